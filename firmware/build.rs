@@ -1,4 +1,4 @@
-//! Linker script, build id and baud rate; refuses builds that would only look right.
+//! Linker script, build id and baud rate. Rejects builds that would look right but not work.
 use std::path::PathBuf;
 use std::process::Command;
 use std::{env, fs};
@@ -45,8 +45,8 @@ fn main() {
     }
 }
 
-/// The commit that is built, with `+` at its end when files were changed since. Always thirteen characters: the log takes the
-/// same time in every build, and figures of one build are those of the next.
+/// Returns the commit that is built, with `+` at its end if files were changed since. Always thirteen characters, so
+/// that the log takes the same time in every build and figures of builds can be compared.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;

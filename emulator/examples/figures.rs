@@ -1,7 +1,8 @@
 //! Figures of a board's program, counted on the emulated chip: instructions, latencies of interrupts, stack.
 //!
-//! `cargo run --release --example figures -- ELF [--cycles]` prints lines that are the same on every machine. `--cycles` adds what
-//! llvm-mca's model of the Cortex-M7 makes of one control step, which depends on the version of LLVM.
+//! `cargo run --release --example figures -- ELF [--cycles]` prints lines that are the same on every machine.
+//! `--cycles` adds the estimate of llvm-mca's model of the Cortex-M7 for one control step, which depends on the version
+//! of LLVM.
 #[path = "figures/cycles.rs"]
 mod cycles;
 #[path = "../tests/rig/mod.rs"]
@@ -18,7 +19,7 @@ use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
 use rig::Rig;
 use session::{Session, Steps};
 
-/// Handlers of the program, by their number in the vector table and the priority that they run at.
+/// Handlers of the program, with their number in the vector table and their priority.
 const HANDLERS: [(&str, usize); 8] = [
     ("TIM7, the tick", FIRST_LINE + 55),
     ("TIM5, time of the links", FIRST_LINE + 50),
@@ -33,9 +34,9 @@ const HANDLERS: [(&str, usize); 8] = [
 /// Longest time from the tick's timer to its first instruction, ns.
 const LATENCY_MAX: u64 = 1_000;
 
-/// How long every instruction is looked at, ms.
+/// Time for which every instruction is checked, ms.
 const MASK_MS: u64 = 150;
-/// Bytes of stack that are never to be used.
+/// Bytes of stack that must never be used.
 const STACK_SPARE: u32 = 4_096;
 
 fn main() -> ExitCode {
@@ -97,7 +98,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// First address above the stack, and its last.
+/// Returns the first address above the stack, and its last.
 fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     let word = elf.segments.iter().find(|(at, _)| *at == 0x0800_0000).ok_or("no vector table")?;
     let top = u32::from_le_bytes(word.1[..4].try_into()?);
@@ -105,7 +106,7 @@ fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     Ok((top, 0x2000_0000))
 }
 
-/// Each handler: its instructions without those of handlers that interrupt it, how late it began, its stack.
+/// Prints each handler: its instructions without those of handlers that interrupt it, its latency, its stack.
 fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     for (name, number) in HANDLERS {
         let (count, latency) = (observers.handlers[number], observers.latencies[number]);
@@ -125,7 +126,8 @@ fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Bytes by context, with the frames of what interrupts it; each may be interrupted by those of a higher priority.
+/// Prints the stack use of each context, with the frames of the exceptions that interrupt it. Handlers of a higher
+/// priority may interrupt each context.
 fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
     let size = top - bottom;
     let mut sum = top - observers.lowest_sp[0];

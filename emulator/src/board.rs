@@ -1,4 +1,5 @@
-//! The board in its world: firmware, simulated arm with drives and gripper on the joint bus, a host on a serial line.
+//! The board in its environment: firmware, simulated arm with drives and gripper on the joint bus, a host on a serial
+//! line.
 use std::cell::{Ref, RefCell};
 use std::rc::Rc;
 
@@ -19,7 +20,7 @@ const SAFETY: (Pin, Pin) = (Pin('D', 3), Pin('D', 4));
 /// A serial port of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Port {
-    /// Next to the connector of the host.
+    /// Serial port next to the connector of the host.
     Usart2,
     /// The ST-LINK's virtual port.
     Usart3,
@@ -28,17 +29,17 @@ pub enum Port {
 /// Settings of a [`Board`].
 #[derive(Clone, Debug)]
 pub struct BoardConfig {
-    /// Arm, drives and gripper; what belongs to the simulator's own controller and line is not used.
+    /// Arm, drives and gripper; settings of the simulator's own controller and line are not used.
     pub sim: SimConfig,
-    /// Nothing is connected to the joint bus.
+    /// `true` if the joint bus has no other members.
     pub no_bus: bool,
     /// Rate of the hosts, bit/s.
     pub baud: u32,
     /// Safety input and safety output.
     pub safety_pins: (Pin, Pin),
-    /// Seed of what RAM holds at first.
+    /// Seed of the initial contents of RAM.
     pub seed: u64,
-    /// What bank 2 of the flash holds from before; the program's own part is put over it.
+    /// Previous contents of bank 2 of the flash; the program's own part overwrites them.
     pub bank2: Bank2,
 }
 
@@ -80,7 +81,7 @@ impl CanPeers for Nodes {
     }
 }
 
-/// Machine and world, one millisecond after the other.
+/// Machine and plant, advanced one millisecond at a time.
 pub struct Board {
     /// The machine.
     pub machine: Machine,
@@ -91,7 +92,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Power is switched on everywhere.
+    /// Switches the power on everywhere.
     pub fn new(elf: Elf, config: &BoardConfig) -> Self {
         let plant = Rc::new(RefCell::new(Plant::new(&config.sim)));
         let mut machine = Machine::with_bank2(elf, config.seed, config.bank2.clone());
@@ -107,12 +108,12 @@ impl Board {
         Self { machine, plant, faults: Vec::new(), safety: config.safety_pins, ms: 0 }
     }
 
-    /// Milliseconds since power-on.
+    /// Returns the milliseconds since power-on.
     pub fn now_ms(&self) -> u64 {
         self.ms
     }
 
-    /// One millisecond of everything: first the machine and the bus, then drives and arm.
+    /// Advances everything by one millisecond: first the machine and the bus, then drives and arm.
     pub fn step(&mut self) {
         self.ms += 1;
         self.machine.run_until(self.ms * MILLISECOND);
@@ -120,27 +121,27 @@ impl Board {
         self.plant.borrow_mut().step(safety);
     }
 
-    /// Many milliseconds.
+    /// Runs `ms` milliseconds.
     pub fn run_ms(&mut self, ms: u64) {
         for _ in 0..ms {
             self.step();
         }
     }
 
-    /// The arm and its drives.
+    /// Returns the arm and its drives.
     pub fn plant(&self) -> Ref<'_, Plant> {
         self.plant.borrow()
     }
 
-    /// Begin a fault of a node, of the arm, of the safety input or of the bus; `FaultKind`s of the simulator's own serial
-    /// line and tick do nothing here.
+    /// Begins a fault of a node, of the arm, of the safety input or of the bus; `FaultKind`s of the simulator's own
+    /// serial line and tick have no effect here.
     pub fn inject(&mut self, kind: FaultKind) {
         self.plant.borrow_mut().begin(kind);
         self.faults.push(kind);
         self.apply_faults();
     }
 
-    /// End a fault.
+    /// Ends a fault.
     pub fn heal(&mut self, kind: FaultKind) {
         self.faults.retain(|&k| k != kind);
         self.apply_faults();
@@ -160,13 +161,13 @@ impl Board {
         chip.drive_pin(self.safety.0, Some(input));
     }
 
-    /// Drive the safety input; `None`: the wire is broken.
+    /// Drives the safety input; `None`: the wire is broken.
     pub fn set_safety_input(&mut self, level: Option<bool>) {
         let pin = self.safety.0;
         self.machine.chip().drive_pin(pin, level);
     }
 
-    /// Level of the safety output; `None` while the pin is not driven.
+    /// Returns the level of the safety output; `None` while the pin is not driven.
     pub fn safety_output(&mut self) -> Option<bool> {
         let pin = self.safety.1;
         self.machine.chip().gpio.output(pin)
@@ -179,34 +180,34 @@ impl Board {
         }
     }
 
-    /// Rate of the host at a port, bit/s.
+    /// Sets the rate of the host at a port, bit/s.
     pub fn set_baud(&mut self, port: Port, baud: u32) {
         self.machine.chip().usarts[Self::index(port)].host_baud = baud;
     }
 
-    /// Rate that the firmware has set at a port, bit/s; 0: none.
+    /// Returns the rate that the firmware has set at a port, bit/s; 0: none.
     pub fn firmware_baud(&self, port: Port) -> u32 {
         self.machine.uc.get_data().usarts[Self::index(port)].baud()
     }
 
-    /// The host sends bytes; they follow those that wait already.
+    /// Sends bytes of the host, after those that already wait.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         let chip = self.machine.chip();
         let now = chip.now();
         chip.usarts[Self::index(port)].host_write(now, bytes);
     }
 
-    /// Bytes of the host that are not through yet.
+    /// Returns the number of bytes of the host that have not passed the line yet.
     pub fn pending(&self, port: Port) -> usize {
         self.machine.uc.get_data().usarts[Self::index(port)].host_pending()
     }
 
-    /// Bytes that have reached the host since the last call, with their times.
+    /// Returns the bytes that have reached the host since the last call, with their times.
     pub fn read_timed(&mut self, port: Port) -> Vec<WireByte> {
         self.machine.chip().usarts[Self::index(port)].take_output().collect()
     }
 
-    /// Bytes that have reached the host since the last call.
+    /// Returns the bytes that have reached the host since the last call.
     pub fn read(&mut self, port: Port) -> Vec<u8> {
         self.read_timed(port).into_iter().map(|b| b.byte).collect()
     }

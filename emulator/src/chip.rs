@@ -31,39 +31,39 @@ const USART_LINES: [usize; 2] = [38, 39];
 /// Interrupt lines of FDCAN1.
 const FDCAN_LINES: [usize; 2] = [19, 21];
 
-/// How often a register was touched that these models do not know.
+/// Number of accesses to a register that these models do not implement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Access {
     /// Reads.
     pub reads: u32,
     /// Writes.
     pub writes: u32,
-    /// Instruction that touched it last.
+    /// Address of the last instruction that accessed it.
     pub pc: u32,
-    /// What was written last.
+    /// Value that was written last.
     pub value: u32,
 }
 
-/// State of the core that the hook of every instruction touches.
+/// State of the core that the hook of every instruction accesses.
 #[derive(Default)]
 pub struct Core {
     /// Instructions executed.
     pub instructions: u64,
-    /// Count at which the hook looks closer.
+    /// Count at which the hook checks more.
     pub look_at: u64,
     /// Count before which the machine must stop.
     pub stop_at: u64,
-    /// The last instruction begun.
+    /// Address of the last instruction that began.
     pub pc: u32,
     /// Addresses of the members of the last IT block.
     pub it_block: Range<u32>,
-    /// A stop was requested.
+    /// `true` if a stop was requested.
     pub stopping: bool,
-    /// Something changed that the loop must see before the next instruction.
+    /// `true` after a change that the loop must handle before the next instruction.
     pub attention: bool,
-    /// Something pends that only masks hold back.
+    /// `true` if a pending exception is blocked only by masks.
     pub masked: bool,
-    /// The instruction before may have lowered the stack pointer.
+    /// `true` if the instruction before may have lowered the stack pointer.
     pub check_sp: bool,
     /// Event register.
     pub event: bool,
@@ -81,7 +81,7 @@ pub struct Core {
 pub struct Chip {
     /// Core.
     pub core: Core,
-    /// What is known of the code.
+    /// Classes of the instructions.
     pub code: Code,
     /// Interrupts.
     pub nvic: Nvic,
@@ -112,7 +112,7 @@ pub struct Chip {
     pub unknown: BTreeMap<u32, Access>,
     /// Accesses to peripherals whose clock is off.
     pub unclocked: BTreeMap<u32, Access>,
-    /// D2 SRAM that may be used has changed.
+    /// `true` if the set of usable D2 SRAM has changed.
     pub remap: bool,
     base_time: Time,
     base_instructions: u64,
@@ -152,18 +152,18 @@ impl Default for Chip {
 }
 
 impl Chip {
-    /// Virtual time.
+    /// Returns the virtual time.
     #[inline]
     pub fn now(&self) -> Time {
         self.base_time + (self.core.instructions - self.base_instructions) * self.cycle
     }
 
-    /// Core clock cycles, sleep included.
+    /// Returns the core clock cycles, sleep included.
     pub fn cycles(&self) -> u64 {
         self.base_cycles + (self.core.instructions - self.base_instructions)
     }
 
-    /// Length of a core clock period.
+    /// Returns the length of a core clock period.
     pub fn cycle(&self) -> Time {
         self.cycle
     }
@@ -174,7 +174,7 @@ impl Chip {
         self.base_instructions = self.core.instructions;
     }
 
-    /// The core sleeps until `time`.
+    /// Lets the core sleep until `time`.
     pub fn sleep_until(&mut self, time: Time) {
         self.rebase();
         if time > self.base_time {
@@ -183,7 +183,7 @@ impl Chip {
         }
     }
 
-    /// Take new frequencies over.
+    /// Applies new frequencies.
     fn update_clocks(&mut self) {
         let clocks = self.rcc.clocks();
         let now = self.now();
@@ -202,7 +202,7 @@ impl Chip {
         }
     }
 
-    /// Everything but memory as after a reset with these flags.
+    /// Sets everything except memory as after a reset with these flags.
     pub fn reset(&mut self, flags: u32) {
         let now = self.now();
         self.rcc.reset(flags);
@@ -226,7 +226,7 @@ impl Chip {
         self.update_clocks();
     }
 
-    /// Drive a pin from outside; `None`: leave it open. Its edges reach EXTI.
+    /// Drives a pin from outside; `None` leaves it open. Its edges reach EXTI.
     pub fn drive_pin(&mut self, pin: Pin, level: Option<bool>) {
         let Some(port) = Gpio::port(pin) else { return };
         let before = self.gpio.levels(port);
@@ -243,7 +243,7 @@ impl Chip {
         }
     }
 
-    /// Let everything up to now happen, and set interrupt lines accordingly.
+    /// Executes everything up to now, and sets interrupt lines accordingly.
     pub fn advance(&mut self, memory: &mut dyn Memory) {
         let now = self.now();
         for timer in &mut self.timers {
@@ -275,7 +275,7 @@ impl Chip {
         }
     }
 
-    /// When something happens next without the core's doing.
+    /// Returns the time of the next event that does not depend on the core.
     pub fn next_event(&self) -> Time {
         let timers = self.timers.iter().map(Timer::next_event);
         let usarts = self.usarts.iter().map(|u| u.next_event(&self.dma));
@@ -286,12 +286,12 @@ impl Chip {
         timers.chain(usarts).chain(others).min().unwrap_or(NEVER)
     }
 
-    /// Supply and voltage scale as the PWR registers have them: CR3 and the VOS code of D3CR.
+    /// Returns the supply and voltage scale of the PWR registers: CR3 and the VOS code of D3CR.
     pub fn supply(&self) -> (u32, u32) {
         (self.plain.read(PWR + 0x0C), self.plain.read(PWR + 0x18) >> 14 & 3)
     }
 
-    /// Microseconds of virtual time.
+    /// Returns the virtual time in microseconds.
     pub fn now_us(&self) -> u64 {
         self.now() / MICROSECOND
     }

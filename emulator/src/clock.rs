@@ -1,6 +1,6 @@
-//! Virtual time, fine enough that a period of every clock of the board is a whole number.
+//! Virtual time, with a resolution at which a period of every clock of the board is a whole number.
 
-/// A moment or a length of virtual time in grains: 1 s = [`SECOND`] grains.
+/// Moment or duration of virtual time in grains: 1 s = [`SECOND`] grains.
 pub type Time = u64;
 
 /// Grains in a second: the least common multiple of 64, 85, 400 and 480 MHz, so that core clock, CAN bits and timer ticks
@@ -10,25 +10,25 @@ pub const SECOND: Time = 81_600_000_000;
 pub const MILLISECOND: Time = SECOND / 1_000;
 /// Grains in a microsecond.
 pub const MICROSECOND: Time = SECOND / 1_000_000;
-/// What never comes.
+/// Time that is never reached.
 pub const NEVER: Time = Time::MAX;
 
-/// Length of one period of a clock, rounded to the grain.
+/// Returns the length of one period of a clock, rounded to the grain.
 pub fn period(hz: u64) -> Time {
     (SECOND + hz / 2).checked_div(hz).unwrap_or(NEVER)
 }
 
-/// Whole microseconds.
+/// Converts to whole microseconds.
 pub fn to_us(time: Time) -> u64 {
     time / MICROSECOND
 }
 
-/// Nanoseconds, rounded down.
+/// Converts to nanoseconds, rounded down.
 pub fn to_ns(time: Time) -> u64 {
     (u128::from(time) * 1_000_000_000 / u128::from(SECOND)) as u64
 }
 
-/// A number of nanoseconds, rounded down to the grain.
+/// Converts from nanoseconds, rounded down to the grain.
 pub fn from_ns(ns: u64) -> Time {
     (u128::from(ns) * u128::from(SECOND) / 1_000_000_000) as u64
 }

@@ -1,12 +1,12 @@
-//! What the machine must know of an instruction before it runs, remembered per address.
+//! Properties that the machine must know of an instruction before it runs, stored per address.
 //!
-//! Unicorn executes `SEV` as nothing, shows no change of the stack pointer and passes over the members of an IT block that its
-//! condition skips, so the few instructions that matter are recognised by their first half-words the first time an address is
-//! executed.
+//! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the members of an IT
+//! block whose condition is false. Therefore the few instructions that matter are recognised by their first half-words,
+//! the first time an address is executed.
 
-/// Not looked at yet.
+/// The address has not been checked yet.
 pub const UNKNOWN: u16 = 0;
-/// Nothing of interest.
+/// An instruction without special handling.
 pub const PLAIN: u16 = 1;
 /// Sets the event register.
 pub const SEV: u16 = 2;
@@ -14,11 +14,12 @@ pub const SEV: u16 = 2;
 pub const LOWERS_SP: u16 = 4;
 /// An observer waits for this address.
 pub const WATCHED: u16 = 8;
-/// Begins an IT block, whose members are counted with it: the core fetches and issues them all, whatever the condition.
+/// Begins an IT block, whose members are counted with it: the core fetches and issues them all, regardless of the
+/// condition.
 pub const IT: u16 = 16;
-/// Stands in an IT block.
+/// Member of an IT block.
 pub const MEMBER: u16 = 32;
-/// Place of the members' number and of their half-words' in the class of an IT instruction.
+/// Position of the number of members, and of the number of their half-words, in the class of an IT instruction.
 const MEMBERS: u32 = 8;
 const HALF_WORDS: u32 = 12;
 
@@ -26,7 +27,7 @@ const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u32 = 0x20_0000;
 const ITCM_SIZE: u32 = 0x1_0000;
 
-/// Classes of the instructions in ITCM and flash; elsewhere every instruction is looked at each time.
+/// Classes of the instructions in ITCM and flash; elsewhere every instruction is checked each time.
 pub struct Code {
     flash: Vec<u16>,
     itcm: Vec<u16>,
@@ -39,7 +40,7 @@ impl Default for Code {
 }
 
 impl Code {
-    /// Class of the instruction at an address.
+    /// Returns the class of the instruction at an address.
     #[inline]
     pub fn class(&self, address: u32) -> u16 {
         let in_flash = address.wrapping_sub(FLASH);
@@ -57,14 +58,14 @@ impl Code {
         self.itcm.get_mut(address as usize / 2)
     }
 
-    /// Remember a class; what observers asked for stays, and that it is in an IT block.
+    /// Stores a class; keeps the observers' mark and the mark of an IT block member.
     pub fn learn(&mut self, address: u32, class: u16) {
         if let Some(place) = self.place(address) {
             *place = class | *place & (WATCHED | MEMBER);
         }
     }
 
-    /// Have the machine stop by at an address; false when code there cannot be watched.
+    /// Makes the machine stop at an address; returns `false` if code there cannot be watched.
     pub fn watch(&mut self, address: u32) -> bool {
         match self.place(address) {
             Some(place) => {
@@ -75,7 +76,7 @@ impl Code {
         }
     }
 
-    /// These bytes were written from outside; whether they may be code.
+    /// Drops the classes of bytes that were written from outside; returns `true` if they may be code.
     pub fn forget(&mut self, address: u32, length: u32) -> bool {
         let mut code = false;
         for at in address..address.saturating_add(length) {
@@ -86,7 +87,7 @@ impl Code {
         code
     }
 
-    /// ITCM was or will be filled anew.
+    /// Drops the classes of ITCM, because it was or will be refilled.
     pub fn forget_itcm(&mut self) {
         for place in &mut self.itcm {
             *place &= WATCHED;
@@ -94,7 +95,7 @@ impl Code {
     }
 }
 
-/// Class of an instruction by its first two half-words.
+/// Returns the class of an instruction by its first two half-words.
 pub fn classify(first: u16, second: u16) -> u16 {
     let lowers = first & 0xFE00 == 0xB400 // PUSH
         || first & 0xFF80 == 0xB080 // SUB SP, #
@@ -117,23 +118,24 @@ pub fn classify(first: u16, second: u16) -> u16 {
     }
 }
 
-/// The IT block that an instruction of this class begins: number of its members, and their length in bytes.
+/// Returns the IT block that an instruction of this class begins: number of its members, and their length in bytes.
 pub fn block(class: u16) -> (u32, u32) {
     (u32::from(class >> MEMBERS) & 7, 2 * (u32::from(class >> HALF_WORDS) & 15))
 }
 
-/// Class of an IT instruction with so many members, in so many bytes.
+/// Returns the class of an IT instruction with this number of members and bytes.
 pub fn begins_block(members: u32, bytes: u32) -> u16 {
     IT | ((members << MEMBERS) | ((bytes / 2) << HALF_WORDS)) as u16
 }
 
-/// Number of members of the IT block that an instruction with this first half-word begins; 0: it begins none.
+/// Returns the number of members of the IT block that an instruction with this first half-word begins; 0: it does not
+/// begin one.
 pub fn it_block(first: u16) -> u32 {
-    // The lowest one of the mask ends the block; without a one it is a hint.
+    // The lowest set bit of the mask ends the block; without a set bit the instruction is a hint.
     if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
 }
 
-/// Length in bytes of an instruction with this first half-word.
+/// Returns the length in bytes of an instruction with this first half-word.
 pub fn length(first: u16) -> u32 {
     if first >= 0xE800 { 4 } else { 2 }
 }

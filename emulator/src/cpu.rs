@@ -1,8 +1,8 @@
-//! The Cortex-M7 itself: Unicorn executes instructions, this loop gives it time, exceptions and sleep.
+//! The Cortex-M7 itself: Unicorn executes instructions; this loop provides time, exceptions and sleep.
 //!
-//! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run exactly
-//! where the next event is due. An IT block is counted where it begins, with all its members, because the hardware takes its
-//! time for those that its condition skips, too; nothing interrupts it.
+//! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run
+//! exactly when the next event is due. An IT block is counted at its beginning, with all its members, because the
+//! hardware also takes time for members that the condition skips; it is never interrupted.
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
 use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 
@@ -30,16 +30,16 @@ mod raised {
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 impl Machine {
-    /// A board with this firmware in its flash; power is switched on. `seed` decides what RAM holds before anything was
-    /// written to it.
+    /// Creates a board with this firmware in its flash and switches the power on. `seed` determines the contents of RAM
+    /// before it is written.
     ///
     /// # Panics
-    /// When Unicorn refuses its set-up, which no input can cause.
+    /// If Unicorn refuses its set-up, which no input can cause.
     pub fn new(elf: Elf, seed: u64) -> Self {
         Self::with_bank2(elf, seed, Bank2::default())
     }
 
-    /// The same with what bank 2 of the flash held before the power was switched on.
+    /// Like [`Machine::new`], with the previous contents of bank 2 of the flash.
     ///
     /// # Panics
     /// As [`Machine::new`].
@@ -52,7 +52,7 @@ impl Machine {
         uc.get_data_mut().flash.bank = bank;
         let mut machine = Self { uc, elf, sleep: Sleep::Awake };
         for (address, bytes) in machine.elf.segments.clone() {
-            // Segments for places that this board does not have are the linker's business.
+            // Segments for places that this board does not have are ignored: they are the linker's responsibility.
             machine.poke(address, &bytes);
         }
         let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
@@ -61,7 +61,7 @@ impl Machine {
         machine
     }
 
-    /// Run until a moment of virtual time.
+    /// Runs until a moment of virtual time.
     pub fn run_until(&mut self, end: Time) {
         while self.now() < end {
             self.slice(end);
@@ -69,7 +69,7 @@ impl Machine {
         self.catch_up();
     }
 
-    /// Pull the reset pin or write SYSRESETREQ: RAM and reset flags stay.
+    /// Resets the machine, by the reset pin or SYSRESETREQ: RAM and reset flags stay.
     pub fn reset(&mut self, cause: ResetCause) {
         let flags = match cause {
             ResetCause::PowerOn => flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU,
@@ -84,7 +84,7 @@ impl Machine {
         self.boot();
     }
 
-    /// First fetch after a reset: stack pointer and entry from the vector table in flash.
+    /// Executes the first fetch after a reset: stack pointer and entry from the vector table in flash.
     fn boot(&mut self) {
         use RegisterARM::*;
         for register in [R0, R1, R2, R3, R4, R5, R6, R7, R8, R9, R10, R11, R12] {
@@ -104,7 +104,7 @@ impl Machine {
         self.remap();
     }
 
-    /// Up to the next event, but not beyond `end`.
+    /// Runs up to the next event, but not beyond `end`.
     fn slice(&mut self, end: Time) {
         self.catch_up();
         let chip = self.uc.get_data_mut();
@@ -151,7 +151,7 @@ impl Machine {
         self.execute();
     }
 
-    /// End a sleep when its condition is there.
+    /// Ends a sleep if its condition is met.
     fn wake(&mut self, masks: Masks) {
         let chip = self.uc.get_data_mut();
         let pended = core::mem::take(&mut chip.nvic.pended);
@@ -196,7 +196,7 @@ impl Machine {
             None => {}
         }
         match result {
-            // WFI ends a run without a word.
+            // WFI ends a run without an error.
             Ok(()) => self.sleep = Sleep::Interrupt,
             Err(uc_error::INSN_INVALID) => self.hint_or_undefined(last),
             Err(uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT) if pc >= EXC_RETURN & !1 => {
@@ -209,7 +209,7 @@ impl Machine {
         }
     }
 
-    /// WFE and YIELD come back as invalid instructions.
+    /// Handles WFE and YIELD, which Unicorn reports as invalid instructions.
     fn hint_or_undefined(&mut self, pc: u32) {
         let word = self.word(pc & !1).unwrap_or(0);
         let (first, second) = (word as u16, (word >> 16) as u16);
@@ -230,7 +230,7 @@ impl Machine {
     }
 }
 
-/// Hooks of instructions, raised exceptions and failed accesses.
+/// Installs the hooks of instructions, raised exceptions and failed accesses.
 fn hook(uc: &mut Unicorn<'static, Chip>) {
     let code = uc.add_code_hook(1, 0, |uc, address, _| {
         let chip = uc.get_data_mut();
@@ -257,11 +257,11 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
     assert!(code.is_ok() && raised.is_ok() && invalid, "Unicorn takes hooks");
 }
 
-/// Before an instruction that needs a closer look.
+/// Checks an instruction that needs special handling before it runs.
 fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     let chip = uc.get_data_mut();
     if chip.core.it_block.contains(&address) {
-        // Counted where the block began, and nothing stops within it.
+        // The instruction was counted at the beginning of its block, and the run must not stop within the block.
         chip.core.pc = address;
         return;
     }
@@ -276,7 +276,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         let core = &mut uc.get_data_mut().core;
         core.stopping = true;
         core.look_at = 0;
-        // The instruction before this one is complete: only here may a run be stopped.
+        // The instruction before this one is complete: a run may be stopped only here.
         let _ = uc.emu_stop();
         return;
     }
@@ -305,7 +305,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     core.pc = address;
 }
 
-/// Class of the instruction at an address, which is remembered.
+/// Returns the class of the instruction at an address, and stores it.
 fn class(uc: &mut Unicorn<'_, Chip>, address: u32) -> u16 {
     let known = uc.get_data().code.class(address);
     if known & !(WATCHED | MEMBER) != UNKNOWN {
@@ -332,7 +332,7 @@ fn half_word(uc: &Unicorn<'_, Chip>, address: u32) -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// The masks no longer hold back what waits.
+/// Returns `true` if the masks no longer block a waiting exception.
 fn unmasked(uc: &Unicorn<'_, Chip>) -> bool {
     let read = |register: RegisterARM| uc.reg_read(register).unwrap_or(0);
     let masks = Masks {

@@ -1,7 +1,7 @@
 //! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): transfers between a peripheral and memory, one at a time, circular or
 //! not, with their half and full flags.
 
-/// Streams of both controllers together: DMA1 0..8, DMA2 8..16.
+/// Number of streams of both controllers: DMA1 0..8, DMA2 8..16.
 pub const STREAMS: usize = 16;
 
 const EN: u32 = 1;
@@ -18,18 +18,18 @@ const TEIF: u32 = 1 << 3;
 /// Interrupt lines of the streams.
 pub const LINES: [usize; STREAMS] = [11, 12, 13, 14, 15, 16, 17, 47, 56, 57, 58, 59, 60, 68, 69, 70];
 
-/// Memory as a controller reaches it.
+/// Memory as a controller accesses it.
 pub trait Memory {
-    /// False when nothing is there.
+    /// Reads bytes; returns `false` at an unmapped address.
     fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool;
-    /// False when nothing is there.
+    /// Writes bytes; returns `false` at an unmapped address.
     fn write(&mut self, address: u32, bytes: &[u8]) -> bool;
 }
 
 #[derive(Clone, Copy, Default)]
 struct Stream {
     cr: u32,
-    /// NDTR as written and what is left.
+    /// NDTR as written, and the remaining count.
     total: u32,
     left: u32,
     par: u32,
@@ -52,7 +52,7 @@ impl Stream {
         self.m0ar.wrapping_add((self.total - self.left) * self.size())
     }
 
-    /// Count one transfer.
+    /// Counts one transfer.
     fn done(&mut self) {
         self.left -= 1;
         if self.left == self.total / 2 {
@@ -77,20 +77,20 @@ pub struct Dma {
     pub errors: u32,
 }
 
-/// TCM is behind the core's own port: DMA1 and DMA2 do not reach it.
+/// Returns `true` if DMA1 and DMA2 reach the address: not TCM, which is connected to the core only.
 fn reachable(address: u32) -> bool {
     !(address < 0x0001_0000 || (0x2000_0000..0x2002_0000).contains(&address))
 }
 
 impl Dma {
-    /// Reset a controller, 0 or 1.
+    /// Resets a controller, 0 or 1.
     pub fn reset(&mut self, controller: usize) {
         for stream in self.streams.iter_mut().skip(8 * controller).take(8) {
             *stream = Stream { request: stream.request, ..Stream::default() };
         }
     }
 
-    /// Read a word of controller 0 or 1.
+    /// Reads a word of controller 0 or 1.
     pub fn read(&self, controller: usize, offset: u32) -> u32 {
         let streams = &self.streams[8 * controller..8 * controller + 8];
         match offset {
@@ -113,7 +113,7 @@ impl Dma {
         }
     }
 
-    /// Write a word of controller 0 or 1.
+    /// Writes a word of controller 0 or 1.
     pub fn write(&mut self, controller: usize, offset: u32, value: u32) {
         let streams = &mut self.streams[8 * controller..8 * controller + 8];
         match offset {
@@ -155,24 +155,24 @@ impl Dma {
         }
     }
 
-    /// Read a word of DMAMUX1.
+    /// Reads a word of DMAMUX1.
     pub fn read_mux(&self, offset: u32) -> u32 {
         self.streams.get(offset as usize / 4).map_or(0, |s| s.request)
     }
 
-    /// Write a word of DMAMUX1.
+    /// Writes a word of DMAMUX1.
     pub fn write_mux(&mut self, offset: u32, value: u32) {
         if let Some(stream) = self.streams.get_mut(offset as usize / 4) {
             stream.request = value;
         }
     }
 
-    /// The running stream that serves a request line.
+    /// Returns the running stream that serves a request line.
     pub fn serving(&self, request: u32) -> Option<usize> {
         self.streams.iter().position(|s| s.cr & EN != 0 && s.request & 0x7F == request)
     }
 
-    /// Transfers until the stream raises an interrupt that is enabled.
+    /// Returns the number of transfers until the stream raises an enabled interrupt.
     pub fn until_interrupt(&self, stream: usize) -> Option<u32> {
         let s = &self.streams[stream];
         let half = (s.cr & 8 != 0).then(|| s.left.checked_sub(s.total / 2)).flatten().filter(|&n| n > 0);
@@ -180,7 +180,7 @@ impl Dma {
         half.into_iter().chain(full).min()
     }
 
-    /// Peripheral to memory.
+    /// Transfers a byte from a peripheral to memory.
     pub fn give(&mut self, stream: usize, byte: u8, memory: &mut dyn Memory) {
         let s = &mut self.streams[stream];
         let word = u32::from(byte).to_le_bytes();
@@ -191,7 +191,7 @@ impl Dma {
         s.done();
     }
 
-    /// Memory to peripheral.
+    /// Transfers a byte from memory to a peripheral.
     pub fn take(&mut self, stream: usize, memory: &mut dyn Memory) -> Option<u8> {
         let s = &mut self.streams[stream];
         let mut byte = [0];
@@ -211,15 +211,15 @@ impl Dma {
         s.cr &= !EN;
     }
 
-    /// Interrupt line of a stream.
+    /// Returns the level of the interrupt line of a stream.
     pub fn line(&self, stream: usize) -> bool {
         let s = &self.streams[stream];
-        // Enable bits TEIE, HTIE, TCIE stand in the order of their flags.
+        // The enable bits TEIE, HTIE, TCIE have the same order as their flags.
         s.flags & (s.cr & 0x1C) << 1 != 0
     }
 }
 
-/// Places of four streams' flags in a status register.
+/// Positions of four streams' flags in a status register.
 const SHIFTS: [u32; 4] = [0, 6, 16, 22];
 
 #[cfg(test)]

@@ -1,27 +1,27 @@
-//! The firmware's ELF file: what to load where, and its symbols.
+//! The firmware's ELF file: segments with their load addresses, and symbols.
 use std::collections::BTreeMap;
 use std::fmt;
 
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Object, ObjectSymbol, SymbolKind};
 
-/// Why an ELF file cannot be used.
+/// Reason why an ELF file cannot be used.
 #[derive(Debug)]
 pub enum ElfError {
-    /// It is none, or is damaged.
+    /// The file is not an ELF file, or is damaged.
     Bad(object::Error),
     /// No symbol has this name.
     NoSymbol {
-        /// The name asked for.
+        /// Requested name.
         name: String,
-        /// Names that are near to it.
+        /// Similar names.
         near: Vec<String>,
     },
     /// More than one symbol has this part in its name.
     Ambiguous {
-        /// The part asked for.
+        /// Requested part.
         name: String,
-        /// The names that have it.
+        /// Names that contain it.
         found: Vec<String>,
     },
 }
@@ -53,13 +53,13 @@ impl From<object::Error> for ElfError {
 pub struct Symbol {
     /// Address, for a function without the Thumb bit.
     pub address: u32,
-    /// Bytes.
+    /// Size in bytes.
     pub size: u32,
-    /// It is code.
+    /// `true` if the symbol is code.
     pub code: bool,
 }
 
-/// What is loaded from the file.
+/// Contents of the file that are loaded.
 #[derive(Clone, Debug, Default)]
 pub struct Elf {
     /// Load addresses and contents.
@@ -68,7 +68,7 @@ pub struct Elf {
 }
 
 impl Elf {
-    /// Parse a 32-bit little-endian ELF file.
+    /// Parses a 32-bit little-endian ELF file.
     pub fn parse(bytes: &[u8]) -> Result<Self, ElfError> {
         let header = object::elf::FileHeader32::<object::Endianness>::parse(bytes)?;
         let endian = header.endian()?;
@@ -95,19 +95,19 @@ impl Elf {
         Ok(elf)
     }
 
-    /// A firmware that is nothing but these bytes at an address.
+    /// Creates a firmware that consists only of these bytes at an address.
     pub fn from_image(address: u32, bytes: Vec<u8>) -> Self {
         Self { segments: vec![(address, bytes)], symbols: BTreeMap::new() }
     }
 
-    /// The same with one more symbol.
+    /// Adds a symbol.
     pub fn with_symbol(mut self, name: &str, symbol: Symbol) -> Self {
         self.symbols.insert(name.to_owned(), symbol);
         self
     }
 
-    /// A symbol by its full name, or by a part of it that no other symbol has. Rust names are written as in the source,
-    /// without the hash.
+    /// Finds a symbol by its full name, or by a part of the name that no other symbol contains. Rust names are written
+    /// as in the source, without the hash.
     pub fn symbol(&self, name: &str) -> Result<Symbol, ElfError> {
         if let Some(symbol) = self.symbols.get(name) {
             return Ok(*symbol);
@@ -127,12 +127,12 @@ impl Elf {
         }
     }
 
-    /// All symbols by name.
+    /// Returns all symbols by name.
     pub fn symbols(&self) -> &BTreeMap<String, Symbol> {
         &self.symbols
     }
 
-    /// Name of the function at an address.
+    /// Returns the name of the function at an address.
     pub fn function_at(&self, address: u32) -> Option<&str> {
         let holds = |s: &Symbol| s.code && (s.address..s.address + s.size.max(2)).contains(&address);
         self.symbols.iter().find(|(_, s)| holds(s)).map(|(name, _)| name.as_str())

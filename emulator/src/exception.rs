@@ -9,17 +9,17 @@ const BASIC: [RegisterARM; 6] = [R0, R1, R2, R3, R12, LR];
 const FLOATS: [RegisterARM; 8] = [D0, D1, D2, D3, D4, D5, D6, D7];
 /// Words of the frame.
 const WORDS: usize = 26;
-/// Where FPSCR stands in it.
+/// Position of FPSCR in the frame.
 const FPSCR_AT: usize = 24;
 
-/// Return to a handler, to a thread with an extended frame on the main stack.
+/// Return to a handler, or to a thread with an extended frame on the main stack.
 const TO_HANDLER: u32 = 0xFFFF_FFE1;
 const TO_THREAD: u32 = 0xFFFF_FFE9;
 
 /// Bit of the stacked xPSR that marks a padding word.
 const ALIGNED: u32 = 1 << 9;
 
-/// Run the handler of an exception next.
+/// Enters the handler of an exception.
 pub fn enter(machine: &mut Machine, exception: usize) {
     let sp = machine.register(SP);
     let padding = sp & 4;
@@ -60,7 +60,7 @@ pub fn enter(machine: &mut Machine, exception: usize) {
     }
 }
 
-/// The handler has jumped to an exception return value.
+/// Handles the jump of a handler to an exception return value.
 pub fn leave(machine: &mut Machine, to: u32) {
     let chip = machine.chip();
     let (now, instructions) = (chip.now(), chip.core.instructions);
@@ -90,7 +90,7 @@ pub fn leave(machine: &mut Machine, to: u32) {
     machine.set(XPSR_NZCVQG, xpsr & !ALIGNED);
     let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
     machine.set(SP, sp + 4 * WORDS as u32 + padding);
-    // FAULTMASK falls with the return from any exception but NMI.
+    // FAULTMASK is cleared by the return from any exception but NMI.
     machine.set(FAULTMASK, 0);
     machine.set(PC, word(6) | 1);
 }

@@ -1,5 +1,5 @@
-//! Extended interrupt and event controller, as far as pins are concerned (RM0399, EXTI and SYSCFG_EXTICR1..4): edges of a pin
-//! set pending bits that stay until a 1 is written to them.
+//! Extended interrupt and event controller, for pins only (RM0399, EXTI and SYSCFG_EXTICR1..4): edges of a pin set
+//! pending bits that stay until a 1 is written to them.
 
 /// Lines of pins.
 const LINES: usize = 16;
@@ -9,7 +9,7 @@ const LINES: usize = 16;
 pub struct Exti {
     rtsr: u32,
     ftsr: u32,
-    /// Interrupt mask of core 1; a line that is masked gets no pending bit here, which is the stricter reading.
+    /// Interrupt mask of core 1. A masked line gets no pending bit here, which is the stricter reading of the manual.
     imr: u32,
     emr: u32,
     pending: u32,
@@ -17,7 +17,7 @@ pub struct Exti {
 }
 
 impl Exti {
-    /// Read a register of EXTI.
+    /// Reads a register of EXTI.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x00 => self.rtsr,
@@ -29,32 +29,32 @@ impl Exti {
         }
     }
 
-    /// Write a register of EXTI.
+    /// Writes a register of EXTI.
     pub fn write(&mut self, offset: u32, value: u32) {
         match offset {
             0x00 => self.rtsr = value,
             0x04 => self.ftsr = value,
             0x80 => self.imr = value,
             0x84 => self.emr = value,
-            // A 1 clears.
+            // Writing 1 clears.
             0x88 => self.pending &= !value,
             _ => {}
         }
     }
 
-    /// Read SYSCFG_EXTICR1..4 (0..3).
+    /// Reads SYSCFG_EXTICR1..4 (0..3).
     pub fn source(&self, n: usize) -> u32 {
         self.exticr.get(n).copied().unwrap_or(0)
     }
 
-    /// Write SYSCFG_EXTICR1..4 (0..3).
+    /// Writes SYSCFG_EXTICR1..4 (0..3).
     pub fn set_source(&mut self, n: usize, value: u32) {
         if let Some(register) = self.exticr.get_mut(n) {
             *register = value & 0xFFFF;
         }
     }
 
-    /// Levels of the pins of a port (0 is A) have changed.
+    /// Latches the edges after the levels of the pins of a port (0 is A) have changed.
     pub fn edges(&mut self, port: usize, before: u32, after: u32) {
         let falling = before & !after & self.ftsr;
         let rising = after & !before & self.rtsr;

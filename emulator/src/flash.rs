@@ -1,5 +1,6 @@
-//! Bank 2 of the embedded flash (RM0399 chapter 4): erasing and programming take their time, a read in that time halts the core, a
-//! loss of power in it leaves anything. Bank 1 holds the program and stays locked.
+//! Bank 2 of the embedded flash (RM0399 chapter 4): erasing and programming take time, a read during an operation halts
+//! the core, and a loss of power during an operation leaves undefined contents. Bank 1 holds the program and stays
+//! locked.
 mod bank;
 
 use crate::clock::{MICROSECOND, SECOND, Time};
@@ -33,7 +34,7 @@ mod cr {
 pub mod sr {
     /// An operation runs.
     pub const BSY: u32 = 1 << 0;
-    /// Some bytes of a word are here, and not all.
+    /// Some bytes of a word have arrived, but not all.
     pub const WBNE: u32 = 1 << 1;
     /// An operation runs or waits.
     pub const QW: u32 = 1 << 2;
@@ -41,7 +42,7 @@ pub mod sr {
     pub const EOP: u32 = 1 << 16;
     /// Write protection.
     pub const WRPERR: u32 = 1 << 17;
-    /// Programming without having been set to do so.
+    /// Programming without having enabled it.
     pub const PGSERR: u32 = 1 << 18;
     /// A byte was written twice.
     pub const STRBERR: u32 = 1 << 19;
@@ -53,17 +54,17 @@ pub mod sr {
     pub const DBECCERR: u32 = 1 << 26;
 }
 
-/// What the bank does.
+/// Kind of operation of the bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperationKind {
     /// A sector becomes all ones.
     Erase {
-        /// Its number.
+        /// Number of the sector.
         sector: usize,
     },
     /// A word is programmed.
     Program {
-        /// Its address.
+        /// Address of the word.
         address: u32,
     },
 }
@@ -71,17 +72,17 @@ pub enum OperationKind {
 /// An operation of the bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
-    /// What.
+    /// Kind of the operation.
     pub kind: OperationKind,
-    /// Beginning.
+    /// Start of the operation.
     pub start: Time,
-    /// End.
+    /// End of the operation.
     pub end: Time,
 }
 
 /// The flash interface.
 pub struct Flash {
-    /// What it holds.
+    /// Contents of the bank.
     pub bank: Bank2,
     /// Time to erase a sector.
     pub erase_time: Time,
@@ -89,26 +90,26 @@ pub struct Flash {
     pub program_time: Time,
     /// All operations, oldest first.
     pub operations: Vec<Operation>,
-    /// Reads and writes that had to wait for an operation, with the time that the core stood still.
+    /// Reads and writes that waited for an operation: the moment, and the time for which the core stood still.
     pub stalls: Vec<(Time, Time)>,
-    /// Accesses to the bank as memory that the core may cache or read ahead of the program.
+    /// Number of accesses to the bank as memory that the core may cache or read ahead of the program.
     pub ahead: u32,
-    /// Words that were programmed again without being erased.
+    /// Number of words that were programmed again without being erased.
     pub overwrites: u32,
-    /// Longest time within an operation in which the protection unit would have let the core read the bank.
+    /// Longest time within an operation during which the protection unit would have allowed the core to read the bank.
     pub longest_open: Time,
     /// Bits of SR in which the next operation ends.
     pub fail_next: u32,
-    /// Somebody has unlocked bank 1.
+    /// `true` if the program has unlocked bank 1.
     pub bank1_unlocked: bool,
-    /// What was left unfinished by resets.
+    /// Number of resets: seed of the contents that an interrupted operation leaves.
     torn: u64,
     cr: u32,
     sr: u32,
-    /// Keys that were written; more than two: refused until a reset.
+    /// Keys that were written; after more than two, unlocking is refused until a reset.
     keys: usize,
     running: Option<Operation>,
-    /// The word that is being written: its number, its bytes, which of them are there.
+    /// Word that is being written: its number, its bytes, and a mask of the bytes that have arrived.
     buffer: Option<(usize, [u8; WORD], u32)>,
     open_since: Option<Time>,
 }
@@ -139,7 +140,7 @@ impl Default for Flash {
 }
 
 impl Flash {
-    /// Registers as after a reset; an operation is broken off.
+    /// Sets the registers as after a reset; interrupts a running operation.
     pub fn reset(&mut self, now: Time) {
         self.torn += 1;
         self.bank = self.cut(now, self.torn);
@@ -147,7 +148,7 @@ impl Flash {
         self.open_since = None;
     }
 
-    /// What the bank holds when the power goes now.
+    /// Returns the contents of the bank if the power fails now.
     pub fn cut(&self, now: Time, seed: u64) -> Bank2 {
         let mut bank = self.bank.clone();
         if let Some(operation) = self.running.filter(|o| o.start < now) {
@@ -157,12 +158,12 @@ impl Flash {
         bank
     }
 
-    /// When the operation that runs now ends.
+    /// Returns the end of the operation that runs now.
     pub fn busy_until(&self, now: Time) -> Option<Time> {
         self.running.map(|operation| operation.end).filter(|end| *end > now)
     }
 
-    /// Lets what has ended by now take effect.
+    /// Applies the operation that has ended by now.
     pub fn advance(&mut self, now: Time) {
         let Some(operation) = self.running.take_if(|operation| operation.end <= now) else { return };
         self.guard(operation.end, true);
@@ -186,7 +187,7 @@ impl Flash {
         }
     }
 
-    /// The protection unit keeps the core out from now on, or does not.
+    /// Notes that the protection unit blocks or allows access of the core from now on.
     pub fn guard(&mut self, now: Time, closed: bool) {
         if closed {
             let open = self.open_since.take().map_or(0, |since| now.saturating_sub(since));
@@ -207,7 +208,7 @@ impl Flash {
         self.guard(now, closed);
     }
 
-    /// A register; `None` for those that are memory to every program.
+    /// Reads a register; returns `None` for those that are plain memory to every program.
     pub fn read_register(&mut self, offset: u32, now: Time) -> Option<u32> {
         self.advance(now);
         Some(match offset {
@@ -227,7 +228,8 @@ impl Flash {
         })
     }
 
-    /// Write a register; false for those that are memory. `closed`: the protection unit keeps the core out of the bank.
+    /// Writes a register; returns `false` for those that are plain memory. `closed`: the protection unit blocks access
+    /// of the core to the bank.
     pub fn write_register(&mut self, offset: u32, value: u32, now: Time, closed: bool) -> bool {
         self.advance(now);
         match offset {
@@ -270,7 +272,7 @@ impl Flash {
         }
     }
 
-    /// The core reads; the flag shows that the word cannot be read.
+    /// Handles a read by the core; the flag shows that the word cannot be read.
     pub fn load(&mut self, address: u32, size: usize) -> (u32, bool) {
         let at = (address - BANK2) as usize;
         let bad = self.bank.cells[at / WORD] == Cell::Unreadable;
@@ -281,7 +283,7 @@ impl Flash {
         (bytes.rev().fold(0, |value, byte| value << 8 | u32::from(*byte)), bad)
     }
 
-    /// The core writes; nothing runs.
+    /// Handles a write by the core; no operation may run.
     pub fn store(&mut self, address: u32, size: usize, value: u32, now: Time, closed: bool) {
         let at = (address - BANK2) as usize;
         let (n, first) = (at / WORD, at % WORD);

@@ -1,4 +1,4 @@
-//! Pins (RM0399 chapter 12): driven from outside, and a record of every change that the firmware makes.
+//! Pins (RM0399 chapter 12): driven from outside, with a record of every change that the firmware makes.
 use crate::clock::Time;
 
 /// A pin: port letter and number.
@@ -8,11 +8,11 @@ pub struct Pin(pub char, pub u8);
 /// A change of a pin that the firmware drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PinChange {
-    /// When.
+    /// Time of the change.
     pub time: Time,
-    /// Which.
+    /// The pin.
     pub pin: Pin,
-    /// Level now.
+    /// New level.
     pub level: bool,
 }
 
@@ -27,14 +27,14 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// What the outside drives, where `driven` has a bit.
+    /// Levels that are driven from outside, at the bits that are set in `driven`.
     outside: u16,
     driven: u16,
 }
 
 impl Port {
     fn new(index: usize) -> Self {
-        // The debug pins stand at their function after reset.
+        // After reset the debug pins have their alternate function.
         let (moder, pupdr) = match index {
             0 => (0xABFF_FFFF, 0x6400_0000),
             1 => (0xFFFF_FEBF, 0x0000_0100),
@@ -47,7 +47,7 @@ impl Port {
         self.moder >> (2 * pin) & 3 == 1
     }
 
-    /// Levels on the pins: own output, else the outside, else the pull resistor.
+    /// Returns the levels on the pins: the own output, else the outside level, else the pull resistor.
     fn idr(&self) -> u32 {
         (0..16).fold(0, |word, pin| {
             let outside = u32::from(self.outside) >> pin & 1;
@@ -80,7 +80,7 @@ impl Default for Gpio {
 }
 
 impl Gpio {
-    /// A reset: all pins are inputs again. What the outside drives stays.
+    /// Resets all ports: all pins are inputs again. Levels that are driven from outside stay.
     pub fn reset(&mut self, now: Time) {
         for index in 0..PORTS {
             let before = self.ports[index].outputs();
@@ -98,7 +98,7 @@ impl Gpio {
         }
     }
 
-    /// Read a word of a port.
+    /// Reads a word of a port.
     pub fn read(&self, index: usize, offset: u32) -> u32 {
         let Some(port) = self.ports.get(index) else { return 0 };
         match offset {
@@ -114,7 +114,7 @@ impl Gpio {
         }
     }
 
-    /// Write a word of a port.
+    /// Writes a word of a port.
     pub fn write(&mut self, index: usize, offset: u32, value: u32, now: Time) {
         let Some(port) = self.ports.get_mut(index) else { return };
         let before = port.outputs();
@@ -124,7 +124,7 @@ impl Gpio {
             0x08 => port.ospeedr = value,
             0x0C => port.pupdr = value,
             0x14 => port.odr = value & 0xFFFF,
-            // Set wins over reset.
+            // Set has priority over reset.
             0x18 => port.odr = port.odr & !(value >> 16) | value & 0xFFFF,
             0x1C => port.lckr = value,
             0x20 | 0x24 => port.afr[(offset as usize - 0x20) / 4] = value,
@@ -138,17 +138,17 @@ impl Gpio {
         (index < PORTS && pin.1 < 16).then_some((index, u32::from(pin.1)))
     }
 
-    /// Number of a pin's port, 0 for A.
+    /// Returns the number of a pin's port, 0 for A.
     pub fn port(pin: Pin) -> Option<usize> {
         Self::place(pin).map(|(port, _)| port)
     }
 
-    /// Levels on the pins of a port: IDR.
+    /// Returns the levels on the pins of a port: IDR.
     pub fn levels(&self, port: usize) -> u32 {
         self.ports.get(port).map_or(0, Port::idr)
     }
 
-    /// Drive a pin from outside; `None`: leave it open.
+    /// Drives a pin from outside; `None` leaves it open.
     pub fn drive(&mut self, pin: Pin, level: Option<bool>) {
         let Some((index, bit)) = Self::place(pin) else { return };
         let port = &mut self.ports[index];
@@ -157,19 +157,19 @@ impl Gpio {
         port.outside = port.outside & !mask | if level == Some(true) { mask } else { 0 };
     }
 
-    /// Level that the firmware drives; `None` when the pin is no output.
+    /// Returns the level that the firmware drives; `None` if the pin is not an output.
     pub fn output(&self, pin: Pin) -> Option<bool> {
         let (index, bit) = Self::place(pin)?;
         let port = &self.ports[index];
         port.is_output(bit).then_some(port.odr >> bit & 1 == 1)
     }
 
-    /// Pull resistor of a pin: PUPDR.
+    /// Returns the pull resistor of a pin: PUPDR.
     pub fn pull(&self, pin: Pin) -> u32 {
         Self::place(pin).map_or(0, |(index, bit)| self.ports[index].pupdr >> (2 * bit) & 3)
     }
 
-    /// Every change of an output since power-on, oldest first.
+    /// Returns every change of an output since power-on, oldest first.
     pub fn changes(&self) -> &[PinChange] {
         &self.changes
     }

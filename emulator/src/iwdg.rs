@@ -11,7 +11,7 @@ pub struct Iwdg {
     window: u32,
     unlocked: bool,
     bites: Time,
-    /// Shortest time that was left when it was fed.
+    /// Shortest remaining time at which the firmware fed the watchdog.
     pub least_left: Time,
 }
 
@@ -22,12 +22,12 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// Off, as after any reset.
+    /// Switches it off, as after any reset.
     pub fn reset(&mut self) {
         *self = Self { least_left: self.least_left, ..Self::default() };
     }
 
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {
             0x04 => self.prescaler,
@@ -37,7 +37,7 @@ impl Iwdg {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         match offset {
             0x00 => match value & 0xFFFF {
@@ -62,18 +62,18 @@ impl Iwdg {
         }
     }
 
-    /// Time from feeding to the reset.
+    /// Returns the time from feeding to the reset.
     pub fn timeout(&self) -> Time {
         let divider = 4 << self.prescaler.min(6);
         (u64::from(self.reload) + 1) * divider * SECOND / LSI_HZ
     }
 
-    /// When it resets the machine if it is not fed.
+    /// Returns the time at which it resets the machine unless it is fed.
     pub fn bites(&self) -> Time {
         self.bites
     }
 
-    /// It runs.
+    /// Returns `true` while the watchdog runs.
     pub fn running(&self) -> bool {
         self.bites != NEVER
     }

@@ -1,4 +1,4 @@
-//! The machine from outside: registers, memory, faults. What makes it run is in `cpu`.
+//! The machine from outside: registers, memory, faults. The module `cpu` runs it.
 use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::chip::Chip;
@@ -32,42 +32,42 @@ fn in_bank2(address: u32) -> bool {
 }
 
 impl Machine {
-    /// The chip around the core.
+    /// Returns the chip around the core.
     pub fn chip(&mut self) -> &mut Chip {
         self.uc.get_data_mut()
     }
 
-    /// The firmware's file.
+    /// Returns the firmware's file.
     pub fn elf(&self) -> &Elf {
         &self.elf
     }
 
-    /// Virtual time since power-on.
+    /// Returns the virtual time since power-on.
     pub fn now(&self) -> Time {
         self.uc.get_data().now()
     }
 
-    /// Instructions executed since power-on.
+    /// Returns the instructions executed since power-on.
     pub fn instructions(&self) -> u64 {
         self.uc.get_data().core.instructions
     }
 
-    /// A core register.
+    /// Returns a core register.
     pub fn register(&self, register: RegisterARM) -> u32 {
         self.uc.reg_read(register).unwrap_or(0) as u32
     }
 
-    /// The instruction that comes next.
+    /// Returns the address of the next instruction.
     pub fn pc(&self) -> u32 {
         self.register(RegisterARM::PC)
     }
 
-    /// The core stands still after a fault within a fault.
+    /// Returns `true` if the core stands still after a fault within a fault.
     pub fn locked_up(&self) -> bool {
         self.sleep == Sleep::Lockup
     }
 
-    /// Let peripherals happen up to now.
+    /// Advances the peripherals to the present.
     pub(crate) fn catch_up(&mut self) {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().advance(&mut ram);
@@ -78,7 +78,7 @@ impl Machine {
         let _ = self.uc.reg_write(register, u64::from(value));
     }
 
-    /// A word of memory; `None` where nothing is.
+    /// Returns a word of memory; `None` at an unmapped address.
     pub fn word(&self, address: u32) -> Option<u32> {
         if in_bank2(address) {
             let bytes = self.memory(address, 4)?;
@@ -89,7 +89,7 @@ impl Machine {
         Some(u32::from_le_bytes(bytes))
     }
 
-    /// Bytes of memory; `None` where nothing is.
+    /// Returns bytes of memory; `None` at an unmapped address.
     pub fn memory(&self, address: u32, length: usize) -> Option<Vec<u8>> {
         if in_bank2(address) {
             let fits = address as usize + length <= (BANK2 + BANK2_SIZE) as usize;
@@ -98,7 +98,7 @@ impl Machine {
         self.uc.mem_read_as_vec(u64::from(address), length).ok()
     }
 
-    /// Change memory from outside, as a debugger does, code too; false where nothing is.
+    /// Changes memory from outside, as a debugger does, code too; returns `false` at an unmapped address.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
         if in_bank2(address) {
             let fits = address as usize + bytes.len() <= (BANK2 + BANK2_SIZE) as usize;
@@ -109,20 +109,20 @@ impl Machine {
         }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // What was translated from the old code would go on running.
+            // Unicorn would otherwise keep running the translation of the old code.
             self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }
         written
     }
 
-    /// Read a register of a peripheral from outside, as a debugger does.
+    /// Reads a register of a peripheral from outside, as a debugger does.
     pub fn read_register(&mut self, address: u32) -> u32 {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().load(address, 4, &mut ram)
     }
 
-    /// Write a register of a peripheral from outside, as a debugger does.
+    /// Writes a register of a peripheral from outside, as a debugger does.
     pub fn write_register(&mut self, address: u32, value: u32) {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().store(address, 4, value, &mut ram);
@@ -131,7 +131,8 @@ impl Machine {
         }
     }
 
-    /// What bank 2 of the flash would hold if the power went now: chance, from `seed`, where an operation runs.
+    /// Returns the contents of bank 2 of the flash if the power failed now: random, from `seed`, in places of a running
+    /// operation.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.uc.get_data().flash.cut(self.now(), seed)
     }
@@ -144,13 +145,13 @@ impl Machine {
         }
     }
 
-    /// D2 SRAM can be used as far as its clocks are enabled.
+    /// Maps the D2 SRAM whose clocks are enabled.
     pub(crate) fn remap(&mut self) {
         self.chip().remap = false;
         memory::protect(&mut self.uc);
     }
 
-    /// A fault at an instruction: HardFault, or lock-up within it.
+    /// Handles a fault at an instruction: HardFault, or lock-up within it.
     pub(crate) fn fault(&mut self, kind: FaultKind, pc: u32) {
         let masks = self.masks();
         let chip = self.chip();

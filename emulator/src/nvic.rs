@@ -1,11 +1,11 @@
-//! Exceptions: which are pending, which may run, in which order (ARMv7-M B1.5, four priority bits as on STM32).
+//! Exceptions: pending state, permission to run, and order (ARMv7-M B1.5, four priority bits as on STM32).
 use crate::clock::Time;
 
 /// Interrupt lines of the device.
 pub const LINES: usize = 150;
-/// Number of the first interrupt line among the exceptions.
+/// Exception number of the first interrupt line.
 pub const FIRST_LINE: usize = 16;
-/// All exceptions.
+/// Number of all exceptions.
 pub const EXCEPTIONS: usize = FIRST_LINE + LINES;
 
 /// Numbers of the core's own exceptions.
@@ -22,7 +22,7 @@ pub mod exception {
     pub const SYS_TICK: usize = 15;
 }
 
-/// Lower is more urgent; this is what runs without any exception.
+/// Priority of code outside exceptions. Lower values are more urgent.
 const THREAD: i32 = 256;
 
 /// Mask registers of the core.
@@ -40,7 +40,7 @@ pub struct Masks {
 pub struct Nvic {
     enabled: [bool; EXCEPTIONS],
     pending: [bool; EXCEPTIONS],
-    /// When each became pending.
+    /// Time at which each exception became pending.
     since: [Time; EXCEPTIONS],
     active: [bool; EXCEPTIONS],
     level: [bool; EXCEPTIONS],
@@ -49,7 +49,7 @@ pub struct Nvic {
     waiting: Vec<usize>,
     /// AIRCR.PRIGROUP.
     pub prigroup: u32,
-    /// An interrupt became pending since this was last cleared: what wakes WFE with SCR.SEVONPEND.
+    /// `true` if an interrupt became pending since this was last cleared: wakes WFE if SCR.SEVONPEND is set.
     pub pended: bool,
 }
 
@@ -84,7 +84,7 @@ impl Nvic {
         }
     }
 
-    /// Make an exception pending.
+    /// Makes an exception pending.
     pub fn pend(&mut self, exception: usize, now: Time) {
         if !self.pending[exception] {
             self.pending[exception] = true;
@@ -94,13 +94,13 @@ impl Nvic {
         }
     }
 
-    /// Take a pending exception back.
+    /// Withdraws a pending exception.
     pub fn unpend(&mut self, exception: usize) {
         self.pending[exception] = false;
         self.update(exception);
     }
 
-    /// Level of an interrupt line: a rising one makes the interrupt pending.
+    /// Sets the level of an interrupt line: a rising edge makes the interrupt pending.
     pub fn set_line(&mut self, line: usize, level: bool, now: Time) {
         let exception = FIRST_LINE + line;
         let before = core::mem::replace(&mut self.level[exception], level);
@@ -109,48 +109,48 @@ impl Nvic {
         }
     }
 
-    /// The exception is pending.
+    /// Returns `true` if the exception is pending.
     pub fn is_pending(&self, exception: usize) -> bool {
         self.pending[exception]
     }
 
-    /// The exception runs or is preempted.
+    /// Returns `true` if the exception runs or is preempted.
     pub fn is_active(&self, exception: usize) -> bool {
         self.active[exception]
     }
 
-    /// The exception may run.
+    /// Returns `true` if the exception is enabled.
     pub fn is_enabled(&self, exception: usize) -> bool {
         self.enabled[exception]
     }
 
-    /// Allow or forbid an exception to run.
+    /// Enables or disables an exception.
     pub fn enable(&mut self, exception: usize, enabled: bool) {
         self.enabled[exception] = enabled;
         self.update(exception);
     }
 
-    /// Priority byte of an exception.
+    /// Returns the priority byte of an exception.
     pub fn priority(&self, exception: usize) -> u8 {
         self.priority[exception]
     }
 
-    /// Set a priority byte; only the upper four bits exist.
+    /// Sets a priority byte; only the upper four bits exist.
     pub fn set_priority(&mut self, exception: usize, priority: u8) {
         self.priority[exception] = priority & 0xF0;
     }
 
-    /// Since when an exception has been pending.
+    /// Returns the time since which an exception has been pending.
     pub fn pending_since(&self, exception: usize) -> Time {
         self.since[exception]
     }
 
-    /// Anything enabled is pending.
+    /// Returns `true` if an enabled exception is pending.
     pub fn any_waiting(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// Priority within the group: PRIGROUP cuts the lower bits off for preemption.
+    /// Returns the priority of the group: PRIGROUP cuts the lower bits off for preemption.
     fn group(&self, priority: i32) -> i32 {
         if priority < 0 { priority } else { priority >> (self.prigroup + 1) << (self.prigroup + 1) }
     }
@@ -163,13 +163,13 @@ impl Nvic {
         }
     }
 
-    /// Priority of what runs, masks not counted.
+    /// Returns the priority of the running exception or thread, without the masks.
     pub fn running_priority(&self) -> i32 {
         let active = (0..EXCEPTIONS).filter(|&e| self.active[e]);
         active.map(|e| self.group(self.raw_priority(e))).min().unwrap_or(THREAD)
     }
 
-    /// The most urgent exception that waits.
+    /// Returns the most urgent exception that waits.
     fn most_urgent(&self) -> Option<usize> {
         self.waiting.iter().copied().min_by_key(|&e| (self.raw_priority(e), e))
     }
@@ -188,30 +188,30 @@ impl Nvic {
         limit
     }
 
-    /// The exception to enter now.
+    /// Returns the exception to enter now.
     pub fn next(&self, masks: Masks) -> Option<usize> {
         let exception = self.most_urgent()?;
         let running = self.running_priority();
         (self.group(self.raw_priority(exception)) < self.masked(running, masks)).then_some(exception)
     }
 
-    /// Something waits that only the masks hold back.
+    /// Returns `true` if a waiting exception is blocked only by the masks.
     pub fn held_by_masks(&self, masks: Masks) -> bool {
         self.next(masks).is_none() && self.next(Masks::default()).is_some()
     }
 
-    /// WFI ends: something would run if PRIMASK were not set.
+    /// Returns `true` if WFI ends: an exception would run if PRIMASK were not set.
     pub fn wakes(&self, masks: Masks) -> bool {
         self.next(Masks { primask: false, ..masks }).is_some()
     }
 
-    /// An exception begins to run.
+    /// Marks an exception as running.
     pub fn enter(&mut self, exception: usize) {
         self.active[exception] = true;
         self.unpend(exception);
     }
 
-    /// An exception has returned; a line that is still high makes it pending again.
+    /// Ends an exception; a line that is still high makes it pending again.
     pub fn leave(&mut self, exception: usize, now: Time) {
         self.active[exception] = false;
         if self.level[exception] {
@@ -219,7 +219,7 @@ impl Nvic {
         }
     }
 
-    /// ICSR.VECTPENDING.
+    /// Returns ICSR.VECTPENDING.
     pub fn vect_pending(&self) -> usize {
         self.most_urgent().unwrap_or(0)
     }

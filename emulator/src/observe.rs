@@ -1,4 +1,4 @@
-//! What an observer counts while the firmware runs: instructions of functions and handlers, interrupt latencies, stack
+//! Counts of an observer while the firmware runs: instructions of functions and handlers, interrupt latencies, stack
 //! pointers, resets, faults.
 use crate::clock::Time;
 use crate::nvic::EXCEPTIONS;
@@ -8,13 +8,13 @@ use crate::nvic::EXCEPTIONS;
 pub struct Count {
     /// Calls that have returned.
     pub calls: u64,
-    /// Fewest.
+    /// Fewest instructions of a call.
     pub min: u64,
-    /// Most.
+    /// Most instructions of a call.
     pub max: u64,
-    /// The last call's.
+    /// Instructions of the last call.
     pub last: u64,
-    /// All calls'.
+    /// Instructions of all calls.
     pub total: u64,
 }
 
@@ -31,17 +31,17 @@ impl Count {
 /// Delay from pending to the first instruction of a handler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
-    /// Times it was entered.
+    /// Number of entries.
     pub entries: u64,
     /// Longest delay.
     pub worst: Time,
-    /// When the longest was.
+    /// Time of the longest delay.
     pub at: Time,
     /// Delay of the last entry.
     pub last: Time,
 }
 
-/// Why the machine was reset.
+/// Cause of a reset of the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// Power was switched on.
@@ -57,41 +57,41 @@ pub enum ResetCause {
 /// A reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reset {
-    /// When.
+    /// Time of the reset.
     pub time: Time,
-    /// Why.
+    /// Cause of the reset.
     pub cause: ResetCause,
-    /// The instruction that ran.
+    /// Address of the instruction that ran.
     pub pc: u32,
 }
 
-/// What the core stumbled over.
+/// Kind of a fault of the core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
-    /// Load or store where nothing is, or where it is forbidden.
+    /// Load or store at an unmapped or forbidden address.
     BadAccess,
-    /// Jump to where nothing is.
+    /// Jump to an unmapped address.
     BadJump,
     /// Instruction that does not exist.
     Undefined,
     /// BKPT without a debugger.
     Breakpoint,
-    /// Exception return that makes no sense.
+    /// Invalid exception return.
     BadReturn,
 }
 
-/// A fault; the machine goes on with HardFault.
+/// A fault; the machine continues with HardFault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// When.
+    /// Time of the fault.
     pub time: Time,
-    /// What.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// Instruction.
+    /// Address of the instruction.
     pub pc: u32,
     /// Address of the access.
     pub address: u32,
-    /// It happened in HardFault or NMI: the core stands still until a reset.
+    /// `true` if the fault occurred in HardFault or NMI: the core stands still until a reset.
     pub lockup: bool,
 }
 
@@ -113,7 +113,7 @@ struct Running {
     exception: usize,
     start: u64,
     excluded: u64,
-    /// Stack pointer when it began.
+    /// Stack pointer at the beginning.
     base: Option<u32>,
 }
 
@@ -122,13 +122,14 @@ pub struct Observers {
     probes: Vec<Probe>,
     calls: Vec<Call>,
     running: Vec<Running>,
-    /// Per exception number.
+    /// Counts by exception number.
     pub handlers: Vec<Count>,
-    /// Per exception number.
+    /// Latencies by exception number.
     pub latencies: Vec<Latency>,
     /// Lowest stack pointer while exception n ran; 0: no exception.
     pub lowest_sp: Vec<u32>,
-    /// Most bytes of stack that exception n took in one run, with the frames of those that interrupted it; not for 0.
+    /// Largest stack use of exception n in one run, bytes, with the frames of exceptions that interrupted it; not
+    /// counted for 0.
     pub deepest: Vec<u32>,
     /// Resets, oldest first.
     pub resets: Vec<Reset>,
@@ -153,18 +154,18 @@ impl Default for Observers {
 }
 
 impl Observers {
-    /// Count instructions from this entry on; the number of the counter.
+    /// Starts to count instructions from this entry; returns the number of the counter.
     pub fn add_probe(&mut self, entry: u32) -> usize {
         self.probes.push(Probe { entry, count: Count::default() });
         self.probes.len() - 1
     }
 
-    /// A counter's count.
+    /// Returns the count of a counter.
     pub fn probe(&self, probe: usize) -> Count {
         self.probes[probe].count
     }
 
-    /// Set all counts, latencies and lowest stack pointers back.
+    /// Resets all counts, latencies and lowest stack pointers.
     pub fn clear(&mut self) {
         for probe in &mut self.probes {
             probe.count = Count::default();
@@ -175,7 +176,7 @@ impl Observers {
         self.deepest.fill(0);
     }
 
-    /// A watched instruction comes; the return address to watch when a function begins here.
+    /// Handles a watched instruction; returns the return address to watch if a function begins here.
     pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
         let depth = self.running.len();
         while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {
@@ -197,7 +198,7 @@ impl Observers {
         self.probes[call.probe].count.add(instructions - call.start - call.excluded);
     }
 
-    /// An exception begins to run.
+    /// Notes that an exception begins to run.
     pub fn enter(&mut self, exception: usize, since: Time, now: Time, instructions: u64) {
         let latency = &mut self.latencies[exception];
         latency.entries += 1;
@@ -209,7 +210,7 @@ impl Observers {
         self.running.push(Running { exception, start: instructions, excluded: 0, base: None });
     }
 
-    /// The innermost exception returns.
+    /// Notes that the innermost exception returns.
     pub fn leave(&mut self, instructions: u64) {
         let depth = self.running.len();
         // Functions that were handlers themselves end with them.
@@ -227,7 +228,7 @@ impl Observers {
         }
     }
 
-    /// The stack pointer now.
+    /// Notes the stack pointer.
     pub fn note_sp(&mut self, sp: u32) {
         let mut context = 0;
         if let Some(running) = self.running.last_mut() {
@@ -238,7 +239,7 @@ impl Observers {
         self.lowest_sp[context] = self.lowest_sp[context].min(sp);
     }
 
-    /// The machine was reset.
+    /// Notes a reset of the machine.
     pub fn note_reset(&mut self, reset: Reset) {
         self.resets.push(reset);
         self.calls.clear();

@@ -1,19 +1,19 @@
-//! Registers that are nothing but memory.
+//! Registers that behave as plain memory.
 use std::collections::BTreeMap;
 
-/// Words by address; what was never written reads 0.
+/// Words by address; a word that was never written reads 0.
 #[derive(Clone, Debug, Default)]
 pub struct Plain {
     words: BTreeMap<u32, u32>,
 }
 
 impl Plain {
-    /// The word at an address.
+    /// Returns the word at an address.
     pub fn read(&self, address: u32) -> u32 {
         self.words.get(&(address & !3)).copied().unwrap_or(0)
     }
 
-    /// Replace the word at an address.
+    /// Replaces the word at an address.
     pub fn write(&mut self, address: u32, value: u32) {
         self.words.insert(address & !3, value);
     }

@@ -1,5 +1,5 @@
-//! Reset and clock control (RM0399 chapter 9): the clock tree, enable and reset bits, reset flags; with it the few bits of
-//! PWR that clocks depend on.
+//! Reset and clock control (RM0399 chapter 9): the clock tree, enable and reset bits, reset flags. Also contains the
+//! few bits of PWR that clocks depend on.
 use crate::plain::Plain;
 
 const HSI_HZ: u64 = 64_000_000;
@@ -27,7 +27,7 @@ mod reg {
     pub const AHB4ENR: u32 = 0xE0;
     pub const APB1LENR: u32 = 0xE8;
     pub const APB1HENR: u32 = 0xEC;
-    /// First and end of the registers of the own core, and how far from the common ones.
+    /// First address and end of the registers of core 1, and their distance from the common registers.
     pub const C1: core::ops::Range<u32> = 0x130..0x190;
     pub const C1_OFFSET: u32 = 0x60;
 }
@@ -50,13 +50,13 @@ pub mod flag {
     pub const SFT: u32 = 1 << 24;
     /// Independent watchdog 1.
     pub const IWDG1: u32 = 1 << 26;
-    /// RMVF clears all of them.
+    /// Writing RMVF clears all flags.
     pub const REMOVE: u32 = 1 << 16;
     /// All.
     pub const ALL: u32 = 0xFFFE_0000;
 }
 
-/// A peripheral with a clock of its own to enable.
+/// Peripheral with a clock enable bit of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gate {
     /// DMA1, DMA2 (from 0).
@@ -74,7 +74,7 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// Offset of the enable register and bit.
+    /// Returns the offset of the enable register and the bit.
     fn place(self) -> (u32, u32) {
         match self {
             Self::Dma(n) => (reg::AHB1ENR, n),
@@ -87,7 +87,7 @@ impl Gate {
     }
 }
 
-/// Frequencies in Hz that follow from the registers; 0 for what is off.
+/// Frequencies in Hz that follow from the registers; 0 for clocks that are off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clocks {
     /// Core.
@@ -104,19 +104,19 @@ pub struct Clocks {
     pub fdcan: u64,
 }
 
-/// The block.
+/// Reset and clock control.
 pub struct Rcc {
     plain: Plain,
     /// Frequency at OSC_IN, Hz.
     hse_hz: u64,
     rsr: u32,
     clocks: Clocks,
-    /// Peripherals whose reset bit was set since they were last taken.
+    /// Peripherals whose reset bit was set since the list was last taken.
     pub resets: Vec<Gate>,
 }
 
 impl Rcc {
-    /// After power-on, with a clock at OSC_IN.
+    /// Creates it as after power-on, with a clock at OSC_IN.
     pub fn new(hse_hz: u64) -> Self {
         let rsr = flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU;
         let mut rcc =
@@ -139,30 +139,30 @@ impl Rcc {
         self.update();
     }
 
-    /// A reset of the system; the flags of its cause are added to those that are there.
+    /// Resets the system; adds the flags of the cause to the flags that are already set.
     pub fn reset(&mut self, flags: u32) {
         self.plain = Plain::default();
         self.rsr |= flags;
         self.defaults();
     }
 
-    /// RSR.
+    /// Returns RSR.
     pub fn reset_flags(&self) -> u32 {
         self.rsr
     }
 
-    /// All frequencies.
+    /// Returns all frequencies.
     pub fn clocks(&self) -> Clocks {
         self.clocks
     }
 
-    /// The peripheral's clock is enabled.
+    /// Returns `true` if the peripheral's clock is enabled.
     pub fn enabled(&self, gate: Gate) -> bool {
         let (offset, bit) = gate.place();
         self.plain.read(offset) >> bit & 1 == 1
     }
 
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&self, offset: u32) -> u32 {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         let value = self.plain.read(offset);
@@ -183,7 +183,7 @@ impl Rcc {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, offset: u32, value: u32) {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         if offset == reg::RSR {
@@ -202,7 +202,7 @@ impl Rcc {
     }
 
     fn note_resets(&mut self, offset: u32, rising: u32) {
-        // The reset registers stand in the order of the enable registers.
+        // The reset registers have the same order as the enable registers.
         let enable = match offset {
             0x80 => reg::AHB1ENR,
             0x88 => reg::AHB4ENR,
@@ -223,7 +223,7 @@ impl Rcc {
         self.resets.extend(hit);
     }
 
-    /// Output of PLL `n` (0..3): P, Q or R by `output` 0..3.
+    /// Returns the output of PLL `n` (0..3): P, Q or R by `output` 0..3.
     fn pll(&self, n: u32, output: u32) -> u64 {
         let cr = self.plain.read(reg::CR);
         let select = self.plain.read(reg::PLLCKSELR);
@@ -296,7 +296,7 @@ impl Rcc {
     }
 }
 
-/// Divider of HPRE and D1CPRE.
+/// Returns the divider of HPRE and D1CPRE.
 fn ahb_divider(code: u32) -> u64 {
     match code {
         0..=7 => 1,
@@ -305,7 +305,7 @@ fn ahb_divider(code: u32) -> u64 {
     }
 }
 
-/// Divider of D1PPRE, D2PPRE1, D2PPRE2.
+/// Returns the divider of D1PPRE, D2PPRE1, D2PPRE2.
 fn apb_divider(code: u32) -> u64 {
     if code < 4 { 1 } else { 2 << (code - 4) }
 }

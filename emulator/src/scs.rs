@@ -28,7 +28,7 @@ pub struct SysTick {
     wrapped: bool,
 }
 
-/// The block.
+/// The core's own registers.
 #[derive(Default)]
 pub struct Scs {
     /// Vector table.
@@ -50,17 +50,17 @@ pub struct Scs {
     systick: SysTick,
     cyccnt_base: u64,
     cyccnt_on: bool,
-    /// SYSRESETREQ was written.
+    /// `true` if SYSRESETREQ was written.
     pub reset_request: bool,
     plain: Plain,
 }
 
-/// What the protection unit makes of an access.
+/// Decision of the protection unit on an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// It may be.
+    /// `true` if the access is allowed.
     pub allowed: bool,
-    /// The core may cache the memory, and read it ahead of the program.
+    /// `true` if the core may cache the memory, and read it ahead of the program.
     pub ahead: bool,
 }
 
@@ -73,12 +73,12 @@ pub struct Moment {
     pub cycles: u64,
     /// Instructions executed.
     pub instructions: u64,
-    /// The exception that runs.
+    /// Exception that runs.
     pub running: usize,
 }
 
 impl Scs {
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&mut self, address: u32, nvic: &Nvic, at: Moment) -> u32 {
         match address {
             0xE000_1004 if self.cyccnt_on => at.instructions.wrapping_sub(self.cyccnt_base) as u32,
@@ -128,7 +128,7 @@ impl Scs {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, address: u32, value: u32, nvic: &mut Nvic, at: Moment) {
         match address {
             0xE000_1000 => {
@@ -183,13 +183,13 @@ impl Scs {
         }
     }
 
-    /// MPU regions as (RBAR, RASR); those with RASR bit 0 are enabled.
+    /// Returns the MPU regions as (RBAR, RASR); those with RASR bit 0 are enabled.
     pub fn mpu_regions(&self) -> &[(u32, u32); 16] {
         &self.mpu
     }
 
-    /// What the protection unit makes of a load or store by the program (ARMv7-M B3.5). `faults_masked`: FAULTMASK is set, or
-    /// HardFault or NMI runs.
+    /// Returns the decision of the protection unit on a load or store by the program (ARMv7-M B3.5). `faults_masked`:
+    /// FAULTMASK is set, or HardFault or NMI runs.
     pub fn protection(&self, address: u32, faults_masked: bool) -> Protection {
         const DEFAULT: Protection = Protection { allowed: true, ahead: true };
         let ctrl = self.plain.read(MPU_CTRL);
@@ -207,22 +207,22 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // Strongly ordered and device memory; what the program only reads is not distinguished here.
+        // Strongly ordered and device memory; memory that the program only reads is not distinguished here.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }
 
-    /// Bus faults of loads and stores are ignored where faults are masked (CCR.BFHFNMIGN).
+    /// Returns `true` if bus faults of loads and stores are ignored while faults are masked (CCR.BFHFNMIGN).
     pub fn ignores_bus_faults(&self) -> bool {
         self.ccr >> 8 & 1 == 1
     }
 
-    /// Cycle count at which SysTick wraps next.
+    /// Returns the cycle count of the next wrap of SysTick.
     pub fn next_wrap(&self) -> u64 {
         if self.systick.ctrl & 1 == 1 { self.systick.wrap } else { NEVER }
     }
 
-    /// Let SysTick run up to a cycle count.
+    /// Advances SysTick to a cycle count.
     pub fn advance(&mut self, cycles: u64, now: Time, nvic: &mut Nvic) {
         let tick = &mut self.systick;
         while tick.ctrl & 1 == 1 && tick.wrap <= cycles {
@@ -260,7 +260,7 @@ impl SysTick {
 
 const LINES_WORDS: usize = 5;
 
-/// Lines of a word of the enable, pending and active registers.
+/// Returns the lines of a word of the enable, pending and active registers.
 fn word_lines(address: u32) -> impl Iterator<Item = (u32, usize)> {
     let first = FIRST_LINE + ((address & 0x7F) as usize / 4) * 32;
     (0..32).map(move |bit| (bit, first + bit as usize)).filter(|&(_, e)| e < EXCEPTIONS)

@@ -23,7 +23,7 @@ pub struct Timer {
     arr: u32,
     arr_active: u32,
     ccr: [u32; 4],
-    /// Counter at `at`; it goes on from there while the timer runs.
+    /// Counter at time `at`; it continues from there while the timer runs.
     count: u32,
     at: Time,
     /// Length of a clock period.
@@ -33,7 +33,7 @@ pub struct Timer {
 }
 
 impl Timer {
-    /// TIM2..TIM7 by number.
+    /// Creates TIM2..TIM7 by number.
     pub fn new(number: u32) -> Self {
         let wide = number == 2 || number == 5;
         let max = if wide { u32::MAX } else { 0xFFFF };
@@ -59,7 +59,7 @@ impl Timer {
         }
     }
 
-    /// Kernel clock; call it with the timer advanced to `now`.
+    /// Sets the kernel clock; call it with the timer advanced to `now`.
     pub fn set_clock(&mut self, hz: u64, now: Time) {
         let clock = period(hz);
         if clock != self.clock {
@@ -76,7 +76,7 @@ impl Timer {
         self.cr1 & CEN != 0 && self.clock != NEVER
     }
 
-    /// Counter at a moment before which no event is left.
+    /// Returns the counter at a moment before which no event is left.
     fn value(&self, now: Time) -> u32 {
         if !self.runs() {
             return self.count;
@@ -84,7 +84,7 @@ impl Timer {
         self.count + (now.saturating_sub(self.at) / self.tick()) as u32
     }
 
-    /// Make `count` and `at` current without losing the part of a tick that has passed.
+    /// Makes `count` and `at` current without losing the elapsed part of a timer tick.
     fn settle(&mut self, now: Time) {
         if self.runs() {
             let ticks = now.saturating_sub(self.at) / self.tick();
@@ -95,17 +95,17 @@ impl Timer {
         }
     }
 
-    /// Ticks from `count` until the counter overflows to 0.
+    /// Returns the number of timer ticks from `count` until the counter overflows to 0.
     fn to_overflow(&self) -> u64 {
         if self.count > self.arr_active {
-            // ARR went below the counter: it runs through its whole range first.
+            // ARR was set below the counter: it runs through its whole range first.
             let top = if self.wide { 1u64 << 32 } else { 1 << 16 };
             return top - u64::from(self.count);
         }
         u64::from(self.arr_active - self.count) + 1
     }
 
-    /// When the flag of a compare channel is set next before the overflow.
+    /// Returns the timer ticks until the flag of a compare channel is next set before the overflow.
     fn to_match(&self, channel: usize) -> Option<u64> {
         let compare = self.ccr[channel];
         (compare > self.count && compare <= self.arr_active).then(|| u64::from(compare - self.count))
@@ -119,26 +119,26 @@ impl Timer {
         (0..4).filter_map(|c| self.to_match(c)).fold(overflow, u64::min)
     }
 
-    /// When the next flag is set that is not set already or whose interrupt is on.
+    /// Returns the time of the next flag that is not set already or whose interrupt is enabled.
     pub fn next_event(&self) -> Time {
         if !self.runs() {
             return NEVER;
         }
-        // Flags without interrupt need no stop: they are made when somebody looks.
+        // Flags without an interrupt need no stop: they are computed when a register is read.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // A match behind the overflow is found when the overflow is passed.
+                // A match after the overflow is found when the overflow is passed.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }
         if ticks == NEVER { NEVER } else { self.at.saturating_add(ticks.saturating_mul(self.tick())) }
     }
 
-    /// Let every event up to `now` happen.
+    /// Executes every event up to `now`.
     pub fn advance(&mut self, now: Time) {
         while self.runs() {
             let ticks = self.next_ticks();
@@ -179,12 +179,12 @@ impl Timer {
         }
     }
 
-    /// Interrupt line.
+    /// Returns the level of the interrupt line.
     pub fn line(&self) -> bool {
         self.sr & self.dier & 0x1F != 0
     }
 
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&mut self, offset: u32, now: Time) -> u32 {
         self.advance(now);
         match offset {
@@ -203,7 +203,7 @@ impl Timer {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         self.advance(now);
         self.settle(now);
@@ -218,7 +218,7 @@ impl Timer {
             0x04 => self.cr2 = value,
             0x08 => self.smcr = value,
             0x0C => self.dier = value,
-            // Flags are cleared by writing 0.
+            // Writing 0 clears flags.
             0x10 => self.sr &= value,
             0x14 => {
                 if value & 1 != 0 {
@@ -252,7 +252,7 @@ mod tests {
     use super::*;
     use crate::clock::{MICROSECOND, MILLISECOND};
 
-    /// It counts microseconds up to `reload`, compares with `compare`, and has these interrupts.
+    /// Creates a timer that counts microseconds up to `reload`, compares with `compare`, and has these interrupts.
     fn microsecond_timer(number: u32, reload: u32, compare: u32, interrupts: u32) -> Timer {
         let mut timer = Timer::new(number);
         timer.set_clock(200_000_000, 0);

@@ -14,12 +14,12 @@ const RTOEN: u32 = 1 << 23;
 const DMAR: u32 = 0x40;
 const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
-/// Bytes ahead that are looked at for the next event.
+/// Number of bytes checked in advance for the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference of rates at which bytes still arrive whole, in parts of 1000.
+/// Largest difference of rates at which bytes still arrive intact, in parts of 1000.
 const TOLERANCE: u64 = 40;
 
-/// A byte and when its stop bit ended.
+/// A byte and the time at which its stop bit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WireByte {
     /// End of the stop bit.
@@ -44,10 +44,10 @@ pub struct Usart {
     bit: Time,
     rx_fifo: VecDeque<u8>,
     last_rdr: u8,
-    /// On the wire to the device.
+    /// Bytes on the wire to the device.
     rx_wire: VecDeque<WireByte>,
     rx_wire_free: Time,
-    /// End of the last byte received, until the idle flag was made of it.
+    /// End of the last byte received, until the idle flag is derived from it.
     idle_from: Option<Time>,
     timeout_from: Option<Time>,
     tx_fifo: VecDeque<u8>,
@@ -57,18 +57,18 @@ pub struct Usart {
     pub host_baud: u32,
     /// Bytes from the host that arrived while the receiver was off.
     pub missed: u64,
-    /// Overruns.
+    /// Number of overruns.
     pub overruns: u64,
     /// Bytes sent at a rate that the other end cannot read.
     pub garbled: u64,
-    /// Bytes received and sent.
+    /// Bytes received.
     pub received: u64,
     /// Bytes sent.
     pub sent: u64,
 }
 
 impl Usart {
-    /// USART2 or USART3 with their DMAMUX request lines.
+    /// Creates USART2 or USART3 with their DMAMUX request lines.
     pub fn new(number: u32) -> Self {
         let rx_request = if number == 2 { 43 } else { 45 };
         Self {
@@ -102,7 +102,7 @@ impl Usart {
         }
     }
 
-    /// Registers as after reset; what is on the wire goes on.
+    /// Sets the registers as after reset; bytes on the wire continue.
     pub fn reset(&mut self) {
         let old = core::mem::replace(self, Self::new(if self.rx_request == 43 { 2 } else { 3 }));
         self.rx_wire = old.rx_wire;
@@ -114,7 +114,7 @@ impl Usart {
         (self.received, self.sent) = (old.received, old.sent);
     }
 
-    /// Kernel clock.
+    /// Sets the kernel clock.
     pub fn set_clock(&mut self, hz: u64) {
         if hz != self.kernel_hz {
             self.kernel_hz = hz;
@@ -138,7 +138,7 @@ impl Usart {
         };
     }
 
-    /// Rate that the registers give, bit/s; 0: none.
+    /// Returns the rate that the registers give, bit/s; 0: none.
     pub fn baud(&self) -> u32 {
         if self.bit == NEVER { 0 } else { (SECOND as f64 / self.bit as f64).round() as u32 }
     }
@@ -158,7 +158,7 @@ impl Usart {
         own.abs_diff(host) * 1000 <= host * TOLERANCE
     }
 
-    /// The host sends bytes, the first no earlier than `now`.
+    /// Sends bytes of the host, the first no earlier than `now`.
     pub fn host_write(&mut self, now: Time, bytes: &[u8]) {
         let length = 10 * SECOND / u64::from(self.host_baud.max(1));
         for &byte in bytes {
@@ -168,31 +168,31 @@ impl Usart {
         }
     }
 
-    /// Bytes of the host that are not through yet.
+    /// Returns the number of bytes of the host that have not passed the line yet.
     pub fn host_pending(&self) -> usize {
         self.rx_wire.len()
     }
 
-    /// What has reached the host since the last call.
+    /// Returns the bytes that have reached the host since the last call.
     pub fn take_output(&mut self) -> impl Iterator<Item = WireByte> {
         core::mem::take(&mut self.output).into_iter()
     }
 
-    /// Let everything up to `now` happen.
+    /// Executes everything up to `now`.
     pub fn advance(&mut self, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
         while let Some(&next) = self.rx_wire.front().filter(|b| b.end <= now) {
             self.rx_wire.pop_front();
             self.idle(next.end.saturating_sub(self.frame()));
             self.receive(next, dma, memory);
         }
-        // A byte that is on its way ends the silence with its start bit.
+        // The start bit of a byte that is on its way ends the silence.
         let until = self.rx_wire.front().map_or(now, |b| now.min(b.end.saturating_sub(self.frame())));
         self.idle(until);
         self.drain_fifo(dma, memory);
         self.send(now, dma, memory);
     }
 
-    /// The line was silent until `until`.
+    /// Handles silence of the line until `until`.
     fn idle(&mut self, until: Time) {
         if let Some(from) = self.idle_from
             && until >= from.saturating_add(self.frame())
@@ -252,7 +252,7 @@ impl Usart {
             return;
         }
         let depth = if self.cr1 & cr1::FIFOEN != 0 { FIFO } else { 1 };
-        // When the next byte can start: at the end of the one before, or now.
+        // The next byte can start at the end of the one before, or now.
         loop {
             while self.cr3 & DMAT != 0
                 && self.tx_fifo.len() < depth

@@ -1,18 +1,18 @@
-//! Observers by the names of the firmware's symbols, and its log.
+//! Observers by the names of the firmware's symbols, and the firmware's log.
 use crate::elf::ElfError;
 use crate::machine::Machine;
 use crate::observe::Count;
 
-/// A counter of a function's instructions.
+/// Counter of a function's instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter(usize);
 
-/// Where defmt's channel stands in the control block of RTT: behind the identifier and two counts.
+/// Offset of defmt's channel in the control block of RTT: after the identifier and two counts.
 const RTT_CHANNEL: u32 = 24;
 
 impl Machine {
-    /// Count the instructions of a function from now on: its full name, or a part that no other symbol has. Functions that
-    /// the compiler has inlined have no symbol.
+    /// Counts the instructions of a function from now on. `name`: its full name, or a part that no other symbol
+    /// contains. Functions that the compiler has inlined have no symbol.
     pub fn count(&mut self, name: &str) -> Result<Counter, ElfError> {
         let entry = self.elf().symbol(name)?.address;
         let chip = self.chip();
@@ -20,12 +20,13 @@ impl Machine {
         Ok(Counter(chip.observers.add_probe(entry)))
     }
 
-    /// What was counted.
+    /// Returns the count.
     pub fn counted(&self, counter: Counter) -> Count {
         self.uc.get_data().observers.probe(counter.0)
     }
 
-    /// What the firmware has written into RTT's first channel since the last call, as a probe reads it: encoded by defmt.
+    /// Returns the bytes that the firmware has written into RTT's first channel since the last call, as a probe reads
+    /// them: encoded by defmt.
     pub fn defmt(&mut self) -> Vec<u8> {
         let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };
         let at = block.address + RTT_CHANNEL;

@@ -1,4 +1,4 @@
-//! What a board does when its power comes on: supply, clocks, statuses, the version record, the second core.
+//! Start of a board when its power comes on: supply, clocks, statuses, the version record, the second core.
 mod rig;
 
 use jtc_core::ControllerState;
@@ -8,12 +8,12 @@ use openjtc_emulator::clock::{MICROSECOND, MILLISECOND};
 use openjtc_emulator::observe::ResetCause;
 use rig::{BOARDS, PORTS, Rig, elf, index, program, version};
 
-/// A board is one of the two with a Cortex-M4.
+/// Returns `true` for the boards with a Cortex-M4.
 fn two_cores(board: &str) -> bool {
     board.contains("h745")
 }
 
-/// It gets its core voltage from the SMPS.
+/// Returns `true` for the board that gets its core voltage from the SMPS.
 fn smps(board: &str) -> bool {
     board == "nucleo-h745zi-q"
 }
@@ -30,8 +30,8 @@ fn j10_clocks_are_those_of_the_documents() {
     }
 }
 
-/// RM0399 and RM0433: PWR_CR3 has LDOEN in bit 1 and SDEN in bit 2, D3CR.VOS 0b11 is scale 1, and SYSCFG_PWRCR.ODEN raises
-/// it to scale 0, which is allowed with the LDO only.
+/// RM0399 and RM0433: PWR_CR3 has LDOEN in bit 1 and SDEN in bit 2, D3CR.VOS 0b11 is scale 1, and SYSCFG_PWRCR.ODEN
+/// raises it to scale 0, which is allowed with the LDO only.
 #[test]
 fn supply_and_voltage_are_those_of_the_board() {
     for board in BOARDS {
@@ -69,8 +69,8 @@ fn j12_tim7_ticks_a_thousand_times_a_second() {
     }
 }
 
-/// Where DMA and the core share memory it is not cached, and a null pointer leads nowhere. ARMv7-M B3.5.9: RASR has XN in bit 28,
-/// AP in bits 26..24, TEX S C B in bits 21..16, the size in bits 5..1.
+/// Memory that DMA and the core share is not cached, and a null pointer causes a fault. ARMv7-M B3.5.9: RASR has XN in
+/// bit 28, AP in bits 26..24, TEX S C B in bits 21..16, the size in bits 5..1.
 #[test]
 fn memory_is_protected_and_shared_memory_is_not_cached() {
     for board in BOARDS {
@@ -79,7 +79,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
         assert_eq!(rig.register(0xE000_ED94) & 1, 1, "{board}: MPU_CTRL");
         assert_eq!(rig.register(0xE000_ED14) >> 16 & 3, 3, "{board}: both caches");
         let regions = *rig.board.machine.chip().scs.mpu_regions();
-        // The region with the highest number that holds an address decides.
+        // The region with the highest number that contains an address decides.
         let at = |address: u32| {
             let holds = |(rbar, rasr): &(u32, u32)| {
                 let size = 1u64 << ((rasr >> 1 & 31) + 1);
@@ -97,7 +97,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
     }
 }
 
-/// J-12: nothing else runs at the tick's priority, so nothing delays it but critical sections.
+/// J-12: no other interrupt has the tick's priority, so that only critical sections delay the tick.
 #[test]
 fn j12_the_tick_is_above_all_other_interrupts() {
     const ENABLED: u32 = 0xE000_E100;
@@ -221,7 +221,7 @@ fn the_second_core_is_parked_where_there_is_one() {
     }
 }
 
-/// Everything that is used was written before.
+/// All memory that is used was written before.
 #[test]
 fn what_memory_holds_at_power_on_does_not_matter() {
     let run = |seed| {

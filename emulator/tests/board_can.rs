@@ -1,4 +1,4 @@
-//! The joint bus as the FDCAN controller of the chip has it: timing, filters, errors, bus-off.
+//! The joint bus as seen by the FDCAN controller of the chip: timing, filters, errors, bus-off.
 mod rig;
 
 use std::collections::BTreeSet;
@@ -15,12 +15,12 @@ use rig::{BOARDS, Rig};
 const FDCAN1: u32 = 0x4000_A000;
 const MESSAGE_RAM: u32 = 0x4000_AC00;
 
-/// Identifiers of answers to Move, ChangeFsm and ChangeMode (J-11).
+/// Returns the identifiers of answers to Move, ChangeFsm and ChangeMode (J-11).
 fn expected() -> BTreeSet<u16> {
     [0x200, 0x210, 0x2F0].into_iter().flat_map(|base| (0..7).map(move |node| base + node)).collect()
 }
 
-/// J-10, in the words of RM0399: everything less one.
+/// J-10, in the terms of RM0399: the registers hold each value minus one.
 #[test]
 fn j10_registers_of_the_controller() {
     for board in BOARDS {
@@ -34,7 +34,7 @@ fn j10_registers_of_the_controller() {
         assert_eq!(state.tdcr, 13 << 8, "{board}: the sample point, 13 of 17, after the loop delay");
         // TXP, BRSE, FDOE; neither INIT, CCE, DAR (so: retransmission) nor NISO (so: ISO).
         assert_eq!(state.cccr, 1 << 14 | 1 << 9 | 1 << 8, "{board}");
-        // Remote frames and what matches no filter are rejected, 11 and 29 bits.
+        // Remote frames and frames that match no filter are rejected, 11 and 29 bits.
         let gfc = rig.register(FDCAN1 + 0x80);
         assert_eq!(gfc & 3, 3, "{board}: RRFS, RRFE");
         assert!(gfc >> 2 & 3 >= 2 && gfc >> 4 & 3 >= 2, "{board}: ANFE, ANFS {gfc:#x}");
@@ -115,7 +115,7 @@ fn j10_only_expected_frames_arrive() {
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
 }
 
-/// The controller's own frames on the bus in this millisecond, with their torques.
+/// Returns the controller's own frames on the bus in this millisecond, with their torques.
 fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     let good = rig.bus.iter().filter(|e| e.from_controller && e.outcome == Outcome::Good);
     good.filter_map(|e| {
@@ -128,10 +128,10 @@ fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     .collect()
 }
 
-/// J-14, J-12: an error at once, recovery by the rules, and the torque that waited while the bus was off is never sent.
+/// J-14, J-12: an error at once, recovery by the rules, and a torque that waited while the bus was off is never sent.
 #[test]
 fn j14_after_bus_off_no_stale_frame() {
-    // A pose in which gravity asks for torque.
+    // A pose in which gravity requires torque.
     let sim = SimConfig { start: [0.0, 0.5, -0.4, 0.3, 0.0, 0.0], ..SimConfig::default() };
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
     rig.bring_up(Port::Usart2);
@@ -164,13 +164,13 @@ fn j14_after_bus_off_no_stale_frame() {
         to_us(first.saturating_sub(healed))
     );
     assert!(first > off + 129 * 11 * MILLISECOND / 1000, "129 times 11 recessive bits are waited for");
-    // The error stays until the host clears it (J-21), then everything goes on.
+    // The error stays until the host clears it (J-21), then operation continues.
     assert_eq!(rig.state(), ControllerState::Error);
     rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
     rig.wait_for_hold(15_000);
 }
 
-/// Ticks with that state of the bus until Error, and the word of CAN errors then.
+/// Returns the ticks with that state of the bus until Error, and the word of CAN errors then.
 fn ticks_to_error(rig: &mut Rig, kind: FaultKind) -> (u64, u32) {
     let before = rig.ticks;
     rig.inject(kind);
@@ -226,7 +226,7 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
-/// J-15: what is too short for its identifier is ignored, whoever sends it.
+/// J-15: a frame that is too short for its identifier is ignored, whichever member sends it.
 #[test]
 fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });

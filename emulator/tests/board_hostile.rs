@@ -1,5 +1,5 @@
-//! J-07: whatever comes over the lines and the joint bus, nothing hangs, no tick is missing, nothing is reset, and every
-//! tick is what the same controller makes of the same inputs (`rig`).
+//! J-07: with any bytes on the lines and any frames on the joint bus, the program does not hang, no tick is missing, no
+//! reset occurs, and every tick gives the same outputs as the same controller with the same inputs (`rig`).
 mod rig;
 
 use std::path::Path;
@@ -17,7 +17,7 @@ fn fast() -> Rig {
     Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() })
 }
 
-/// Every input that is kept for a fuzz target, by name.
+/// Returns every input that is kept for a fuzz target, by name.
 fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz"));
     let mut inputs = Vec::new();
@@ -34,7 +34,7 @@ fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     inputs
 }
 
-/// What must hold at the end: a tick for each millisecond, the first start, no fault, and the board still answers.
+/// Checks the end: a tick for each millisecond, the first start, no fault, and the board still answers.
 fn unharmed(mut rig: Rig) {
     for port in PORTS {
         rig.wait("the line falls silent", 60_000, |rig| rig.board.pending(port) == 0);
@@ -64,8 +64,8 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the wire are those of a parser that has the whole stream at hand, less those of noise that
-/// joined another and those that were lost because more than 64 waited, which are counted.
+/// J-03, J-04, J-05: the records on the wire are those of a parser that has the whole stream, except those of noise
+/// that joined another record and those that were lost because more than 64 waited, which are counted.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();
@@ -93,7 +93,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
         let lost = rig.telemetry().records_lost as usize - lost_before;
-        // Noise joins the record of noise that waits; nothing else does.
+        // Noise joins the record of noise that waits; no other record joins.
         let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
         let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
         assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
@@ -123,7 +123,7 @@ fn j07_kept_frames_with_any_body() {
     unharmed(rig);
 }
 
-/// Both lines at once, as fast as they are, for all boards' sakes on the slow one too.
+/// Both lines at once, at full load: the program for 15 MBd, and another board's program at the default rate.
 #[test]
 fn j07_random_bytes() {
     for (seed, mut rig, bytes) in [(1, fast(), 150_000), (2, Rig::new(BOARDS[2]), 6_000)] {
@@ -131,7 +131,7 @@ fn j07_random_bytes() {
         let mut rng = fastrand::Rng::with_seed(seed);
         rig.bring_up(Port::Usart3);
         for port in PORTS {
-            // Headers are what a parser looks at.
+            // The parser reacts to headers.
             let noise: Vec<u8> =
                 (0..bytes).map(|_| if rng.u8(..) < 40 { 0x9B } else { rng.u8(..) }).collect();
             rig.write(port, &noise);
@@ -155,7 +155,7 @@ fn j07_random_frames_of_hosts() {
     unharmed(rig);
 }
 
-/// J-15: any frame that a bus can carry, in between those of the real nodes.
+/// J-15: any frame that a bus can carry, between those of the real nodes.
 #[test]
 fn j15_random_frames_on_the_joint_bus() {
     for seed in 4..7 {
@@ -172,7 +172,7 @@ fn j15_random_frames_on_the_joint_bus() {
             }
             rig.step();
         }
-        // Without them it is well again, for whoever clears the errors.
+        // Without these frames the bus recovers, and any host can clear the errors.
         rig.wait("the bus is free", 1_000, |rig| rig.board.machine.chip().fdcan.wire.waiting() < 8);
         rig.run(50);
         rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
@@ -185,7 +185,7 @@ fn random_frame(rng: &mut fastrand::Rng) -> CanFrame {
     const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 16, 20, 24, 48, 64];
     let id = match rng.u8(0..4) {
         0 => rng.u32(0..0x800),
-        // Answers, of nodes that exist and others.
+        // Answers of existing and non-existing nodes.
         _ => [0x200, 0x200, 0x210, 0x2F0][rng.usize(0..4)] + rng.u32(0..9),
     };
     let standard = Id::standard(id).expect("11 bits");

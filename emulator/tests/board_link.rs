@@ -1,4 +1,4 @@
-//! Both serial lines: gaps, long frames, whose record is whose, floods.
+//! Both serial lines: gaps, long frames, the line of each record, floods.
 mod rig;
 
 use jtc_sim::host;
@@ -12,7 +12,7 @@ use rig::{BOARDS, PORTS, Rig, elf, fast_elf, index};
 const A: Port = Port::Usart2;
 const B: Port = Port::Usart3;
 
-/// Segment 0 of 1 with that many points, which stand still at 0.
+/// Returns segment 0 of 1 with that many points, which stand still at 0.
 fn segment(points: usize) -> Vec<u8> {
     let mut frame = vec![0; 60_000];
     let still = std::iter::repeat_n(RawPoint::default(), points);
@@ -33,16 +33,16 @@ fn no_losses(rig: &mut Rig) {
     }
 }
 
-/// J-03, J-05. The first half of a frame, a silence of whole ms, the other half.
+/// J-03, J-05. Sends the first half of a frame, a silence of whole ms, the other half.
 #[test]
 fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // Long enough that no silence behind it wakes the program.
+        // Long enough that no silence after it wakes the program.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
-        // With the bytes' own time the silence is 0.2 ms shorter than the time between the halves.
+        // With the time of the bytes the silence is 0.2 ms shorter than the time between the halves.
         // At any moment between two ticks.
         let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
         for (us, ms) in moments {
@@ -74,7 +74,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     }
 }
 
-/// J-01, J-07: the longest frames that there are, on both lines at once, without the loss of a byte or a tick.
+/// J-01, J-07: the longest possible frames, on both lines at once, without the loss of a byte or a tick.
 fn longest_frames(mut rig: Rig) {
     rig.bring_up(A);
     let (accepted, refused) = (segment(1500), segment(1666));
@@ -111,7 +111,7 @@ fn j01_frames_of_60_000_bytes_at_15_mbd() {
     longest_frames(rig);
 }
 
-/// J-04: an answer goes to who asked, in order, whatever the other line sends at the same time.
+/// J-04: an answer goes to the line that asked, in order, regardless of simultaneous frames on the other line.
 #[test]
 fn j04_every_port_gets_its_own_records() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -163,14 +163,15 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // Six bytes in, one tick at most, 175 bytes out, at 86.8 µs each; unless a periodic status was just in front.
+        // Six bytes in, one tick at most, 175 bytes out, at 86.8 µs each; unless a periodic status was sent just
+        // before.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
     }
 }
 
-/// J-03, J-07: noise of any kind costs one record and no frame that follows it, with or without a gap.
+/// J-03, J-07: noise of any kind costs one record, and no frame that follows it is lost, with or without a gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -182,7 +183,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     for (n, noise) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
         for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
             if gap == 0 && noise == header {
-                // A header that promises 59 974 bytes is waited for until a gap: what follows is looked at then.
+                // After a header that announces 59 974 bytes the parser waits for a gap; only then it parses the bytes
+                // that follow.
                 rig.write(port, noise);
             }
             rig.hosts[index(port)].records.clear();
@@ -202,8 +204,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     no_losses(&mut rig);
 }
 
-/// J-07: a port that floods neither delays the tick (which is checked in every millisecond) nor keeps the other waiting
-/// for more than the records that are ahead of it.
+/// J-07: a port that floods neither delays the tick (checked in every millisecond) nor lets the other port wait for
+/// more than the records that are ahead of it.
 #[test]
 fn j07_a_flooding_port_does_not_starve_the_other() {
     for (flood, other) in [(A, B), (B, A)] {
@@ -225,7 +227,7 @@ fn j07_a_flooding_port_does_not_starve_the_other() {
     }
 }
 
-/// The same at 15 MBd, to the end: as long as no more than 64 wait on a line, every frame has its record.
+/// J-04 at 15 MBd, to the end: while at most 64 records wait on a line, every frame gets its record.
 #[test]
 fn j04_a_host_that_pipelines_loses_no_record() {
     let mut rig = Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() });
@@ -245,7 +247,7 @@ fn j04_a_host_that_pipelines_loses_no_record() {
     no_losses(&mut rig);
 }
 
-/// On the way along a path, with the host at A.
+/// Returns a board while it moves along a path, with the host at A.
 fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     let mut rig = Rig::of(elf, &BoardConfig { baud, ..Default::default() });
     rig.bring_up(A);
@@ -259,7 +261,7 @@ fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     rig
 }
 
-/// J-04: in the tick after its last byte, whatever either line has brought before.
+/// J-04: a Stop acts in the tick after its last byte, regardless of the bytes that either line has brought before.
 #[test]
 fn j04_a_stop_waits_for_nothing() {
     let clear = fixed::CLEAR_OCCURRED_ERRORS;

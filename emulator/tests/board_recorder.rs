@@ -11,7 +11,7 @@ use rig::{BOARDS, Rig};
 
 const HOST: Port = Port::Usart3;
 
-/// On its way along a trajectory of many seconds.
+/// Returns a board while it moves along a trajectory of many seconds.
 fn moving() -> Rig {
     let sim = SimConfig { start: [0.0, 0.5, -0.4, 0.3, 0.0, 0.0], ..SimConfig::default() };
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
@@ -21,7 +21,7 @@ fn moving() -> Rig {
     rig
 }
 
-/// The memory of the board's flight recorder.
+/// Returns the memory of the board's flight recorder.
 fn memory(rig: &Rig) -> Vec<Block> {
     let piece = |(name, blocks): (&str, usize)| {
         let at = rig.board.machine.elf().symbol(name).expect("its memory");
@@ -33,7 +33,7 @@ fn memory(rig: &Rig) -> Vec<Block> {
     names.into_iter().zip(jtc_sim::RECORDER_BLOCKS).flat_map(piece).collect()
 }
 
-/// Runs the log of the controller beside the board again: the telemetry of each tick, none of which differs.
+/// Replays the log of the shadow controller: the telemetry of each tick, which must not differ in any tick.
 fn replayed(rig: &Rig) -> Vec<Telemetry> {
     let shadow = rig.shadow.as_ref().expect("a controller");
     let blocks: Vec<Block> = shadow.recorder().blocks().copied().collect();
@@ -46,8 +46,8 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// What the board writes is what the same recorder writes on this machine, to the last word; and a replay on this machine gives what the
-/// board computed: two seconds at least before the error, and 0.3 s after it.
+/// The board writes the same log as the recorder on this machine, to the last word; and a replay on this machine gives
+/// the values that the board computed: two seconds at least before the error, and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     let mut rig = moving();
@@ -66,18 +66,18 @@ fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     assert!(error - first >= 2_000 && last == error + 300, "{first} {error} {last}");
     for then in seen.iter().filter(|then| then.tick <= last) {
         let now = replayed.iter().find(|now| now.tick == then.tick).expect("each tick");
-        // Records belong to the link.
+        // `records_lost` is excluded, because the link sets it.
         assert_eq!(Telemetry { records_lost: 0, ..*now }, Telemetry { records_lost: 0, ..*then });
     }
 }
 
-/// A watchdog reset cuts no log, and the next start keeps it: its pages are fetched, byte by byte those of the controller beside the
-/// board, and replay up to the last tick before it.
+/// A watchdog reset does not interrupt a log, and the next start keeps it. Its pages are fetched, equal those of the
+/// shadow controller byte by byte, and replay up to the last tick before the reset.
 #[test]
 fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
     let mut rig = moving();
     let last = rig.telemetry().tick;
-    // TIM7 is masked: no tick comes any more.
+    // TIM7 is masked: no more ticks come.
     rig.may_hang = true;
     rig.board.machine.write_register(0xE000_E184, 1 << (55 - 32));
     rig.run(30);
@@ -99,7 +99,7 @@ fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
         .collect();
     assert!(ticks.last().is_some_and(|tick| last - tick <= 500), "{ticks:?} {last}");
 
-    // A whole block by frames; each byte is compared with the answers of the controller beside the board.
+    // A whole block by frames; each byte is compared with the answers of the shadow controller.
     for offset in (0..BLOCK_BYTES).step_by(232) {
         rig.ask(HOST, &fixed::get_log(0, offset as u16));
         rig.run(60);

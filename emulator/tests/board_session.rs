@@ -1,5 +1,5 @@
-//! Whole sessions with a host and an arm, in virtual time. In every tick of every session the controller on this machine
-//! computes the same, to the bit (`rig`).
+//! Whole sessions with a host and an arm, in virtual time. In every tick of every session the controller on this
+//! machine computes the same values, to the bit (`rig`).
 mod rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -12,7 +12,7 @@ use rig::{BOARDS, Rig, fast_elf};
 const HOST: Port = Port::Usart2;
 const GOAL: [f64; 6] = [0.5, 0.4, -0.5, 0.4, -0.3, 0.6];
 
-/// There and back, 4 s in all: 1001 points at 4 ms.
+/// Returns a motion out and back, 4 s in all: 1001 points at 4 ms.
 fn motion() -> Vec<RawPoint> {
     let points = frames::there_and_back(&[0.0; 6], &GOAL, 2.0, 1, 4);
     assert_eq!(points.len(), 1001);
@@ -31,20 +31,20 @@ impl Rig {
         self.response(HOST, &frames::exec(command))
     }
 
-    /// Largest distance of the real arm from the commanded position, rad.
+    /// Returns the largest distance of the real arm from the commanded position, rad.
     fn following_error(&self) -> f64 {
         let real = self.board.plant().truth().q;
         let joints = self.telemetry().joints;
         (0..6).map(|j| (joints[j].set_position - real[j]).abs()).fold(0.0, f64::max)
     }
 
-    /// Largest speed of the real arm, rad/s.
+    /// Returns the largest speed of the real arm, rad/s.
     fn speed(&self) -> f64 {
         self.board.plant().truth().qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()))
     }
 }
 
-/// Lets a run go on until that execution state; the largest following error.
+/// Lets a run continue until that execution state; returns the largest following error.
 #[track_caller]
 fn follow(rig: &mut Rig, until: TrajectoryState, ms: u64) -> f64 {
     let mut worst: f64 = 0.0;
@@ -65,7 +65,7 @@ fn a_whole_session() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(HOST);
     let limit = Config::default().joints.map(|j| j.position_error_max).into_iter().fold(f64::MAX, f64::min);
-    // J-51: segment 0 decides that this upload has all numbers.
+    // J-51: the line at segment 0 decides if this upload gets all data status values, 7 and 8 included.
     rig.ask(HOST, &fixed::GET_INFO);
     rig.upload(&motion(), 4);
 
@@ -88,8 +88,8 @@ fn a_whole_session() {
     assert!(rig.telemetry().point > held, "it goes on where it was");
     assert!(accepted(rig.exec(ExecCommand::Stop)));
     let stopped = follow(&mut rig, TrajectoryState::Stop, 1_000);
-    // J-34: from somewhere on the path it cannot be started.
-    // J-51: only a host that has asked lately receives the reason.
+    // J-34: an intermediate position on the path is not a valid start.
+    // J-51: only a host that has sent GetInfo recently receives the reason.
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::IncorrectValue);
     rig.ask(HOST, &fixed::GET_INFO);
     assert_eq!(rig.exec(ExecCommand::Execute).data, DataStatus::StartPositionMismatch);
@@ -112,7 +112,7 @@ fn a_whole_session() {
     // J-25.
     rig.wait("HoldPos behind the last point", 10, |rig| rig.state() == ControllerState::HoldPos);
     rig.ask(HOST, &fixed::TEACHING_MODE_ENABLE);
-    // It begins when the integral has come to rest behind the motion.
+    // Teaching begins when the integral has come to rest after the motion.
     rig.wait("Teaching", 3_000, |rig| rig.state() == ControllerState::Teaching);
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Teaching);
@@ -123,8 +123,8 @@ fn a_whole_session() {
     assert_eq!(rig.status(HOST).occurred, 0, "no error in all that time");
 }
 
-/// 3.3 kg at the last link, known to the controller, are lowered through the place where they take 95 % of the shoulder's torque
-/// limit, and a Stop comes there.
+/// A load of 3.3 kg at the last link, known to the controller, is lowered through the position in which it takes 95 %
+/// of the shoulder's torque limit, and a Stop comes there.
 #[test]
 fn j33_a_loaded_arm_stands_within_half_a_second() {
     const SHOULDER: usize = 1;
@@ -168,8 +168,9 @@ fn j33_a_loaded_arm_stands_within_half_a_second() {
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
-/// J-40: with a host's own numbers, friction tables, over limits and errors, every torque has the bits that a PC computes,
-/// and every frame and status its bytes. The rig compares them in each tick; here it is seen that there was something to compare.
+/// J-40: with a host's own numbers, friction tables, over limits and errors, every torque has the bits that a PC
+/// computes, and every frame and status its bytes. The rig compares them in each tick; this test checks that there was
+/// something to compare.
 #[test]
 fn j40_torques_have_the_same_bits_as_on_a_pc() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -189,7 +190,7 @@ fn j40_torques_have_the_same_bits_as_on_a_pc() {
         moved.insert(rig.flight.torque.map(f64::to_bits));
     }
     assert!(moved.len() > 1_000, "{} different torques", moved.len());
-    // A joint that is stuck: it yields, and the others stop on their path (J-66).
+    // A joint that is stuck yields, and the others stop on their path (J-66).
     rig.inject(jtc_sim::FaultKind::Friction { joint: jtc_bus::Joint::ALL[1], factor: 30.0 });
     rig.wait("a held stop", 2_000, |rig| rig.state() == ControllerState::HoldPos);
     rig.run(200);
@@ -210,7 +211,7 @@ fn a_short_session_on_every_board() {
     }
 }
 
-/// The program for fast lines does the same.
+/// The program for fast lines behaves the same.
 #[test]
 fn a_short_session_at_15_mbd() {
     let points = frames::there_and_back(&[0.0; 6], &GOAL.map(|q| q / 4.0), 0.5, 1, 5);
@@ -221,7 +222,7 @@ fn a_short_session_at_15_mbd() {
     follow(&mut rig, TrajectoryState::Finish, 2_500);
 }
 
-/// The drives with the older habits: their velocity scale, one message per interrupt, answers during transitions.
+/// Drives with the older behaviour: their velocity scale, one message per interrupt, answers during transitions.
 #[test]
 fn j12_older_drives_are_not_left_behind() {
     let sim = SimConfig {
@@ -235,8 +236,8 @@ fn j12_older_drives_are_not_left_behind() {
     assert_eq!(rig.status(HOST).occurred, 0);
 }
 
-/// J-12: what is on the bus, millisecond by millisecond: one broadcast of the controller, begun within microseconds of the
-/// tick, and nothing else than its answers.
+/// J-12: the frames on the bus, millisecond by millisecond: one broadcast of the controller, begun within microseconds
+/// of the tick, and only its answers.
 #[test]
 fn j12_one_broadcast_a_tick_and_its_answers() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -265,7 +266,7 @@ fn j12_one_broadcast_a_tick_and_its_answers() {
     }
     let period = openjtc_emulator::clock::MILLISECOND;
     for pair in starts.windows(2) {
-        // The instructions from the tick's beginning to the transmit request vary.
+        // The number of instructions from the tick's beginning to the transmit request varies.
         let off = (pair[1] - pair[0]).abs_diff(period);
         assert!(off < 30 * openjtc_emulator::clock::MICROSECOND, "{off}");
     }

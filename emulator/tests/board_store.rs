@@ -1,5 +1,5 @@
-//! J-54: the stored arm. What the flash of an emulated board holds goes from one board to the next, as over a loss of power; the
-//! program is asked to store by its mailbox, which only a test or a debugger can reach.
+//! J-54: the stored arm. The flash contents of an emulated board go from one board to the next, as over a loss of
+//! power. The program is asked to store through its mailbox, which only a test or a debugger can reach.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -12,7 +12,7 @@ use rig::{BOARDS, Rig, elf};
 /// Interrupt of the tick.
 const TIM7: usize = FIRST_LINE + 55;
 const IMAGE_MAX: usize = jtc_core::slots::IMAGE_MAX;
-/// Where the slots are.
+/// Addresses of the slots.
 const SLOTS: [u32; 2] = [BANK2 + 6 * 0x2_0000, BANK2 + 7 * 0x2_0000];
 
 /// The program's mailbox: words in the order of `firmware/src/arm_store.rs`.
@@ -37,13 +37,13 @@ fn mailbox(machine: &Machine) -> Mailbox {
     Mailbox { state, length, sequence, failure, staging, loaded: [word(5), word(6), word(7)] }
 }
 
-/// The image that the program found when it started, with its sequence number.
+/// Returns the image that the program found when it started, with its sequence number.
 fn loaded(machine: &Machine) -> Option<(Vec<u8>, u32)> {
     let [address, length, sequence] = mailbox(machine).loaded;
     (address != 0).then(|| (machine.memory(address, length as usize).expect("memory"), sequence))
 }
 
-/// As a frame of the host will.
+/// Requests a store, as a frame of the host does.
 fn ask(machine: &mut Machine, image: &[u8]) {
     let at = machine.elf().symbol("ARM_STORE").expect("the mailbox").address;
     let staging = mailbox(machine).staging;
@@ -52,7 +52,8 @@ fn ask(machine: &mut Machine, image: &[u8]) {
     assert!(machine.poke(at, &ASKED.to_le_bytes()));
 }
 
-/// A board with this in its flash, some ticks after its start. Where the time does not matter a sector is erased fast.
+/// Returns a board with this in its flash, some ticks after its start. If the time does not matter, a sector is erased
+/// fast.
 fn board(bank2: Bank2) -> Rig {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { bank2, ..Default::default() });
     rig.board.machine.chip().flash.erase_time = 100 * MILLISECOND;
@@ -82,7 +83,7 @@ fn working(rig: &Rig) -> bool {
     !matches!(mailbox(&rig.board.machine).state, DONE | FAILED)
 }
 
-/// What must hold whatever is done with the flash.
+/// Checks the conditions that must hold after every operation on the flash.
 #[track_caller]
 fn clean(rig: &mut Rig) {
     let chip = rig.board.machine.chip();
@@ -111,7 +112,7 @@ fn clean(rig: &mut Rig) {
     assert_eq!(wrong, None, "the first sectors are not the store's");
 }
 
-/// J-54: what was stored is there when the power comes back, and the image before it stays until the next but one.
+/// J-54: a stored image is there when the power comes back, and the image before it stays until the next but one.
 #[test]
 fn j54_a_stored_image_outlasts_the_power() {
     let mut rig = board(Bank2::default());
@@ -135,7 +136,7 @@ fn j54_a_stored_image_outlasts_the_power() {
     assert_eq!(loaded(&rig.board.machine), Some((images[1].clone(), 6)));
 }
 
-/// J-50 to J-54: a host gives the board an arm by frames, has it stored, and after a loss of power the defaults mean it.
+/// J-50 to J-54: a host uploads an arm by frames and has it stored; after a loss of power the defaults are this arm.
 #[test]
 fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     const HOST: Port = Port::Usart3;
@@ -186,8 +187,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     clean(&mut rig);
 }
 
-/// J-12: a sector is erased for two seconds and more; every tick comes at its time, with the same instructions as if nothing were
-/// done.
+/// J-12: erasing a sector takes two seconds and more; every tick comes in time, with the same number of instructions as
+/// without an operation.
 #[test]
 fn j12_no_tick_is_late_while_the_flash_works() {
     let run = |ask_for: Option<&[u8]>| {
@@ -205,15 +206,15 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     let (idle, none) = run(None);
     let (storing, operations) = run(Some(&image(IMAGE_MAX, 5)));
     assert_eq!((none, operations), (0, 1 + IMAGE_MAX / WORD + 1), "all is stored in that time");
-    // It asks what has become of the image, in a few instructions more or less.
+    // The tick asks for the progress of the image, which changes its instructions by a few.
     assert_eq!(idle.calls, storing.calls);
     for (idle, storing) in [(idle.min, storing.min), (idle.max, storing.max)] {
         assert!(idle.abs_diff(storing) <= 32, "instructions of the tick: {idle} and {storing}");
     }
 }
 
-/// J-54: the power goes at every operation of a store: before it, in the middle of it, after it. The board starts with the old image or
-/// the new one, whole, and stores the next.
+/// J-54: the power fails at every operation of a store: before it, in the middle of it, after it. The board starts with
+/// the old image or the new one, complete, and stores the next.
 #[test]
 fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     let images = [image(200, 1), image(IMAGE_MAX, 2), image(260, 3)];
@@ -237,7 +238,8 @@ fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     }
 }
 
-/// Stores an image on a board with this flash; the flash afterwards, and what it is if the power goes before.
+/// Stores an image on a board with this flash. Returns the flash afterwards, and the contents after a loss of power
+/// before, during and after operations, each with a description.
 fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     let mut rig = board(bank);
     let mut cuts = vec![("before all".to_owned(), rig.board.machine.cut_power(0))];
@@ -250,7 +252,7 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // The header decides, and a sector half erased has many forms; of many words some are enough.
+        // The header decides, and a half-erased sector has many forms; of the many words a few are enough.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,
@@ -289,14 +291,14 @@ fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// What a board with this flash starts with.
+/// Returns the arm that a board with this flash uses after its start.
 fn start(bank: Bank2) -> Option<Vec<u8>> {
     let mut rig = board(bank);
     clean(&mut rig);
     loaded(&rig.board.machine).map(|(image, _)| image)
 }
 
-/// J-54: words that cannot be read are neither a fault nor an image, in any place of the slot; and they can be replaced.
+/// J-54: unreadable words are neither a fault nor an image, in any place of the slot; and they can be replaced.
 #[test]
 fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     let mut rig = board(Bank2::default());
@@ -331,7 +333,7 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erasure goes on for long; words are written within milliseconds, and the one at work or the next of them fails.
+            // An erasure takes long; words are written within milliseconds, and the present or the next one fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });
@@ -346,8 +348,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// Failures that the flash does not report: keys that it no longer takes, a word that reads differently, an erasure that never
-/// ends.
+/// Failures that the flash does not report: keys that it no longer takes, a word that reads back differently, an
+/// erasure that never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {
@@ -385,7 +387,7 @@ fn j54_a_store_that_cannot_work_ends() {
     fails(rig, 5);
 }
 
-/// Every board's program finds an image that another one stored.
+/// Every board's program finds an image that another board's program stored.
 #[test]
 fn j54_every_board_loads_it() {
     let mut rig = board(Bank2::default());

@@ -1,10 +1,11 @@
-//! The stored arm (J-54): an image of bytes that outlasts power, and what a host does to it.
+//! The stored arm (J-54): an image of bytes that persists without power, and the operations of a host on it.
 //!
-//! At the start [`load`] finds the newest whole image and copies it into memory, before the first tick. Later the tick hands an image over
-//! with [`begin`], and sees in [`progress`] what became of it. The links' rounds carry it out, a small step in each
-//! ([`Store::step`]): nothing waits for the flash, and no interrupt for more than some instructions.
+//! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. Later the
+//! tick hands an image over with [`begin`], and reads the result with [`progress`]. The rounds of the links store it, a
+//! small step in each ([`Store::step`]): no code waits for the flash, and no interrupt is delayed by more than a few
+//! instructions.
 //!
-//! What is in the slots and what is done in which order is `jtc_core::slots`; the flash itself is [`bank2`].
+//! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] drives the flash itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -21,7 +22,7 @@ pub type Buffer = [u8; IMAGE_MAX];
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
-/// What tick and links exchange. Its form is fixed, so that a debugger can look at it: words in this order.
+/// Mailbox between tick and links. Its layout is fixed, so that a debugger can read it: words in this order.
 #[repr(C)]
 pub struct Mailbox {
     /// [`Mailbox::IDLE`] and so on.
@@ -30,11 +31,11 @@ pub struct Mailbox {
     length: AtomicU32,
     /// Sequence number of the image that was stored last.
     sequence: AtomicU32,
-    /// The last [`Failure`].
+    /// Last [`Failure`].
     failure: AtomicU32,
-    /// Address of the memory that an image to be stored is in.
+    /// Address of the memory with the image to be stored.
     staging: AtomicU32,
-    /// The image of the start: address or 0, bytes, sequence number.
+    /// Image that was found at the start: address or 0, bytes, sequence number.
     loaded: [AtomicU32; 3],
 }
 
@@ -46,7 +47,7 @@ impl Mailbox {
     const FAILED: u32 = 4;
 }
 
-/// The one mailbox.
+/// The only mailbox.
 #[unsafe(no_mangle)]
 #[used]
 pub static ARM_STORE: Mailbox = Mailbox {
@@ -58,9 +59,9 @@ pub static ARM_STORE: Mailbox = Mailbox {
     loaded: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Memory for an image to be stored; whoever has it out may use it.
+/// Memory for an image to be stored; the side that has taken it out may use it.
 static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
-/// The image of the start.
+/// Image that was found at the start.
 static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
 
 /// The image that was found at the start.
@@ -72,48 +73,48 @@ pub struct Loaded {
     pub sequence: u32,
 }
 
-/// Why an image is not taken.
+/// Reason why an image is not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// The last one is not stored yet.
+    /// The last image is not stored yet.
     Busy,
-    /// It has more than [`IMAGE_MAX`] bytes.
+    /// The image has more than [`IMAGE_MAX`] bytes.
     TooLong,
 }
 
-/// What became of the last image.
+/// Progress of the last image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// There was none since the start.
+    /// No image was handed over since the start.
     Idle,
-    /// It is being stored.
+    /// The image is being stored.
     Busy,
-    /// It is stored, and will be found from now on.
+    /// The image is stored, and is found at every later start.
     Done {
         /// Its sequence number.
         sequence: u32,
     },
-    /// It is not; the image that was stored before it is still there.
+    /// The image is not stored; the image before it is still there.
     Failed(Failure),
 }
 
-/// Why an image could not be stored. The log has the flags of the flash.
+/// Reason why an image could not be stored. The flags of the flash are in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 #[repr(u8)]
 pub enum Failure {
     /// The flash cannot be unlocked until the next reset.
     Locked = 1,
-    /// The flash reported an error while it erased.
+    /// The flash reported an error during erasing.
     Erase = 2,
-    /// The flash reported an error while it programmed.
+    /// The flash reported an error during programming.
     Program = 3,
-    /// What was programmed reads differently: the sector is worn out.
+    /// The programmed data reads back differently: the sector is worn out.
     Verify = 4,
     /// The flash did not become ready in time.
     Timeout = 5,
 }
 
-/// Gives an image to be stored. By the tick; it copies the bytes and comes back at once.
+/// Hands over an image to be stored. Called by the tick; copies the bytes and returns at once.
 pub fn begin(image: &[u8]) -> Result<(), Refused> {
     if matches!(ARM_STORE.state.load(Ordering::Acquire), Mailbox::ASKED | Mailbox::BUSY) {
         return Err(Refused::Busy);
@@ -128,7 +129,7 @@ pub fn begin(image: &[u8]) -> Result<(), Refused> {
     Ok(())
 }
 
-/// What became of the last image.
+/// Returns the progress of the last image.
 pub fn progress() -> Progress {
     match ARM_STORE.state.load(Ordering::Acquire) {
         Mailbox::ASKED | Mailbox::BUSY => Progress::Busy,
@@ -144,12 +145,12 @@ pub fn progress() -> Progress {
     }
 }
 
-/// The image that was found at the start; it stays the same until the next one.
+/// Returns the image that was found at the start; it stays the same until the next start.
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }
 
-/// Reads a slot; its header when it is whole.
+/// Reads a slot; returns its header if it is complete.
 fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     let first = bank2::read(slot, 0);
     if first == Some([0xFF; WORD]) {
@@ -167,7 +168,7 @@ fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     header
 }
 
-/// Looks for the stored image. Once, before the first tick; the watchdog does not run yet.
+/// Looks for the stored image. Call it once, before the first tick; the watchdog does not run yet.
 pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     let [first, second] = buffers;
     let headers = [read(0, first), read(1, second)];
@@ -189,23 +190,23 @@ pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     Store { slots, job: None }
 }
 
-/// The links' side.
+/// The links' side of the store.
 pub struct Store {
     slots: Slots,
     job: Option<Job>,
 }
 
-/// An image on its way.
+/// An image that is being stored.
 struct Job {
     image: &'static mut Buffer,
     length: usize,
     storing: Storing,
-    /// When what the flash does now was begun.
+    /// Time at which the current operation of the flash began.
     begun: Option<Instant>,
 }
 
 impl Store {
-    /// One step of what is to be done, if anything is; a few microseconds.
+    /// Carries out one step of the work, if there is any; takes a few microseconds.
     pub fn step(&mut self) {
         let Some(job) = &mut self.job else {
             if ARM_STORE.state.load(Ordering::Acquire) == Mailbox::ASKED {
@@ -220,12 +221,12 @@ impl Store {
         }
     }
 
-    /// Takes an image over.
+    /// Takes an image over from the mailbox.
     fn start(&mut self) {
         let Some(image) = critical_section::with(|cs| STAGING.borrow(cs).take()) else { return };
         ARM_STORE.state.store(Mailbox::BUSY, Ordering::Relaxed);
         let length = (ARM_STORE.length.load(Ordering::Relaxed) as usize).min(IMAGE_MAX);
-        // Not longer than allowed: a slot is always found.
+        // The image is not too long, so a slot is always found.
         let Some(storing) = Storing::begin(&mut self.slots, &image[..length]) else { return };
         self.job = Some(Job { image, length, storing, begun: None });
         if bank2::busy() {
@@ -238,7 +239,7 @@ impl Store {
     fn end(&mut self, result: Result<(), Failure>) {
         let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
         let flags = bank2::errors();
-        // Where it did not become ready, it is left alone: nobody is let in, and the next attempt looks again.
+        // If the bank is still busy, it is left alone and closed to reads; the next attempt checks it again.
         if !bank2::busy() {
             bank2::lock();
         }
@@ -262,12 +263,12 @@ impl Store {
 }
 
 impl Job {
-    /// What is to be done with the flash now.
+    /// Returns the next action on the flash.
     fn action(&self) -> Action {
         self.storing.action(self.image.get(..self.length).unwrap_or(&[]))
     }
 
-    /// Sees whether the flash is done, and begins what comes next; true at the end.
+    /// Checks if the flash has finished, and begins the next action; returns `true` at the end.
     fn step(&mut self) -> Result<bool, Failure> {
         if let Some(begun) = self.begun {
             let limit = if matches!(self.action(), Action::Erase { .. }) { ERASE_MAX } else { PROGRAM_MAX };
@@ -288,7 +289,7 @@ impl Job {
         Ok(false)
     }
 
-    /// Whether the flash did what it was to do.
+    /// Checks that the flash has done the action.
     fn check(&self) -> Result<(), Failure> {
         let failed = bank2::errors() != 0;
         match self.action() {

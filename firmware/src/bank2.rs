@@ -1,10 +1,10 @@
-//! Flash bank 2, of which the last two sectors keep the stored arm (J-54): erasing and programming that never waits, and reading
-//! that no damaged word can turn into a fault.
+//! Flash bank 2: its last two sectors keep the stored arm (J-54). Erasing and programming never block, and a damaged
+//! word cannot cause a fault when it is read.
 //!
-//! While the bank is erased or programmed, a read of it would halt the processor until that is done: two seconds, where the watchdog
-//! allows 4.5 ms. So nobody can read it: the protection unit keeps everything out, speculative reads and the fetching of cache
-//! lines too ([`memory::bank2`]), and opens it, as memory that is neither cached nor read ahead of the program, only for the few
-//! instructions here. Code and constants are in bank 1, which goes on being read.
+//! While the bank is erased or programmed, a read of it would halt the processor until the operation ends: up to two
+//! seconds, but the watchdog allows only 4.5 ms. Therefore the protection unit blocks every access, including
+//! speculative reads and cache line fills ([`memory::bank2`]). It opens the bank only for the few instructions here, as
+//! memory that is neither cached nor read ahead of the program. Code and constants are in bank 1, which stays readable.
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;
@@ -14,7 +14,7 @@ use jtc_core::slots::{SLOTS, WORD, Word};
 
 use crate::memory;
 
-/// Sectors of the slots. The first sector of the bank is where the Cortex-M4 starts, and is never touched.
+/// Sectors of the slots. The Cortex-M4 starts in the first sector of the bank, which is never changed.
 const SECTORS: [u8; SLOTS] = [6, 7];
 const SECTOR_BYTES: u32 = 128 * 1024;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -23,19 +23,19 @@ const PSIZE: u8 = 0b10;
 /// BFHFNMIGN in the register CCR of the core.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
 
-/// What the bank reports as wrong, bits of FLASH_SR2: write protection, sequence, strobe, inconsistency, operation, read
+/// Errors that the bank reports, bits of FLASH_SR2: write protection, sequence, strobe, inconsistency, operation, read
 /// protection, read security, two wrong bits in a word.
 const ERRORS: u32 = 1 << 17 | 1 << 18 | 1 << 19 | 1 << 21 | 1 << 22 | READ_ERRORS;
 const READ_ERRORS: u32 = 1 << 23 | 1 << 24 | 1 << 26;
-/// What is cleared beside them: end of operation, one wrong bit that was corrected.
+/// Flags that are cleared together with the errors: end of operation, one wrong bit that was corrected.
 const REMARKS: u32 = 1 << 16 | 1 << 25;
 
-/// Registers of the bank.
+/// Returns the registers of the bank.
 fn bank() -> Bank {
     pac::FLASH.bank(1)
 }
 
-/// Lets the registers be written; false when they refuse until the next reset.
+/// Unlocks the registers; returns `false` if they refuse until the next reset.
 pub fn unlock() -> bool {
     if bank().cr().read().lock() {
         KEYS.into_iter().for_each(|key| bank().keyr().write_value(key));
@@ -43,24 +43,24 @@ pub fn unlock() -> bool {
     !bank().cr().read().lock()
 }
 
-/// Ends an operation, and keeps anything but [`unlock`] from beginning one.
+/// Ends an operation; afterwards no operation can begin before [`unlock`].
 pub fn lock() {
     end();
     bank().cr().modify(|w| w.set_lock(true));
 }
 
-/// An operation is not done yet.
+/// Returns `true` while an operation is not finished.
 pub fn busy() -> bool {
     let sr = bank().sr().read();
     sr.bsy() || sr.qw()
 }
 
-/// An operation is done: nothing that is written from here on belongs to it.
+/// Ends programming or erasing: later writes do not belong to that operation.
 pub fn end() {
     bank().cr().write(|w| w.set_psize(PSIZE));
 }
 
-/// What went wrong since an operation began, bits of FLASH_SR2.
+/// Returns the errors since an operation began, bits of FLASH_SR2.
 pub fn errors() -> u32 {
     bank().sr().read().0 & ERRORS
 }
@@ -95,26 +95,26 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
     let (words, _) = bytes.as_chunks::<4>();
     let at = address(slot, word) as *mut u32;
     let write = |n: usize| {
-        // SAFETY: within a sector that nothing but this module uses; stores there go to the flash's buffer.
+        // SAFETY: within a sector that only this module uses; stores there go to the flash's buffer.
         unsafe { at.add(n).write_volatile(u32::from_le_bytes(words[n])) }
     };
     let last = words.len() - 1;
     memory::bank2(true);
     (0..last).for_each(write);
-    // With the last one the bank is busy: no interrupt comes before it is closed.
+    // The last word starts programming: no interrupt comes before the bank is closed.
     critical_section::with(|_| {
         write(last);
         memory::bank2(false);
     });
 }
 
-/// A word; `None` when it cannot be read. Not while the bank is busy.
+/// Reads a word; returns `None` if it cannot be read. Must not be called while the bank is busy.
 ///
-/// A word whose programming or erasing was cut off may have more wrong bits than the flash corrects. Reading it is a bus fault,
-/// which the core ignores here; the flag that the flash sets instead shows it.
+/// A word whose programming or erasing was interrupted may have more wrong bits than the flash can correct. Reading it
+/// causes a bus fault, which the core ignores here; the flag that the flash sets shows the error instead.
 pub fn read(slot: usize, word: usize) -> Option<Word> {
     clear();
-    // SAFETY: a register of the core. Nothing else changes it, and the bit acts only where faults are masked.
+    // SAFETY: a register of the core. No other code changes it, and the bit acts only while faults are masked.
     let ignore = |on: bool| unsafe {
         (*SCB::PTR).ccr.modify(|ccr| if on { ccr | IGNORE_BUS_FAULTS } else { ccr & !IGNORE_BUS_FAULTS });
     };
@@ -130,7 +130,7 @@ pub fn read(slot: usize, word: usize) -> Option<Word> {
     (bank().sr().read().0 & READ_ERRORS == 0).then_some(bytes)
 }
 
-/// One load with faults masked. Each is on its own, so that the tick waits for one at most.
+/// Loads one word with faults masked. Each load is masked separately, so that the tick waits for one at most.
 fn load(address: u32) -> u32 {
     let value: u32;
     // SAFETY: an aligned load from flash. With FAULTMASK set and BFHFNMIGN a bus fault of it is ignored; the barrier waits for

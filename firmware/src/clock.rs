@@ -1,17 +1,17 @@
-//! The clock tree, and what it makes of it: 85 MHz for the bus, 1 kHz for the tick, 15 MBd for the host.
+//! The clock tree and the rates derived from it: 85 MHz for the bus, 1 kHz for the tick, 15 MBd for the host.
 //!
-//! Everything comes from the 8 MHz of the ST-LINK (bypass), because CAN FD asks for a better clock than the internal
-//! oscillator's.
+//! All clocks come from the 8 MHz of the ST-LINK (bypass), because CAN FD needs a more accurate clock than the internal
+//! oscillator.
 use jtc_bus::timing;
 
-/// What comes in at OSC_IN, Hz.
+/// Frequency at OSC_IN, Hz.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// Vcore comes from the SMPS, as the board is wired when it is bought. The highest voltage scale is not allowed then,
-/// and with it not the highest frequency.
+/// `true` if Vcore comes from the SMPS, as the board is wired on delivery. Then the highest voltage scale is not
+/// allowed, and neither is the highest frequency.
 pub const SMPS: bool = cfg!(feature = "nucleo-h745zi-q");
 
-/// One output of a phase-locked loop.
+/// Output of a phase-locked loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Pll {
     /// Divider before the loop.
@@ -33,7 +33,7 @@ impl Pll {
         self.vco() / self.divide
     }
 
-    /// The rules of the reference manual for the wide oscillator, and no rounding anywhere.
+    /// Checks the reference manual's rules for the wide oscillator, and that no division rounds.
     const fn valid(&self) -> bool {
         let reference = HSE_HZ / self.m;
         HSE_HZ.is_multiple_of(self.m)
@@ -117,7 +117,7 @@ impl Baud {
 mod tests {
     use super::*;
 
-    /// What the line does by the reference manual's formula, Bd.
+    /// Computes the rate of the line by the reference manual's formula, Bd.
     fn rate(baud: Baud) -> f64 {
         let clock = f64::from(SERIAL.hz());
         if baud.over8 {
@@ -137,7 +137,7 @@ mod tests {
         {
             let baud = Baud::new(wanted).unwrap_or_else(|| panic!("{wanted} Bd"));
             let error = rate(baud) / f64::from(wanted) - 1.0;
-            // Both ends together may be off by about 3 %.
+            // The errors of both ends together may be about 3 %.
             assert!(error.abs() < 0.01, "{wanted} Bd: {error}");
         }
         assert_eq!(Baud::new(15_000_000), Some(Baud { brr: 0x10, over8: true }));

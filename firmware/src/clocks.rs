@@ -8,12 +8,12 @@ use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 use openjtc_firmware::clock;
 
-/// Everything that is not the tick.
+/// Priority of every interrupt except the tick.
 pub const LOW: Priority = Priority::P8;
 
-/// Output P or Q of a loop.
+/// Returns the settings of output P or Q of a loop.
 fn pll(from: clock::Pll, p: bool) -> Pll {
-    // The registers hold multiplier and divider less one.
+    // The registers hold multiplier and divider minus one.
     let divide = PllDiv::from_bits((from.divide - 1) as u8);
     Pll {
         source: PllSource::HSE,
@@ -30,7 +30,7 @@ fn pll(from: clock::Pll, p: bool) -> Pll {
 /// Brings up supply, clocks and the HAL.
 pub fn init() -> Peripherals {
     let mut config = Config::default();
-    // Otherwise they would be on a level with the tick.
+    // Otherwise they would have the same priority as the tick.
     config.dma_interrupt_priority = LOW;
     config.bdma_interrupt_priority = LOW;
     config.mdma_interrupt_priority = LOW;
@@ -58,7 +58,7 @@ pub fn init() -> Peripherals {
         use embassy_stm32::SharedData;
         use embassy_stm32::rcc::SupplyConfig;
 
-        /// Where the HAL passes the clocks to a program on the Cortex-M4. Nobody reads it.
+        /// Place in which the HAL passes the clocks to a program on the Cortex-M4. No program reads it.
         #[unsafe(link_section = ".sram4")]
         static SHARED: MaybeUninit<SharedData> = MaybeUninit::uninit();
 

@@ -1,5 +1,5 @@
-//! When the program fails: the safety output goes to 0, the drives get one last frame with zero torque, the cause is kept, and
-//! the processor is reset. And after a reset: what the last program left behind.
+//! Handling of a failed program: the safety output goes to 0, the drives get one last frame with zero torque, the cause
+//! is kept, and the processor is reset. After a reset: the data that the last program kept.
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -12,47 +12,47 @@ use openjtc_firmware::reset::{self, Cause, Failure};
 
 use crate::{board, fdcan};
 
-/// Memory whose contents survive a reset: tightly coupled, so no cache stands between a write and the cells.
+/// Memory whose contents survive a reset: tightly coupled, so that no cache stands between a write and the cells.
 #[repr(transparent)]
 pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 
 // SAFETY: `boot` hands out the only reference; a fault, after which nothing else runs, writes through a pointer.
 unsafe impl<T: Send> Sync for Kept<T> {}
 
-/// The last tick; layout in [`openjtc_firmware::flight`].
+/// Record of the last tick; layout in [`openjtc_firmware::flight`].
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.FLIGHT")]
 #[used]
 pub static FLIGHT: Kept<Flight> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// How the last program ended.
+/// Record of how the last program ended.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.LAST_WORDS")]
 #[used]
 pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Starts since power came on.
+/// Number of starts since power came on.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.BOOTS")]
 #[used]
 pub static BOOTS: Kept<u32> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Place in the source code or in the program where it ended.
+/// Place in the source code or in the program at which the last program ended.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LastWords {
-    /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; anything else: none.
+    /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; any other value: no failure.
     magic: u32,
     /// Panic: line of the source.
     line: u32,
-    /// Hard fault: program counter and return address, 0 where unknown.
+    /// Hard fault: program counter and return address, 0 if unknown.
     pc: u32,
     lr: u32,
     /// Hard fault: registers CFSR, HFSR, and the address if there is one.
     cfsr: u32,
     hfsr: u32,
     address: u32,
-    /// Panic: end of the name of the source file, filled up with zeros.
+    /// Panic: end of the name of the source file, padded with zeros.
     file: [u8; 32],
 }
 
@@ -75,28 +75,29 @@ impl LastWords {
     }
 }
 
-/// How this start came about.
+/// Origin of this start.
 pub struct Boot {
-    /// Why.
+    /// Cause of the start.
     pub cause: Cause,
-    /// The how-manieth it is since power came on.
+    /// Number of this start since power came on.
     pub boots: u32,
-    /// Power was off before it.
+    /// `true` if power was off before it.
     pub lost_power: bool,
-    /// The last words of the last program, and its last tick if that was kept.
+    /// Record of how the last program ended, and its last tick if that was kept.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
     /// The flight record of this program.
     pub flight: &'static mut Flight,
 }
 
-/// First thing in the program, once: what happened before it.
+/// Reads the data from before the start. Must be the first call in the program, once.
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
     let lost_power = reset::lost_power(rsr);
-    // SAFETY: nothing else refers to the three yet, and this is called once. After power-on they are random, with wrong check
-    // bits: written before they are read. Otherwise they hold integers and floats, for which any bits are a value.
+    // SAFETY: nothing else refers to the three yet, and this is called once. After power-on they are random, with wrong
+    // check bits, so they are written before they are read. Otherwise they hold integers and floats, for which any bits
+    // are a value.
     let (words, flight, boots) = unsafe {
         let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
         let boots = &mut *BOOTS.0.get();
@@ -115,7 +116,7 @@ pub fn boot() -> Boot {
     Boot { cause, boots: *boots, lost_power, last_words, last_flight, flight }
 }
 
-/// Writes it to the log.
+/// Logs the origin of the start.
 pub fn log(boot: &Boot) {
     let words = &boot.last_words;
     match boot.cause {
@@ -140,7 +141,7 @@ pub fn log(boot: &Boot) {
     }
 }
 
-/// Leaves the machine safe, keeps the words, and starts again. Interrupts are off for good.
+/// Leaves the machine safe, keeps the record, and restarts. Interrupts stay off.
 fn end(words: LastWords) -> ! {
     cortex_m::interrupt::disable();
     board::safety_output_low();
@@ -165,10 +166,10 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(words)
 }
 
-/// An interrupt that nobody expects, the one that cannot be masked among them.
+/// Handles every unexpected interrupt, including the one that cannot be masked.
 ///
 /// # Safety
-/// Only the processor calls it.
+/// Only the processor may call it.
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(number: i16) {
     let mut words =
@@ -179,8 +180,8 @@ unsafe fn DefaultHandler(number: i16) {
     end(words)
 }
 
-/// Entry of the hard fault, to which all faults lead. The stack may be what failed: a new one is begun, with
-/// where the old one was in the first argument.
+/// Entry of the hard fault, to which all faults lead. The stack may be the cause of the failure: therefore a new one is
+/// begun, and the address of the old one is passed in the first argument.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
@@ -208,8 +209,8 @@ extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
         if at < bottom || at + 4 > top || !at.is_multiple_of(4) {
             return 0;
         }
-        // SAFETY: within the stack and aligned. If the old stack was nearly empty the new one may have overwritten it;
-        // then the value is wrong, and harmless.
+        // SAFETY: within the stack and aligned. If the old stack was nearly empty, the new one may have overwritten it;
+        // then the value is wrong, but harmless.
         unsafe { (at as *const u32).read_volatile() }
     };
     let (pc, lr) = (word(PC), word(LR));

@@ -1,8 +1,8 @@
-//! The joint bus: FDCAN1 with dedicated buffers (J-10). It is used by the tick alone and never interrupts it.
+//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses it, and it never interrupts the tick.
 //!
-//! At most one frame a tick goes out. It goes into the one of two transmit buffers that the last one did not use: when the next
-//! tick finds the last frame still unsent, it is cancelled, and what is on the wire at that moment ends there; it is never
-//! sent late. Such a frame counts as unacknowledged.
+//! At most one frame is sent per tick. It goes into the one of the two transmit buffers that the last frame did not
+//! use. If the next tick finds the last frame still unsent, it cancels it: a transmission that is on the wire at that
+//! moment ends there, and the frame is never sent late. Such a frame counts as unacknowledged.
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::can::Fdcan as Registers;
@@ -17,9 +17,9 @@ use openjtc_firmware::message_ram as ram;
 
 const CAN: Registers = FDCAN1;
 
-/// Looks at a register before something that should happen in a few clock periods is given up.
+/// Reads of a register before the wait for a change that should take a few clock periods is given up.
 const PATIENCE: u32 = 10_000;
-/// The same within a tick, which has no time to lose: it looks again a millisecond later.
+/// Like `PATIENCE`, for waits within a tick, which must be short: the next tick looks again a millisecond later.
 const PATIENCE_IN_TICK: u32 = 100;
 
 /// Frames received in a tick.
@@ -35,7 +35,7 @@ impl ReceivedFrames {
         Self { frames: [NONE; ram::RX], count: 0 }
     }
 
-    /// The frames, by identifier.
+    /// Returns the frames, ordered by identifier.
     pub fn frames(&self) -> &[Frame] {
         self.frames.get(..self.count).unwrap_or(&[])
     }
@@ -55,7 +55,7 @@ pub struct Counters {
     pub transmit: u8,
     /// Receive error counter.
     pub receive: u8,
-    /// Frames that were cancelled because the next tick had come.
+    /// Frames that were cancelled because the next tick had begun.
     pub cancelled: u32,
     /// Times the controller went off the bus.
     pub bus_off: u32,
@@ -64,7 +64,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Nothing yet.
+    /// Returns counters at zero.
     pub const fn new() -> Self {
         Self { transmit: 0, receive: 0, cancelled: 0, bus_off: 0, wrong_format: 0 }
     }
@@ -74,14 +74,14 @@ impl Counters {
 pub struct Fdcan {
     /// Transmit buffer of the last frame.
     last: usize,
-    /// A frame was put there by the last tick.
+    /// `true` if the last tick put a frame there.
     sent: bool,
     recovering: bool,
     counters: Counters,
 }
 
 impl Fdcan {
-    /// Sets the controller up and joins the bus.
+    /// Configures the controller and joins the bus.
     pub fn start() -> Self {
         rcc::enable_and_reset::<peripherals::FDCAN1>();
         CAN.cccr().modify(|w| w.set_init(true));
@@ -105,7 +105,7 @@ impl Fdcan {
             FDCANRAM.ram(ram::FILTERS + n).write_value(ram::filter(n));
         }
         CAN.gfc().write(|w| {
-            // Reject what no filter wants, and remote frames.
+            // Reject frames that match no filter, and remote frames.
             w.set_anfs(3);
             w.set_anfe(3);
             w.set_rrfs(true);
@@ -127,7 +127,8 @@ impl Fdcan {
         Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
-    /// Takes the frames received since the last tick; returns the state of the bus. Before `send`, once a tick.
+    /// Takes the frames received since the last tick; returns the state of the bus. Call it before `send`, once per
+    /// tick.
     pub fn poll(&mut self, frames: &mut ReceivedFrames) -> BusState {
         let acknowledged = self.finish_last();
         let off = self.recover();
@@ -146,7 +147,7 @@ impl Fdcan {
         BusState { acknowledged, bus_off: off }
     }
 
-    /// Puts the frame of this tick on its way. While off the bus it is dropped.
+    /// Requests transmission of the frame of this tick. Drops it while the bus is off.
     pub fn send(&mut self, frame: &Frame) {
         if self.recovering {
             return;
@@ -158,14 +159,14 @@ impl Fdcan {
         }
     }
 
-    /// Error counters.
+    /// Returns the error counters.
     pub fn counters(&mut self) -> Counters {
         let now = CAN.ecr().read();
         (self.counters.transmit, self.counters.receive) = (now.tec(), now.rec());
         self.counters
     }
 
-    /// True when the last frame was acknowledged; cancels it when it is still waiting.
+    /// Returns `true` if the last frame was acknowledged. Cancels it if it is still waiting.
     fn finish_last(&mut self) -> bool {
         let sent = core::mem::take(&mut self.sent);
         let bit = 1 << self.last;
@@ -177,15 +178,16 @@ impl Fdcan {
         sent && CAN.txbto().read().0 & bit != 0
     }
 
-    /// ISO 11898-1: a controller that is off the bus comes back 129 times 11 recessive bits after the program
-    /// allows it to. True while it cannot send: no frame would leave, and drives keep their last torque.
+    /// Restarts a controller that is bus-off: ISO 11898-1 lets it rejoin after 129 times 11 recessive bits, counted
+    /// from when the program allows it. Returns `true` while it cannot send: no frame would leave, and drives keep
+    /// their last torque.
     fn recover(&mut self) -> bool {
         let control = CAN.cccr().read();
-        // INIT: the controller itself has stopped. ASM: it could not use its message memory, and now only listens.
+        // INIT: the controller has stopped itself. ASM: it could not use its message memory, and now only listens.
         if control.init() || control.asm() {
             CAN.cccr().modify(|w| w.set_init(true));
             wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
-            // Access to its configuration forgets all transmit requests.
+            // Access to its configuration clears all transmit requests.
             CAN.cccr().modify(|w| {
                 w.set_cce(true);
                 w.set_asm(false);
@@ -202,7 +204,7 @@ impl Fdcan {
 }
 
 fn set_timing() {
-    // Registers hold everything less one.
+    // The registers hold each value minus one.
     let BitTiming { prescaler, segment1, segment2, jump_width } = timing::NOMINAL;
     CAN.nbtp().write(|w| {
         w.set_nbrp(prescaler - 1);
@@ -224,7 +226,8 @@ fn set_timing() {
     });
 }
 
-/// Ends the set-up. The bit is cleared in another clock domain: it must read 0 before it may be set again.
+/// Leaves the initialisation mode. The bit is cleared in another clock domain: it must read 0 before it may be set
+/// again.
 fn leave_init(patience: u32) {
     CAN.cccr().modify(|w| {
         w.set_cce(false);
@@ -233,12 +236,12 @@ fn leave_init(patience: u32) {
     wait(patience, || !CAN.cccr().read().init());
 }
 
-/// Looks `patience` times whether it is `done`.
+/// Checks up to `patience` times if it is `done`.
 fn wait(patience: u32, done: impl Fn() -> bool) -> bool {
     (0..patience).any(|_| done())
 }
 
-/// The frame in receive buffer `n`; `None` when it has a format that this bus has not.
+/// Returns the frame in receive buffer `n`; `None` if its format is not used on this bus.
 fn received(n: usize) -> Option<Frame> {
     let word = |i: usize| FDCANRAM.ram(ram::rx(n) + i).read();
     let (head, about) = (word(0), word(1));
@@ -254,7 +257,8 @@ fn received(n: usize) -> Option<Frame> {
     Frame::from_dlc((head >> 18 & 0x7FF) as u16, (about >> 16 & 0xF) as u8, &data)
 }
 
-/// Writes a frame into transmit buffer `n` and asks for it to be sent; false when the buffer is still in use.
+/// Writes a frame into transmit buffer `n` and requests its transmission; returns `false` if the buffer is still in
+/// use.
 fn request(n: usize, frame: &Frame) -> bool {
     const FD: u32 = 1 << 21;
     const BIT_RATE_SWITCH: u32 = 1 << 20;
@@ -276,8 +280,8 @@ fn request(n: usize, frame: &Frame) -> bool {
     true
 }
 
-/// The program has failed: takes the torque away, if the bus can still be used, and gives up soon (about a
-/// millisecond) if not. Called from a fault, whatever the state of everything else.
+/// Takes the torque away after a failure of the program, if the bus can still be used. Otherwise gives up after about a
+/// millisecond. Called from a fault, when the state of all other parts is unknown.
 pub fn last_frame() {
     /// A frame takes 0.1 ms, and up to seven answers may be on the bus before it.
     const LOOKS: u32 = 20_000;

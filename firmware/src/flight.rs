@@ -1,8 +1,9 @@
-//! The flight record: everything that went into the last tick, and what came out of it.
+//! The flight record: all inputs and outputs of the last tick.
 //!
-//! It lies in memory that keeps its contents over a reset, under the symbol `FLIGHT`, and is written in every tick: its
-//! inputs before the controller runs, its outputs after. Whoever records it after every tick can run the same ticks
-//! on a PC and must get the same bits. Host frames are named by type, length and CRC; their bytes are the host's.
+//! The record lies in memory that keeps its contents over a reset, under the symbol `FLIGHT`. Every tick writes its
+//! inputs before the controller runs, and its outputs after. A tool that reads the record after every tick can run the
+//! same ticks on a PC and must get the same bits. Host frames are named by type, length and CRC; only the host has
+//! their bytes.
 //!
 //! All numbers are little-endian, as in the processor's memory. The layout is that of the structures below, which have
 //! no hidden padding; [`Flight::LAYOUT`] changes with it.
@@ -12,7 +13,7 @@ use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
 
 use crate::message_ram::RX;
 
-/// A frame of the joint bus; `id` is [`NO_FRAME`] where there is none.
+/// Frame of the joint bus; `id` is [`NO_FRAME`] if there is no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightFrame {
@@ -20,11 +21,11 @@ pub struct FlightFrame {
     pub id: u16,
     /// Bytes of payload.
     pub len: u16,
-    /// Payload, zeros behind it.
+    /// Payload, padded with zeros.
     pub data: [u8; MAX_LEN],
 }
 
-/// Identifier of a frame that is none.
+/// Identifier that means “no frame”.
 pub const NO_FRAME: u16 = 0xFFFF;
 
 impl FlightFrame {
@@ -39,31 +40,32 @@ impl FlightFrame {
         Self { id: frame.id, len: payload.len() as u16, data }
     }
 
-    /// The frame; `None` for [`NO_FRAME`].
+    /// Returns the frame; `None` for [`NO_FRAME`].
     pub fn frame(&self) -> Option<Frame> {
         Frame::new(self.id, self.data.get(..self.len.into())?)
     }
 }
 
-/// What came from the host.
+/// Event from the host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// 0 nothing, 1 a good frame, 2 a bad one, 3 noise; bit 6: it came on a plain line; bit 7: an urgent command has overtaken it.
+    /// 0 no event, 1 a good frame, 2 a bad one, 3 noise; bit 6: it came on a plain line; bit 7: an urgent command has
+    /// overtaken it.
     pub kind: u8,
     /// Its line: 0 RS422, 1 USB.
     pub line: u8,
-    /// Type byte, 0 where unknown.
+    /// Type byte, 0 if unknown.
     pub frame_type: u8,
     /// Frame status as it will be reported.
     pub status: u8,
-    /// Bytes, 0 where unknown.
+    /// Length in bytes, 0 if unknown.
     pub len: u16,
     /// CRC of a good frame, else 0.
     pub crc: u16,
 }
 
-/// The urgent commands of a line: each sort that came (1 Stop, 2 Pause) and how often, the last at the end.
+/// Urgent commands of a line: kind (1 Stop, 2 Pause) and number received, the kind that came last at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightUrgent(pub [[u8; 2]; 2]);
@@ -77,7 +79,7 @@ impl FlightUrgent {
         Self(all)
     }
 
-    /// The commands.
+    /// Returns the commands.
     pub fn commands(&self) -> UrgentCommands {
         let mut commands = UrgentCommands::NONE;
         for [command, count] in self.0 {
@@ -98,7 +100,7 @@ pub struct Flight {
     pub layout: u16,
     /// Bytes of this record.
     pub size: u16,
-    /// How far the tick is: one of the `PHASE_` constants.
+    /// Progress of the tick: one of the `PHASE_` constants.
     pub phase: u32,
     /// [`crate::reset::Cause`] of the start of this program.
     pub cause: u32,
@@ -110,7 +112,7 @@ pub struct Flight {
     pub bus_state: u8,
     /// Level of the safety input.
     pub safety_input: u8,
-    /// Both lines could take a status.
+    /// 1 if both lines could take a status.
     pub status_free: u8,
     /// Frames in `received`.
     pub received_count: u8,
@@ -118,7 +120,7 @@ pub struct Flight {
     pub wrong_format: u32,
     /// Stop and Pause that arrived on each line.
     pub urgent: [FlightUrgent; HOST_LINES],
-    /// Host events that were offered.
+    /// Number of host events that were offered.
     pub event_count: u8,
     reserved: u8,
     /// Ticks before this one that did not come or came late.
@@ -145,7 +147,7 @@ pub struct Flight {
     pub errors: u16,
     /// Events that are done.
     pub host_done: u8,
-    /// Line of the response record in the status; 0xFF: it has none.
+    /// Line of the response record in the status; 0xFF: the status has no record.
     pub record_line: u8,
     /// Torques commanded, N·m.
     pub torque: [f64; JOINTS],
@@ -158,7 +160,7 @@ impl Flight {
     pub const MAGIC: u32 = u32::from_le_bytes(*b"JTCF");
     /// Version of the layout.
     pub const LAYOUT: u16 = 3;
-    /// No line has a record.
+    /// Value of `record_line` for a status without a record.
     pub const NO_LINE: u8 = 0xFF;
     /// No tick yet.
     pub const PHASE_NONE: u32 = 0;
@@ -200,14 +202,14 @@ impl Flight {
         }
     }
 
-    /// It was written by this version of the program.
+    /// Returns `true` if this version of the program wrote the record.
     pub fn valid(&self) -> bool {
         self.magic == Self::MAGIC
             && self.layout == Self::LAYOUT
             && usize::from(self.size) == size_of::<Self>()
     }
 
-    /// Records what goes into the next tick.
+    /// Records the inputs of the next tick.
     pub fn begin(&mut self, inputs: &Inputs<'_>, wrong_format: u32) {
         self.phase = Self::PHASE_INPUTS;
         self.tick += 1;
@@ -230,7 +232,7 @@ impl Flight {
         }
     }
 
-    /// Records what came out of it.
+    /// Records the outputs of the tick.
     pub fn complete(&mut self, outputs: &jtc_core::Outputs, telemetry: &Telemetry) {
         self.state = telemetry.state as u8;
         self.trajectory = telemetry.trajectory as u8;
@@ -247,12 +249,12 @@ impl Flight {
         self.phase = Self::PHASE_COMPLETE;
     }
 
-    /// The state of the bus that went in.
+    /// Returns the bus state of the inputs.
     pub fn bus_state(&self) -> BusState {
         BusState { acknowledged: self.bus_state & 1 != 0, bus_off: self.bus_state & 2 != 0 }
     }
 
-    /// The frames that went in.
+    /// Returns the received frames of the inputs.
     pub fn received(&self) -> impl Iterator<Item = Frame> {
         self.received.iter().take(self.received_count.into()).filter_map(FlightFrame::frame)
     }

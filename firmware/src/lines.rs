@@ -9,7 +9,7 @@ pub const RS422: usize = 0;
 /// The virtual serial port of the ST-LINK.
 pub const USB: usize = 1;
 
-/// The same status without a record.
+/// Returns the same status without a record.
 pub fn without_record(status: &[u8; STATUS_LEN]) -> [u8; STATUS_LEN] {
     let mut idle = *status;
     idle[field::RESPONSE_TYPE..field::RESPONSE_LENGTH.end].fill(0);

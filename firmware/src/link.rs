@@ -1,9 +1,9 @@
-//! From bytes to frames: each line has a parser of its own; what the parsers find goes to the tick in batches, through one
+//! From bytes to frames: each line has its own parser. The events of the parsers go to the tick in batches, through one
 //! slot.
 //!
-//! A batch is a copy, so that a parser can take more bytes while the tick executes a long frame, slice by slice. What comes
-//! faster than the tick executes fills the parser's buffer, then the ring, and is lost in the end; Stop and Pause are not,
-//! because the tick finds them by itself.
+//! A batch is a copy, so that a parser can take more bytes while the tick executes a long frame, slice by slice. If
+//! bytes come faster than the tick executes frames, they fill the parser's buffer, then the ring, and in the end some
+//! are lost. Stop and Pause are not lost, because the tick finds them by itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -19,20 +19,21 @@ use crate::uart;
 
 /// Inter-byte timeout: silence that ends a frame, µs (J-03).
 pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
-/// Bytes given to a parser at once.
+/// Bytes that are given to a parser at once.
 const CHUNK: usize = 1024;
-/// Rounds before the links wait for the next tick.
+/// Largest number of rounds before the links wait for the next tick.
 const ROUNDS: usize = 64;
-/// Bytes behind which the links may be: DMA overwrites what is older than the ring is long, and goes on while they read.
+/// Largest lag of the links, bytes: DMA overwrites bytes that are older than the ring is long, and continues while the
+/// links read.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
-/// Counts up with every round of the links: the tick sees by it that they are alive.
+/// Number of rounds of the links. The tick uses it to see that they are alive.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
 /// Bytes received on each line, modulo 2³², as of the last tick.
 pub static RECEIVED: [AtomicU32; lines::LINES] = [const { AtomicU32::new(0) }; lines::LINES];
 
-/// Where the slot is put for the other side to take. Whoever has the reference may use it; there is but one.
+/// Place in which one side leaves the slot for the other. The side that holds the only reference may use it.
 type Place = Mutex<Cell<Option<&'static mut EventBatch>>>;
 static FULL: Place = Mutex::new(Cell::new(None));
 static EMPTY: Place = Mutex::new(Cell::new(None));
@@ -43,14 +44,14 @@ pub struct SlotIn(Option<&'static mut EventBatch>);
 /// The tick's end of the slot, with the batch that it executes.
 pub struct SlotOut(Option<&'static mut EventBatch>);
 
-/// Both ends of the slot, which is empty.
+/// Returns both ends of the slot, which is empty.
 pub fn slot(memory: &'static mut EventBatch) -> (SlotIn, SlotOut) {
     critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
     (SlotIn(None), SlotOut(None))
 }
 
 impl SlotIn {
-    /// Adds an event to the batch; false when the tick has it, or it is full.
+    /// Adds an event to the batch; returns `false` if the tick holds the batch, or if it is full.
     fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| EMPTY.borrow(cs).take());
@@ -58,7 +59,7 @@ impl SlotIn {
         self.0.as_mut().is_some_and(|batch| batch.push(received))
     }
 
-    /// Hands the batch to the tick if there is something in it.
+    /// Hands the batch to the tick if it contains an event.
     fn send(&mut self) {
         if let Some(batch) = self.0.take_if(|batch| !batch.is_empty()) {
             critical_section::with(|cs| FULL.borrow(cs).set(Some(batch)));
@@ -67,7 +68,7 @@ impl SlotIn {
 }
 
 impl SlotOut {
-    /// The batch, until all of it is done.
+    /// Returns the batch, until all of it is done.
     pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
@@ -75,7 +76,7 @@ impl SlotOut {
         self.0.as_deref()
     }
 
-    /// The oldest `count` events are done.
+    /// Marks the oldest `count` events as done.
     pub fn done(&mut self, count: usize) {
         if let Some(batch) = &mut self.0 {
             batch.done(count);
@@ -91,26 +92,26 @@ pub struct Link {
     line: usize,
     uart: uart::Receiver,
     parser: Receiver<&'static mut [u8]>,
-    /// Bytes taken from the line, those that were lost included.
+    /// Bytes taken from the line, including lost ones.
     taken: u64,
     /// Bytes that were lost.
     lost: u64,
-    /// When the ring was looked at last, µs.
+    /// Time at which the ring was last checked, µs.
     looked_us: u64,
-    /// Bytes that were left in the ring then.
+    /// Bytes that were left in the ring at that time.
     left: usize,
 }
 
 impl Link {
-    /// A link over `line`, whose bytes `uart` receives.
+    /// Creates a link over `line`, whose bytes `uart` receives.
     pub fn new(line: usize, uart: uart::Receiver, buffer: &'static mut [u8; FRAME_MAX]) -> Self {
         let parser = Receiver::new(&mut buffer[..], INTER_BYTE_TIMEOUT_US);
         Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 
-    /// Takes what has arrived and looks for an event; true when there is more to do at once.
+    /// Takes the bytes that have arrived and looks for an event; returns `true` if there is more to do at once.
     fn receive(&mut self) -> bool {
-        // The clock first: a byte that arrives after it is not counted as silence before it.
+        // The clock first, so that a byte that arrives after it is not counted as silence before it.
         let now = Instant::now().as_micros();
         self.catch_up();
         let waiting = self.uart.waiting();
@@ -133,11 +134,11 @@ impl Link {
         self.taken += count as u64;
     }
 
-    /// Where DMA has come round to bytes that were not taken: all that waits is given up.
+    /// Drops all waiting bytes if DMA has come round to bytes that were not taken.
     fn catch_up(&mut self) {
         let received = RECEIVED[self.line].load(Ordering::Relaxed);
         let behind = received.wrapping_sub(self.taken as u32);
-        // Bytes taken since the last tick make it negative.
+        // Bytes taken since the last tick make the value negative.
         if behind > BEHIND && behind < 1 << 31 {
             self.lost += u64::from(behind);
             self.taken += u64::from(behind);
@@ -147,8 +148,8 @@ impl Link {
         }
     }
 
-    /// The first of `new` bytes arrived earlier than the last, which matters for a gap before it: at the latest
-    /// when it had to for all of them to be here by now, and not before the ring was last looked at.
+    /// Gives the first of `new` bytes to the parser with its time of arrival, which matters for a gap before it: `now`
+    /// minus the duration of `new` bytes, but not before the ring was last checked.
     fn begin(&mut self, now: u64, new: usize) {
         let first = (now.saturating_sub(duration_us(new))).max(self.looked_us);
         let mut byte = [0];
@@ -156,7 +157,7 @@ impl Link {
         self.take(taken);
     }
 
-    /// Adds the event of the parser to the batch if there is room.
+    /// Adds the event of the parser to the batch if there is space.
     fn hand_over(&mut self, slot: &mut SlotIn) -> bool {
         let moved = self.parser.received(self.line).is_some_and(|received| slot.push(&received));
         if moved {
@@ -166,14 +167,14 @@ impl Link {
     }
 }
 
-/// Time of `bytes` on the line: ten bits each.
+/// Returns the time of `bytes` on the line: ten bits each.
 fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
 /// Serves both lines for ever, stores arms, and reads the program in flash.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
-    // Line whose turn it is: one that floods the slot does not keep the other from it.
+    // Line whose turn it is, so that a line that floods the slot does not block the other.
     let mut turn = 0;
     let mut report = Report::new();
     let mut program = program::Reader::new();
@@ -203,8 +204,8 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
     }
 }
 
-/// Logs what changed, at most once a second. One number in each line: interrupts are masked while a line is written, and the tick has to begin
-/// in time.
+/// Logs changes, at most once a second. Each line has one number: interrupts are masked while a line is written, and
+/// the tick must begin in time.
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],

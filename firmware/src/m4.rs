@@ -1,11 +1,11 @@
-//! The second core of the H745 starts at bank 2 of the flash, whether there is a program or not. This is its program:
+//! The second core of the H745 starts at bank 2 of the flash, with or without a program there. This is its program:
 //! sleep.
 
 /// `wfi` and a branch back to it.
 const SLEEP: u32 = 0xE7FD_BF30;
 /// Address of the instructions, with the bit that stands for Thumb.
 const PROGRAM: u32 = 0x0810_0000 + 16 * 4 + 1;
-/// End of the small SRAM3, where the stack would be if there were an exception.
+/// End of the small SRAM3. The stack would start here, but no exception ever uses it.
 const STACK: u32 = 0x3004_8000;
 
 /// Vector table (stack, reset, fourteen exceptions) and program.

@@ -1,13 +1,13 @@
 //! Firmware of the joint trajectory controller.
 //!
-//! Two parties share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
-//! second: it owns the controller, the joint bus, the safety wires and the LEDs, and nothing delays it by more than a
-//! few instructions. The *links* ([`link`]) run in what time is left: they take bytes from both serial lines and cut
-//! them into frames. Frames go from the links to the tick in batches, through one slot; statuses go straight from the tick
-//! to the lines' DMA. A Stop or a Pause needs neither links nor slot: the tick looks for them in what DMA has received. The
-//! links' rounds also write the stored arm ([`arm_store`]), a step in each.
+//! Two parts share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
+//! second: it owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed by more than a
+//! few instructions. The *links* ([`link`]) run in the remaining time: they take bytes from both serial lines and split
+//! them into frames. Frames go from the links to the tick in batches, through one slot; statuses go straight from the
+//! tick to the lines' DMA. A Stop or a Pause needs neither links nor slot: the tick looks for them in the bytes that
+//! DMA has received. The rounds of the links also write the stored arm ([`arm_store`]), a step in each.
 //!
-//! What is above the hardware stands in the library beside this program and in `jtc-core`, where it is tested on a PC.
+//! Everything above the hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
 #![no_std]
 #![no_main]
 #![deny(unsafe_op_in_unsafe_fn)]
@@ -34,14 +34,14 @@ mod summary;
 mod tick;
 mod uart;
 
-/// What this firmware is, at a fixed address.
+/// Identity of this firmware, at a fixed address.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".version")]
 #[used]
 pub static VERSION: Version = Version::this();
 
-/// A tick that does not complete within this time resets the processor, µs. The watchdog's own oscillator is a few per
-/// cent off.
+/// Time within which a tick must complete, µs; otherwise the watchdog resets the processor. Its own oscillator is a few
+/// per cent off.
 const WATCHDOG_US: u32 = 4_500;
 
 #[embassy_executor::main]
@@ -65,7 +65,7 @@ async fn main(_spawner: Spawner) {
     let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
         memory::take(boot.lost_power);
     let store = arm_store::load(arms);
-    // All of its memory is looked at, and that is slow memory: before the watchdog runs.
+    // Reads all of its memory, which is slow: before the watchdog runs.
     let recorder = Recorder::new(recorder, boot.cause.failed());
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;

@@ -12,7 +12,7 @@ use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 use crate::arm_store;
 use crate::uart::RING;
 
-/// A value outside .data and .bss, which nobody initialises before [`take`].
+/// A value outside .data and .bss: no code initialises it before [`take`].
 #[repr(C, align(32))]
 struct Place<T>(UnsafeCell<MaybeUninit<T>>);
 
@@ -24,10 +24,10 @@ impl<T> Place<T> {
         Self(UnsafeCell::new(MaybeUninit::uninit()))
     }
 
-    /// The value, all bytes zero.
+    /// Returns the value, with all bytes zero.
     ///
     /// # Safety
-    /// Called once, and zero bytes are a value of `T`.
+    /// Must be called once, and zero bytes must be a valid value of `T`.
     #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn take(&'static self) -> &'static mut T {
         // SAFETY: the only reference there will ever be, by the contract.
@@ -37,11 +37,12 @@ impl<T> Place<T> {
         unsafe { place.assume_init_mut() }
     }
 
-    /// The value as the last program left it, all bytes zero after a loss of power: until then the memory is random, with wrong check
-    /// bits.
+    /// Returns the value as the last program left it; after a loss of power with all bytes zero, because then the
+    /// memory is random, with wrong check bits.
     ///
     /// # Safety
-    /// Called once, any bytes are a value of `T`, and the linker keeps the place out of what is initialised.
+    /// Must be called once, any bytes must be a valid value of `T`, and the linker must keep the place out of the
+    /// initialised sections.
     #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn keep(&'static self, lost_power: bool) -> &'static mut T {
         if lost_power {
@@ -56,8 +57,9 @@ impl<T> Place<T> {
 /// Blocks in the pieces of the flight recorder's memory.
 const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
-/// Memory of the flight recorder (J-56): what DMA leaves of SRAM1, SRAM3, and SRAM4. None is cached: what is written is there at the next
-/// instruction, whatever resets the processor. Their names keep the compiler from knowing what they hold.
+/// Memory of the flight recorder (J-56): the part of SRAM1 that DMA does not use, SRAM3, and SRAM4. None of it is
+/// cached: written data is in memory at the next instruction and survives any reset. The symbols keep the compiler from
+/// assuming their contents.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".sram1")]
 #[used]
@@ -77,16 +79,16 @@ static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
 /// The frames that the controller executes.
 #[unsafe(link_section = ".axisram")]
 static BATCH: Place<EventBatch> = Place::new();
-/// The stored arm, and one that is to be stored.
+/// The stored arm, and an arm that will be stored.
 #[unsafe(link_section = ".axisram")]
 static ARMS: Place<[arm_store::Buffer; 2]> = Place::new();
-/// What the lines' DMA writes; not cached.
+/// Buffers that the lines' DMA writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
-/// What the lines' DMA reads; not cached.
+/// Buffers that the lines' DMA reads; not cached.
 #[unsafe(link_section = ".sram1")]
 static STATUSES: Place<[[u8; ANSWER_MAX]; 2]> = Place::new();
-/// Where frames are put together, a buffer for each line.
+/// Buffers in which frames are assembled, one for each line.
 #[unsafe(link_section = ".sram2")]
 static RECEIVE: Place<[[u8; FRAME_MAX]; 2]> = Place::new();
 
@@ -96,25 +98,26 @@ pub struct Memory {
     pub points: &'static mut [RawPoint],
     /// DMA rings of the lines.
     pub rings: [&'static mut [u8; RING]; 2],
-    /// DMA buffers of what is sent.
+    /// DMA buffers for transmission.
     pub statuses: [&'static mut [u8; ANSWER_MAX]; 2],
     /// Receive buffers of the lines.
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.
     pub batch: &'static mut EventBatch,
-    /// For the stored arm and for one that is to be stored.
+    /// Buffers for the stored arm and for an arm that will be stored.
     pub arms: [&'static mut arm_store::Buffer; 2],
-    /// For the flight recorder; it holds what the last program recorded.
+    /// Memory of the flight recorder, with the records of the last program.
     pub recorder: [&'static mut [Block]; 3],
 }
 
-/// Hands out the buffers, zeroed; but for the flight recorder's, unless the device has `lost_power`. Once; after [`init`].
+/// Hands out the buffers, zeroed. The flight recorder's are zeroed only if the device has `lost_power`. Call it once,
+/// after [`init`].
 pub fn take(lost_power: bool) -> Memory {
     // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `EventBatch`, which consists of
     // integers, too.
     let (points, rings, statuses, receive, batch, arms) =
         unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
-    // SAFETY: as above; all stand in sections that nobody loads or clears, and integers may be any bytes.
+    // SAFETY: as above; all are in sections that are neither loaded nor cleared, and integers may be any bytes.
     let recorder: [&mut [Block]; 3] = unsafe {
         [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM3.keep(lost_power), RECORDER_SRAM4.keep(lost_power)]
     };
@@ -131,19 +134,19 @@ pub fn take(lost_power: bool) -> Memory {
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
 const REGIONS: [(u32, u32, u32); 7] = [
-    // External memory that is not there: without this the core may read it speculatively and hang. The lowest three
+    // External memory that does not exist: without this the core may read it speculatively and hang. The lowest three
     // eighths and the highest of the 4 GB are left out.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
     // The instruction memory at address 0 is not used: following a null pointer is a fault.
     (0x0000_0000, 16, NO_ACCESS),
     // Below the stack: an overflow is a fault at the very store that overflows.
     (0x1FFC_0000, 18, NO_ACCESS),
-    // What DMA reads and writes: normal memory, not cached.
+    // Memory that DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
-    // What the flight recorder writes.
+    // Memory that the flight recorder writes.
     (0x3004_0000, 15, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     (0x3800_0000, 16, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
-    // The second bank of the flash halts whoever reads it while it is busy: opened by [`bank2`] only.
+    // A read of the second flash bank while it is busy halts the reader: only [`bank2`] opens it.
     (BANK2, 20, NO_ACCESS),
 ];
 /// Flash bank 2.
@@ -185,7 +188,7 @@ fn protect(mpu: &MPU) {
         }
     }
     const ENABLE: u32 = 1 << 0;
-    // HFNMIENA. Otherwise bank 2 would be cached memory to the loads of `bank2`, which mask faults.
+    // HFNMIENA. Without it, bank 2 would be cached memory for the loads of `bank2`, which mask faults.
     const WITH_FAULTS_MASKED: u32 = 1 << 1;
     const DEFAULT_MAP_ELSEWHERE: u32 = 1 << 2;
     // SAFETY: as above; everything else keeps the processor's default attributes.
@@ -194,12 +197,12 @@ fn protect(mpu: &MPU) {
     cortex_m::asm::isb();
 }
 
-/// Lets loads and stores into flash bank 2, or keeps them out. Open, it is strongly ordered memory: not cached, nothing is read
-/// before the program asks for it. By the main program only.
+/// Allows loads and stores in flash bank 2, or blocks them. While open, it is strongly ordered memory: not cached, and
+/// never read before the program asks for it. Only for the main program.
 pub fn bank2(open: bool) {
     let (_, size, closed) = REGIONS[BANK2_REGION as usize];
     let attributes = if open { FULL_ACCESS | NO_EXECUTE } else { closed };
-    // What was begun before ends before.
+    // Completes accesses that began before the change.
     cortex_m::asm::dsb();
     // SAFETY: the region holds nothing of this program but what `bank2` reads and writes while it is open; interrupts use
     // neither the bank nor these registers.

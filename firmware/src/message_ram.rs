@@ -1,16 +1,16 @@
-//! The CAN controller's message memory: which filter leads into which buffer, and where each begins (J-10).
+//! The CAN controller's message memory: the buffer of each filter, and the position of each buffer (J-10).
 //!
-//! Buffers are dedicated: each of the 21 answers that nodes can give has one of its own, in the order
-//! of their identifiers. All else is rejected by the controller. A buffer that was not read is not overwritten.
+//! Buffers are dedicated: each of the 21 possible answers of nodes has a buffer of its own, in the order of their
+//! identifiers. The controller rejects all other frames. A buffer that was not read is not overwritten.
 use jtc_bus::{MAX_LEN, NODES, id};
 
 /// Bytes of the message memory.
 pub const BYTES: usize = 10 * 1024;
 /// Identifiers that are received: answers of seven nodes to Move, ChangeFsm and ChangeMode.
 pub const RX: usize = 3 * NODES;
-/// Transmit buffers: one for this tick's frame, one for the last one's while it is being cancelled.
+/// Transmit buffers: one for this tick's frame, one for the last tick's frame while it is being cancelled.
 pub const TX: usize = 2;
-/// Words of a buffer: two of header, the rest payload.
+/// Words of a buffer: two of header, the remainder payload.
 pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
 /// Code of a payload of 24 bytes in RXESC and TXESC.
 pub const SIZE_CODE: u8 = 4;
@@ -28,21 +28,21 @@ const _: () = {
     assert!(END * 4 <= BYTES);
     // The codes 0..4 stand for 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // One register of new-data flags covers all.
+    // One register of new-data flags covers all receive buffers.
     assert!(RX <= 32 && TX <= 32);
 };
 
-/// First word of receive buffer `n`.
+/// Returns the first word of receive buffer `n`.
 pub const fn rx(n: usize) -> usize {
     RX_BUFFERS + n * BUFFER_WORDS
 }
 
-/// First word of transmit buffer `n`.
+/// Returns the first word of transmit buffer `n`.
 pub const fn tx(n: usize) -> usize {
     TX_BUFFERS + n * BUFFER_WORDS
 }
 
-/// The identifier of the frames in receive buffer `n`.
+/// Returns the identifier of the frames in receive buffer `n`.
 pub const fn received_id(n: usize) -> u16 {
     let node = (n % NODES) as u8;
     match n / NODES {
@@ -52,7 +52,7 @@ pub const fn received_id(n: usize) -> u16 {
     }
 }
 
-/// Filter element `n`: frames with just that identifier go into receive buffer `n`.
+/// Returns filter element `n`: frames with exactly that identifier go into receive buffer `n`.
 pub const fn filter(n: usize) -> u32 {
     const STORE_INTO_BUFFER: u32 = 0b111 << 27;
     STORE_INTO_BUFFER | (received_id(n) as u32) << 16 | n as u32

@@ -1,8 +1,8 @@
-//! What stands in flash: how long this program is there, and the CRC-32 of it as it reads back (J-67). A host that has put the
-//! program there compares both with its file.
+//! The program in flash: its length and its CRC-32 as it reads back (J-67). A host that has written the program to the
+//! board compares both with its file.
 //!
-//! The links' rounds read it, a piece in each ([`Reader::step`]): the first tick does not wait for it, and no interrupt does. A tenth of a
-//! second after the start the tick finds it in [`read`].
+//! The rounds of the links read it, a piece in each ([`Reader::step`]), so neither the first tick nor any interrupt
+//! waits for it. The tick finds the result in [`read`] a tenth of a second after the start.
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
@@ -10,26 +10,26 @@ use jtc_wire::Program;
 
 /// First byte of the flash.
 const FLASH: usize = 0x0800_0000;
-/// Bytes that a round reads, in some 50 µs.
+/// Bytes that a round reads, in about 50 µs.
 const PIECE: usize = 2048;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// What was read, for the tick and for debuggers: bytes of the program, 0 before all are read, and their CRC-32.
+/// Result for the tick and for debuggers: bytes of the program, 0 until all are read, and their CRC-32.
 #[unsafe(no_mangle)]
 #[used]
 pub static PROGRAM: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
 
 unsafe extern "C" {
-    /// Where the initial values of .data stand in flash: behind everything else of bank 1.
+    /// Place of the initial values of .data in flash: after everything else in bank 1.
     static __sidata: u8;
-    /// First byte of .data, and the one behind its last.
+    /// First byte of .data, and the byte after its last.
     static __sdata: u8;
     static __edata: u8;
 }
 
-/// Reads the program, from the first byte of the flash to its last. The few words of the second core in bank 2, which is closed, are
-/// not read.
+/// Reads the program, from the first byte of the flash to its last. Does not read the few words of the second core in
+/// bank 2, which is closed.
 pub struct Reader {
     program: &'static [u8],
     at: usize,
@@ -37,16 +37,16 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// Nothing is read yet.
+    /// Creates a reader that has not read anything yet.
     pub fn new() -> Self {
         let initial_values = &raw const __edata as usize - &raw const __sdata as usize;
         let end = &raw const __sidata as usize + initial_values;
-        // SAFETY: the linker has put the program there, and nothing writes bank 1 while it runs.
+        // SAFETY: the linker has put the program there, and bank 1 is not written while the program runs.
         let program = unsafe { core::slice::from_raw_parts(FLASH as *const u8, end - FLASH) };
         Self { program, at: 0, digest: Some(CRC.digest()) }
     }
 
-    /// Reads a piece; nothing once all are read.
+    /// Reads a piece; does nothing after all pieces are read.
     pub fn step(&mut self) {
         let Some(digest) = &mut self.digest else { return };
         let rest = self.program.get(self.at..).unwrap_or(&[]);
@@ -63,7 +63,7 @@ impl Reader {
     }
 }
 
-/// What was read; `None` before all of it was.
+/// Returns the length and the CRC-32 of the program; `None` until all of it is read.
 pub fn read() -> Option<Program> {
     let [bytes, crc32] = &PROGRAM;
     let bytes = bytes.load(Ordering::Acquire);

@@ -1,6 +1,6 @@
-//! Why the processor started: from the flags of the RCC and what the last program left behind.
+//! Cause of the start of the processor: from the flags of the RCC and from the data that the last program kept.
 
-/// Why the processor started.
+/// Cause of the start of the processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Cause {
@@ -8,23 +8,23 @@ pub enum Cause {
     PowerOn = 1,
     /// The reset button or a debugger.
     Pin = 2,
-    /// A debugger or a program asked for it.
+    /// A debugger or a program requested the reset.
     Software = 3,
     /// The tick did not complete in time.
     Watchdog = 4,
     /// A hard fault of the processor.
     HardFault = 5,
-    /// The program panicked: a state that must be impossible.
+    /// The program panicked: it reached a state that must be impossible.
     Panic = 6,
 }
 
 impl Cause {
-    /// The program failed: the controller reports it to the host until the host has cleared it.
+    /// Returns `true` if the program failed. The controller then reports it to the host until the host has cleared it.
     pub const fn failed(self) -> bool {
         matches!(self, Self::Watchdog | Self::HardFault | Self::Panic)
     }
 
-    /// In words.
+    /// Returns the cause in words.
     pub const fn name(self) -> &'static str {
         match self {
             Self::PowerOn => "power-on",
@@ -37,7 +37,7 @@ impl Cause {
     }
 }
 
-/// How a program that failed ended; kept over the reset.
+/// Kind of failure that ended the program; kept over the reset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Failure {
     /// Hard fault.
@@ -52,15 +52,15 @@ const POWER_ON: u32 = 1 << 23;
 const SOFTWARE: u32 = 1 << 24;
 const WATCHDOG: u32 = 1 << 26;
 
-/// The memory has lost its contents: nothing that the last program left there may be believed.
+/// Returns `true` if the memory has lost its contents: data of the last program must not be used.
 pub const fn lost_power(rsr: u32) -> bool {
     rsr & (POWER_ON | BROWN_OUT) != 0
 }
 
-/// Cause from the register RCC_RSR and from what the last program left.
+/// Determines the cause from the register RCC_RSR and from the data that the last program kept.
 ///
-/// Any reset pulls the reset pin, so that flag is looked at last. `failure` only counts when the program itself asked
-/// for the reset, or hung before it could.
+/// Any reset pulls the reset pin, so that flag is checked last. `failure` counts only if the program itself requested
+/// the reset, or hung before it could.
 pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
     match failure {
         _ if lost_power(rsr) => Cause::PowerOn,
@@ -79,7 +79,7 @@ mod tests {
 
     #[test]
     fn each_cause_is_told_from_the_others() {
-        // As the chip reports them: all but a wake-up pull the pin.
+        // Flags as the chip reports them: every cause except a wake-up pulls the pin.
         assert_eq!(cause(POWER_ON | BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(BROWN_OUT | PIN, None), Cause::PowerOn);
         assert_eq!(cause(PIN, None), Cause::Pin);

@@ -1,4 +1,4 @@
-//! What the log says of the ticks.
+//! Summary of the ticks for the log.
 use core::cell::Cell;
 
 use critical_section::Mutex;
@@ -14,7 +14,7 @@ pub struct Summary {
     pub errors: u16,
     /// Joint bus.
     pub bus: Counters,
-    /// Ticks that were left out because the one before took too long.
+    /// Ticks that were skipped because the one before took too long.
     pub left_out: u32,
 }
 
@@ -24,7 +24,7 @@ impl Summary {
         Self { state: 0, errors: 0, bus: Counters::new(), left_out: 0 }
     }
 
-    /// Logs what has changed since `last`, a line for each number.
+    /// Logs the values that have changed since `last`, a line for each number.
     pub fn log(&self, last: &Self) {
         let (bus, before) = (&self.bus, &last.bus);
         if self.state != last.state {
@@ -54,5 +54,5 @@ impl Summary {
     }
 }
 
-/// As of the last tick.
+/// Summary of the last tick.
 pub static LAST: Mutex<Cell<Summary>> = Mutex::new(Cell::new(Summary::new()));

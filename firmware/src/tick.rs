@@ -1,5 +1,5 @@
-//! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves or
-//! stops the arm; all it shares with the rest is the slot and a summary for the log.
+//! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves
+//! or stops the arm. It shares only the slot and a summary for the log with the rest of the program.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -35,15 +35,16 @@ type Jtc = Controller<&'static mut [RawPoint]>;
 /// The flight recorder, with its memory elsewhere.
 pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
-/// Bytes of a line that a tick looks through at most: more than two ticks bring at 15 MBd.
+/// Largest number of bytes of a line that a tick looks through: more than two ticks bring at 15 MBd.
 const LOOK_MAX: usize = 4096;
 
-/// Ticks without a sign of life of the links after which the arm is stopped: a host could not do it.
+/// Ticks without a sign of life of the links after which the arm is stopped, because a host could not stop it.
 const LINKS_SILENT_ERROR: u32 = 100;
-/// Ticks after which the watchdog brings the links back.
+/// Ticks without a sign of life of the links after which the tick stops feeding the watchdog, so that a reset restarts
+/// them.
 const LINKS_SILENT_RESET: u32 = 200;
 
-/// What a tick needs.
+/// Parts that a tick needs.
 pub struct Parts {
     /// Memory of the trajectory.
     pub points: &'static mut [RawPoint],
@@ -51,17 +52,17 @@ pub struct Parts {
     pub can: Fdcan,
     /// Safety wires and LEDs.
     pub pins: Pins,
-    /// What the lines receive, for Stop and Pause.
+    /// Readers of the received bytes, to find Stop and Pause.
     pub ahead: [Lookahead; lines::LINES],
     /// Events of the hosts.
     pub slot: SlotOut,
     /// RS422, USB.
     pub lines: [Transmitter; lines::LINES],
-    /// Reset unless a tick completes.
+    /// Watchdog that resets the processor unless a tick completes.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
     /// The flight recorder, with what it held before this start.
     pub recorder: FlightRecorder,
-    /// How this start came about.
+    /// Origin of this start.
     pub boot: Boot,
 }
 
@@ -79,14 +80,14 @@ struct Tick {
     recorder: FlightRecorder,
     links: Links,
     left_out: u32,
-    /// What became of the last arm that was stored, and its number.
+    /// Result of the last attempt to store an arm, and its number.
     stored: arm_store::Progress,
     stored_number: u32,
     /// When the last tick began.
     began: Option<Instant>,
 }
 
-/// Whether the links are alive.
+/// Check that the links are alive.
 #[derive(Default)]
 struct Links {
     rounds: u32,
@@ -94,7 +95,7 @@ struct Links {
 }
 
 impl Links {
-    /// Ticks since their last sign of life.
+    /// Returns the number of ticks since their last sign of life.
     fn silent(&mut self) -> u32 {
         let rounds = link::ROUNDS_DONE.load(Ordering::Relaxed);
         self.silent = if rounds == self.rounds { self.silent.saturating_add(1) } else { 0 };
@@ -103,17 +104,18 @@ impl Links {
     }
 }
 
-/// The tick's own; it takes it out while it runs.
+/// The tick's own data. The tick takes it out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
-/// The controller, in its place. Not inlined: it is large, and its way through the stack is over when this returns.
+/// Creates the controller in its place. Not inlined, because the controller is large and passes through the stack: the
+/// stack is free again when this returns.
 #[inline(never)]
 fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
     static PLACE: StaticCell<Jtc> = StaticCell::new();
     PLACE.init_with(|| Controller::new(Config::default(), points))
 }
 
-/// Starts the ticks. Not inlined: what it needs of the stack should not last.
+/// Starts the ticks. Not inlined, so that its stack is free again afterwards.
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
@@ -158,14 +160,14 @@ pub fn start(parts: Parts) {
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
     interrupt::TIM7.set_priority(Priority::P0);
-    // The time driver of the HAL would be on a level with the tick.
+    // The time driver of the HAL would have the same priority as the tick.
     interrupt::TIM5.set_priority(crate::clocks::LOW);
     // SAFETY: everything that its handler uses is in place.
     unsafe { interrupt::TIM7.enable() };
     pac::TIM7.cr1().write(|w| w.set_cen(true));
 }
 
-/// The arm that was stored is in use from the start (J-54).
+/// Puts the stored arm into use from the start (J-54).
 #[inline(never)]
 fn load_arm(controller: &mut Jtc) {
     match arm_store::loaded() {
@@ -220,7 +222,8 @@ impl Tick {
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
-        // Before the frames that it executed are given back, and with nothing left that the arm waits for.
+        // Before the frames that the step executed are returned to the links, and after everything that the arm waits
+        // for.
         record_step(&mut self.recorder, self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
@@ -239,7 +242,7 @@ impl Tick {
         if silent == LINKS_SILENT_ERROR {
             self.controller.raise_internal();
         }
-        // Everything is done: this, and only this, keeps the processor from being reset.
+        // The tick is complete. Only this line keeps the watchdog from resetting the processor.
         if silent < LINKS_SILENT_RESET {
             self.watchdog.pet();
         }
@@ -247,7 +250,7 @@ impl Tick {
         Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
     }
 
-    /// Hands an arm over to be stored, and reports to the controller what becomes of it (J-54).
+    /// Hands an arm over to be stored, and reports the result to the controller (J-54).
     fn store_arm(&mut self, requested: bool) {
         let state = if requested && arm_store::begin(self.controller.stored_arm()).is_err() {
             Some(StoreState::Failed)
@@ -279,7 +282,8 @@ impl Tick {
         }
     }
 
-    /// Ticks that did not come since the last one, or came half a tick late or more, by the microseconds between them.
+    /// Returns the number of ticks that did not come since the last one, or came late by half a tick or more, from the
+    /// microseconds between them.
     fn missed_ticks(&mut self) -> u16 {
         let now = Instant::now();
         let before = self.began.replace(now).unwrap_or(now);
@@ -288,7 +292,7 @@ impl Tick {
         u16::try_from(periods.saturating_sub(1)).unwrap_or(u16::MAX)
     }
 
-    /// A tick that is due already is left out: drives must not get two frames back to back (J-12).
+    /// Skips a tick that is already due: drives must not get two frames back to back (J-12).
     fn leave_out_late_tick(&mut self) {
         if pac::TIM7.sr().read().uif() {
             pac::TIM7.sr().write(|w| w.set_uif(false));
@@ -297,21 +301,22 @@ impl Tick {
     }
 }
 
-/// One step of the controller. A function of its own, under its own name, so that its instructions can be counted.
+/// Runs one step of the controller. A separate function with a symbol of its own, so that its instructions can be
+/// counted.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
 }
 
-/// What the flight recorder does behind it; likewise.
+/// Runs the flight recorder after the step. Separate for the same reason.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inputs<'_>, outputs: &Outputs) {
     recorder.record(controller, inputs, outputs);
 }
 
-/// Fills the places that hold no event.
+/// Filler for places without an event.
 const NO_EVENT: HostEvent<'_> = HostEvent {
     line: lines::RS422,
     overtaken: false,
@@ -319,7 +324,7 @@ const NO_EVENT: HostEvent<'_> = HostEvent {
     event: LinkEvent::Noise(Response::NONE),
 };
 
-/// The events of the batch, as the controller gets them; returns how many.
+/// Collects the events of the batch for the controller; returns their number.
 fn collect<'a>(
     batch: &'a EventBatch,
     watch: &UrgentWatch<{ lines::LINES }>,
@@ -335,7 +340,7 @@ fn collect<'a>(
     count
 }
 
-/// A status goes to both lines, its record only to the line that it answers (J-04).
+/// Sends a status to both lines, and its record only to the line that it answers (J-04).
 fn send(lines: &mut [Transmitter; lines::LINES], record_line: Option<usize>, status: &[u8; STATUS_LEN]) {
     let other = if record_line.is_some() { lines::without_record(status) } else { *status };
     for (n, line) in lines.iter_mut().enumerate() {

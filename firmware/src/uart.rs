@@ -1,8 +1,8 @@
-//! A serial line: bytes come in through a ring that DMA fills and never stops filling, whatever errors the line has;
-//! statuses go out by DMA, started by the tick.
+//! A serial line: bytes come in through a ring that DMA fills and never stops filling, even after line errors; statuses
+//! go out by DMA, started by the tick.
 //!
-//! No byte causes an interrupt. The tick looks through the ring for Stop and Pause; the links look at it after every tick, and
-//! at once when the line falls idle.
+//! No byte causes an interrupt. The tick looks through the ring for Stop and Pause; the links look at it after every
+//! tick, and at once when the line falls idle.
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -23,10 +23,10 @@ use openjtc_firmware::clock::Baud;
 
 use crate::clocks;
 
-/// There may be something to do for the links: a tick has ended, or a line has fallen idle.
+/// Signals work for the links: a tick has ended, or a line has fallen idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Bytes of a ring: 21 ms at 15 MBd.
+/// Bytes of a ring: about 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
 
 /// A USART and the streams of DMA1 that serve it.
@@ -61,11 +61,11 @@ impl Line {
     }
 }
 
-/// A stream of DMA1, and which request of the multiplexer starts its transfers.
+/// Stream of DMA1, and the multiplexer request that starts its transfers.
 #[derive(Clone, Copy)]
 struct Stream {
     registers: St,
-    /// Register and bits that clear its flags.
+    /// Register and bits that clear the flags of the stream.
     clear: Reg<Ixr, W>,
     flags: Ixr,
     multiplexer: Reg<Ccr, RW>,
@@ -85,7 +85,7 @@ impl Stream {
         }
     }
 
-    /// Sets up byte transfers between a register and memory; `start` starts them.
+    /// Configures byte transfers between a register and memory; `start` starts them.
     fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
         self.multiplexer.write(|w| w.set_dmareq_id(self.request));
         let stream = self.registers;
@@ -106,11 +106,11 @@ impl Stream {
 
     /// Transfers `count` bytes. The stream must have stopped.
     fn start(self, count: usize) {
-        // A stream with flags of its last transfer does not start.
+        // A stream with flags of its last transfer set does not start.
         self.clear.write_value(self.flags);
         let stream = self.registers;
         stream.ndtr().write(|w| w.set_ndt(count as u16));
-        // What was written to memory is there before the stream reads it.
+        // The data in memory must be written before the stream reads it.
         fence(Ordering::SeqCst);
         cortex_m::asm::dmb();
         stream.cr().modify(|w| w.set_en(true));
@@ -120,7 +120,7 @@ impl Stream {
         self.registers.cr().read().en()
     }
 
-    /// Bytes that are still to be transferred.
+    /// Returns the number of bytes that are still to be transferred.
     fn remaining(self) -> usize {
         self.registers.ndtr().read().ndt().into()
     }
@@ -142,7 +142,7 @@ pub fn open(
     });
     usart.cr1().write(|w| {
         w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
-        // 16 bytes of patience with the DMA.
+        // The FIFO tolerates a DMA delay of 16 bytes.
         w.set_fifoen(true);
         w.set_te(true);
         w.set_re(true);
@@ -168,28 +168,29 @@ pub fn open(
     )
 }
 
-/// A reader of the ring that DMA fills; two of them read each line, one for itself.
+/// Reader of the ring that DMA fills. Each line has two independent readers.
 struct Ring {
     stream: Stream,
     /// Written by DMA: no reference to it may exist.
     bytes: *const u8,
-    /// First byte that was not taken.
+    /// Position of the first byte that was not taken.
     next: usize,
 }
 
 impl Ring {
-    /// Bytes that have arrived and were not taken, if they are fewer than the ring holds.
+    /// Returns the number of bytes that have arrived and were not taken, if there are fewer of them than the ring
+    /// holds.
     fn waiting(&self) -> usize {
         let end = RING - self.stream.remaining();
         (end + RING - self.next) % RING
     }
 
-    /// Copies the oldest bytes without taking them; as many as are in one piece and fit.
+    /// Copies the oldest bytes without taking them: as many as are contiguous and fit.
     fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         let count = self.waiting().min(into.len()).min(RING - self.next);
         cortex_m::asm::dmb();
-        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and comes to them again only after
-        // all others.
+        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and overwrites them only
+        // after all others.
         unsafe { core::ptr::copy_nonoverlapping(self.bytes.add(self.next), into.as_mut_ptr(), count) };
         &into[..count]
     }
@@ -199,14 +200,15 @@ impl Ring {
     }
 }
 
-/// What the tick sees of a line: every byte, before the links do, at its own pace.
+/// The tick's reader of a line: it sees every byte, before the links do, at its own pace.
 pub struct Lookahead(Ring);
 
 // SAFETY: it reads a register and memory that only DMA writes, which can be done from any context.
 unsafe impl Send for Lookahead {}
 
 impl Lookahead {
-    /// Gives the bytes that have arrived since the last call to `look`, piece by piece; at most `most`, the rest next time.
+    /// Passes the bytes that have arrived since the last call to `look`, piece by piece: at most `most` bytes, the
+    /// remainder next time.
     pub fn read(&mut self, most: usize, mut look: impl FnMut(&[u8])) {
         let mut left = self.0.waiting().min(most);
         let mut piece = [0; 64];
@@ -233,27 +235,27 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Bytes that have arrived and were not taken.
+    /// Returns the number of bytes that have arrived and were not taken.
     pub fn waiting(&self) -> usize {
         self.ring.waiting()
     }
 
-    /// Copies the oldest bytes without taking them; as many as are in one piece and fit.
+    /// Copies the oldest bytes without taking them: as many as are contiguous and fit.
     pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         self.ring.peek(into)
     }
 
-    /// Takes `count` bytes of those that wait.
+    /// Takes `count` of the waiting bytes.
     pub fn take(&mut self, count: usize) {
         self.ring.take(count);
     }
 
-    /// Goes on at byte `position` of all that were received.
+    /// Continues at byte `position`, counted over all received bytes.
     pub fn jump(&mut self, position: u64) {
         self.ring.next = (position % RING as u64) as usize;
     }
 
-    /// Errors of the line since the start. Reception goes on: the parser finds what is wrong with the bytes.
+    /// Returns the errors of the line since the start. Reception continues: the parser detects wrong bytes.
     pub fn errors(&mut self) -> u32 {
         let flags = self.usart.isr().read();
         if flags.ore() || flags.fe() || flags.ne() {
@@ -275,16 +277,16 @@ pub struct Transmitter {
     buffer: &'static mut [u8; ANSWER_MAX],
 }
 
-// SAFETY: registers can be used from any context, and the buffer belongs to this alone.
+// SAFETY: registers can be used from any context, and only this value owns the buffer.
 unsafe impl Send for Transmitter {}
 
 impl Transmitter {
-    /// The last frame has left the buffer.
+    /// Returns `true` if the last frame has left the buffer.
     pub fn is_free(&self) -> bool {
         !self.stream.running()
     }
 
-    /// Sends a frame; nothing is sent while the last one still is, and none that is longer than the buffer.
+    /// Sends a frame. Does nothing while the last frame is still being sent, or if the frame is longer than the buffer.
     pub fn send(&mut self, frame: &[u8]) {
         if self.is_free()
             && let Some(place) = self.buffer.get_mut(..frame.len())
@@ -305,7 +307,7 @@ fn USART3() {
     idle(pac::USART3);
 }
 
-/// The line has been silent for the time of a byte.
+/// Handles the idle interrupt: the line has been silent for the time of a byte.
 fn idle(usart: Usart) {
     usart.icr().write(|w| w.set_idle(true));
     WORK.signal(());

@@ -1,30 +1,30 @@
-//! What this firmware is: a record at a fixed place in flash, for tools that have nothing but the file or the memory.
+//! Identity of this firmware: a record at a fixed place in flash, for tools that can read only the file or the memory.
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 use crate::{BAUD, BOARD, clock};
 
-/// Where the record is.
+/// Address of the record.
 pub const ADDRESS: usize = 0x0800_0400;
 /// First bytes of the record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
-/// The record; little-endian like everything in this processor. Texts are filled up with zeros.
+/// The record; little-endian like everything in this processor. Texts are padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Version {
     /// [`MAGIC`].
     pub magic: [u8; 8],
-    /// Form of this record: 1.
+    /// Layout version of this record: 1.
     pub layout: u16,
     /// Bytes of this record.
     pub size: u16,
     /// Version of the firmware, for example `0.1.0`.
     pub version: [u8; 12],
-    /// Board, as its feature is called.
+    /// Board, named as its feature.
     pub board: [u8; 24],
     /// Commit, with `+` when files were changed since, or `not-in-a-repo`.
     pub build: [u8; 24],
-    /// Points that the trajectory store holds.
+    /// Capacity of the trajectory store, points.
     pub points: u32,
     /// Segments of a trajectory.
     pub segments: u32,
@@ -39,7 +39,7 @@ pub struct Version {
 }
 
 impl Version {
-    /// The record of this build.
+    /// Returns the record of this build.
     pub const fn this() -> Self {
         Self {
             magic: MAGIC,
@@ -58,7 +58,7 @@ impl Version {
     }
 }
 
-/// A text with zeros behind it, cut where it does not fit.
+/// Pads a text with zeros; truncates it if it does not fit.
 const fn padded<const N: usize>(text: &str) -> [u8; N] {
     let mut bytes = [0; N];
     let mut i = 0;

@@ -1,14 +1,15 @@
-//! Time for benchmarks: of the processor, by this thread alone.
+//! Time for benchmarks: processor time of this thread alone.
 
 use std::time::Duration;
 
-/// Time that this thread has had of a processor. While another program has it, this clock stands; what other programs leave
-/// in caches still slows the thread down, so that of many measurements the least is the nearest to the truth.
+/// Processor time of this thread. While another program runs on the processor, this clock stands still. The caches that
+/// other programs have filled still slow the thread down, so that the smallest of many measurements is the nearest to
+/// the truth.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);
 
 impl CpuTime {
-    /// Now.
+    /// Returns the present time.
     #[cfg(unix)]
     pub fn now() -> Self {
         let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
@@ -16,20 +17,20 @@ impl CpuTime {
         Self(Duration::new(seconds.unwrap_or_default(), ns.unwrap_or_default()))
     }
 
-    /// Now: where threads have no clock of their own, the time of the day.
+    /// Returns the present time. Without a clock per thread, this is a monotonic clock of the computer.
     #[cfg(not(unix))]
     pub fn now() -> Self {
         static BEGIN: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
         Self(BEGIN.get_or_init(std::time::Instant::now).elapsed())
     }
 
-    /// Nanoseconds since then.
+    /// Returns the nanoseconds since then.
     pub fn elapsed_ns(self) -> f64 {
         Self::now().0.saturating_sub(self.0).as_secs_f64() * 1e9
     }
 }
 
-/// Nanoseconds of the shortest of `rounds` runs of `work`.
+/// Returns the nanoseconds of the shortest of `rounds` runs of `work`.
 pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
     let mut least = f64::INFINITY;
     for _ in 0..rounds {
@@ -44,7 +45,7 @@ pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
 mod tests {
     use super::*;
 
-    /// The least counts each round, and a thread that sleeps takes no time of the processor.
+    /// The shortest time counts, and a thread that sleeps takes no processor time.
     #[test]
     fn work_takes_time_and_sleep_does_not() {
         let mut rounds = 0;

@@ -1,9 +1,9 @@
-//! Data of an existing arm, which are no part of this project: `OPENJTC_DATA` names their directory. Tests of them are left out where
-//! they are not at hand.
+//! Data of an existing arm, which do not belong to this project: `OPENJTC_DATA` names their directory. Tests that need
+//! the data are skipped if they are missing.
 
 use std::path::{Path, PathBuf};
 
-/// A file of them; `None`, and a line that reports it, where it is not there.
+/// Returns a file of the data. If it is missing, prints a line and returns `None`.
 pub fn file(name: &str) -> Option<PathBuf> {
     let directory = std::env::var("OPENJTC_DATA")
         .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/avena").to_owned());
@@ -15,10 +15,11 @@ pub fn file(name: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// Positions, velocities and accelerations of a trajectory as they go over the wire: 19 integers a line, the first is the time.
+/// Returns positions, velocities and accelerations of a trajectory as on the wire: 19 integers per line, the first is
+/// the time.
 ///
 /// # Panics
-/// When the file has another form.
+/// If the file has another form.
 pub fn points(name: &str) -> Option<Vec<[[i16; 6]; 3]>> {
     let text = std::fs::read_to_string(file(name)?).expect("it can be read");
     let point = |line: &str| {

@@ -1,4 +1,4 @@
-//! Clients that take all connections of an agent: whatever they do with them, a Stop is answered.
+//! Clients that take all connections of an agent: the agent must still answer a Stop.
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -7,24 +7,24 @@ use std::time::Duration;
 use crate::http::Http;
 use crate::patience::until;
 
-/// Connections that a flood keeps open: more than an agent has places.
+/// Connections that a flood keeps open: more than an agent accepts.
 const CONNECTIONS: usize = 400;
-/// Stops that are sent into each flood.
+/// Number of Stops that are sent into each flood.
 const STOPS: usize = 20;
 
-/// How the clients of a flood behave.
+/// Behaviour of the clients of a flood.
 struct Flood {
     what: &'static str,
-    /// What each sends at once.
+    /// Bytes that each client sends at once.
     bytes: Vec<u8>,
-    /// What each sends from then on, again and again.
+    /// Bytes that each client sends repeatedly from then on.
     drip: &'static [u8],
-    /// They read what comes.
+    /// `true` if the clients read the answers.
     reads: bool,
 }
 
-/// Stops of every kind are answered in every flood. `command` is a request that only who commands may send, `stops` are requests that stop something
-/// without a lease.
+/// Checks that stops of every kind are answered in every flood. `command` is a request that needs the lease, `stops`
+/// are requests that stop something without a lease.
 pub fn stops_are_answered_in_every_flood(http: &Http, command: &str, stops: &[&str]) {
     for flood in floods(http, command) {
         answered_in(http, &flood, stops);
@@ -89,7 +89,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     let (over, opened) = (AtomicBool::new(false), AtomicUsize::new(0));
     std::thread::scope(|threads| {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
-        // Whatever becomes of the Stops: the flood ends.
+        // Ends the flood, also if a Stop fails.
         let _end = End(&over);
         until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {
@@ -116,7 +116,7 @@ impl Drop for End<'_> {
     }
 }
 
-/// Keeps so many connections open, and opens another one for each that is closed.
+/// Keeps `CONNECTIONS` connections open, and opens another one for each that is closed.
 fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool) {
     let mut streams: Vec<TcpStream> = Vec::new();
     while !over.load(Ordering::Relaxed) {
@@ -125,7 +125,7 @@ fn keep_open(http: &Http, flood: &Flood, opened: &AtomicUsize, over: &AtomicBool
             let Ok(mut stream) = TcpStream::connect_timeout(&http.address, Duration::from_secs(1)) else {
                 break;
             };
-            // It may have been closed at once.
+            // The connection may have been closed at once.
             let _ = stream.set_nonblocking(true).and_then(|()| stream.write_all(&flood.bytes));
             streams.push(stream);
             opened.fetch_add(1, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! Requests as anybody could send them: by HTTP, with nothing of ours.
+//! Requests as any client can send them: plain HTTP, without code of this project.
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 
@@ -6,33 +6,33 @@ use serde_json::Value;
 
 use crate::patience::{LONGEST, Patience};
 
-/// An agent as it is seen from outside.
+/// An agent as seen from outside.
 #[derive(Clone, Debug)]
 pub struct Http {
-    /// Where it listens.
+    /// Address at which it listens.
     pub address: SocketAddr,
     /// The operator's token.
     pub operator: String,
 }
 
 impl Http {
-    /// Status and body of what a request with these lines gets.
+    /// Sends a request with these header lines; returns the status and the body of the answer.
     pub fn ask(&self, request: &str, lines: &[&str]) -> (u16, String) {
         let head: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
         self.exchange(&format!("{request} HTTP/1.1\r\n{head}Connection: close\r\nContent-Length: 0\r\n\r\n"))
     }
 
-    /// The same as an ordinary client asks.
+    /// Sends a request with the `Host` line of an ordinary client.
     pub fn get(&self, request: &str) -> (u16, String) {
         self.ask(request, &[&format!("Host: {}", self.address)])
     }
 
-    /// What an operator's program asks, with the key of its lease and a body, where there are any.
+    /// Sends a request of an operator's program, with the key of its lease and a body, if any.
     pub fn api(&self, request: &str, key: Option<&str>, body: Option<Value>) -> (u16, Value) {
         self.api_as(Some(&self.operator), request, key, body)
     }
 
-    /// The same with another token, or none.
+    /// Like [`Self::api`], with another token or none.
     pub fn api_as(
         &self,
         token: Option<&String>,
@@ -51,7 +51,8 @@ impl Http {
         (status, serde_json::from_str(&body).unwrap_or(Value::Null))
     }
 
-    /// Status, head and bytes of what somebody gets with this token, or none, for a request without a body.
+    /// Sends a request without a body, with this token or none; returns the status, the head and the bytes of the
+    /// answer.
     pub fn bytes_as(&self, token: Option<&String>, request: &str) -> (u16, String, Vec<u8>) {
         let token = token.map_or(String::new(), |token| format!("Authorization: Bearer {token}\r\n"));
         let host = self.address;
@@ -73,14 +74,15 @@ impl Http {
     fn exchange_bytes(&self, request: &str) -> Vec<u8> {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
-        // One that is refused may be closed before all of it is written.
+        // A rejected request may be closed before all of it is written.
         let _ = stream.write_all(request.as_bytes());
         let mut all = Vec::new();
         let _ = stream.read_to_end(&mut all);
         all
     }
 
-    /// The first event behind a number that `is` this one, and its number; none is left out on the way.
+    /// Waits for the first event after number `after` that `is` the wanted one; returns its number and the event.
+    /// Checks that no number is left out.
     pub fn event(&self, after: u64, what: &str, is: impl Fn(&Value) -> bool) -> (u64, Value) {
         let (mut patience, mut last, mut seen) = (Patience::begin(), after, Vec::new());
         loop {
@@ -98,7 +100,7 @@ impl Http {
         }
     }
 
-    /// What a WebSocket sends, one text after the other, until `enough` of them.
+    /// Reads the texts of a WebSocket, one after another, until `enough` returns `true`.
     pub fn stream(&self, path: &str, mut enough: impl FnMut(Value) -> bool) {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_read_timeout(Some(LONGEST)).expect("a time");
@@ -134,12 +136,13 @@ impl Http {
     }
 }
 
-/// The status in the first line of an answer; 0: there is none.
+/// Returns the status in the first line of an answer, or 0 if the line has none.
 fn status(answer: &str) -> u16 {
     answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0)
 }
 
-/// Requests of other sites and with tokens of nobody are refused, whatever they ask.
+/// Checks that all requests of other sites are rejected, and also requests with unknown tokens, except a Stop or a
+/// Pause.
 pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
     let own = format!("Host: {}", http.address);
     let bearer = format!("Authorization: Bearer {}", http.operator);
@@ -151,7 +154,7 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         assert_eq!(http.ask(request, &[&rebound, &bearer]).0, 403, "{request}: a name that points here");
         let neighbour = format!("Origin: http://127.0.0.1:{}", port ^ 1);
         assert_eq!(http.ask(request, &[&own, &neighbour]).0, 403, "{request}: another program's page");
-        // A Stop of this computer needs none.
+        // A Stop from this computer needs no token.
         let refused = if ["POST /api/stop", "POST /api/pause"].contains(request) { 200 } else { 401 };
         for token in ["Bearer 0123456789abcdefghij", "Basic b3BlcmF0b3I6"] {
             assert_eq!(
@@ -162,14 +165,15 @@ pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
         }
     }
     assert_eq!(http.get("GET /api/status").0, 200);
-    // Reading a state changes nothing, and a page's image or link cannot stop anything.
+    // Reading a state changes nothing, and an image or a link on a page cannot stop anything.
     assert_eq!(http.get("GET /api/stop").0, 405);
 }
 
-/// The pages of the dashboard are shown to whoever asks by one of the agent's names, and to no page of another site.
+/// Checks that the dashboard pages are served to requests with one of the agent's names, and not to pages of another
+/// site.
 pub fn pages_are_the_agents_own(http: &Http) {
     let own = format!("Host: {}", http.address);
-    // A wrong token is none of a page's business: it asks for one itself.
+    // A wrong token does not affect a page: the page asks for a token itself.
     for lines in [&[own.as_str()][..], &[&own, "Authorization: Bearer 0123456789abcdefghij"]] {
         let (status, page) = http.ask("GET /", lines);
         assert!(status == 200 && page.to_lowercase().starts_with("<!doctype html"), "{status} {page}");
@@ -187,7 +191,8 @@ pub fn pages_are_the_agents_own(http: &Http) {
     assert_ne!(http.get("POST /").0, 200);
 }
 
-/// A page that needs a token for its socket names it beside the protocol; no other site's page gets anything by that.
+/// Checks that a page can pass the token for its socket together with the protocol, and that another site's page cannot
+/// use this.
 pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
     let host = format!("Host: {}", http.address);
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
@@ -198,13 +203,13 @@ pub fn sockets_take_a_token_beside_their_protocol(http: &Http) {
         let upgrade = [host.as_str(), "Upgrade: websocket", "Sec-WebSocket-Version: 13", key, &protocols];
         http.ask("GET /api/stream", &[&upgrade[..], more].concat()).0
     };
-    // It is let in, and then misses what makes a socket of it.
+    // The request is authorised, and then fails because it is not a complete WebSocket handshake.
     assert!(![401, 403].contains(&asked(&http.operator, &[])));
     assert_eq!(asked("0123456789abcdefghij", &[]), 401);
     assert_eq!(asked(&http.operator, &[evil]), 403);
 }
 
-/// A page of another site gets no socket.
+/// Checks that a page of another site gets no socket.
 pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
     let key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==";
     let host = format!("Host: {}", http.address);
@@ -213,18 +218,18 @@ pub fn a_socket_of_another_site_is_refused(http: &Http, path: &str) {
     assert_eq!(http.ask(&format!("GET {path}"), &evil).0, 403);
 }
 
-/// Tokens cannot be tried without end, and a Stop is taken meanwhile.
+/// Checks that the number of attempts with wrong tokens is limited, and that a Stop is still accepted.
 pub fn tokens_cannot_be_tried_without_end(http: &Http) {
     let host = format!("Host: {}", http.address);
     let mut answers =
         (0..40).map(|n| http.ask("GET /api/status", &[&host, &format!("Authorization: Bearer {n:0>43}")]).0);
     assert!(answers.by_ref().take(20).all(|status| status == 401));
     assert!(answers.all(|status| status == 429));
-    // Those who have a right one, and those on this computer who need none, are not kept out.
+    // Clients with a valid token, and clients on this computer that need none, are not blocked.
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// A wrong token keeps no Stop of this computer away, however it is sent and however many came; and it lets nobody in.
+/// Checks that a wrong token never blocks a Stop from this computer, in any form and number, and never grants access.
 pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     let host = format!("Host: {}", http.address);
     let evil = "Origin: https://evil.example";
@@ -262,7 +267,8 @@ pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     }
 }
 
-/// Requests that are refused are sent without end; what is answered is short. [`refusals_cost_few_short_lines`] looks at the log then.
+/// Checks that the answers to a long series of rejected requests are short. [`refusals_cost_few_short_lines`] checks
+/// the log afterwards.
 pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
     let (own, bearer) = (format!("Host: {}", http.address), "Authorization: Bearer 0123456789abcdefghij");
     for length in [100, 1_000, 12_000, 15_000, 65_000, 380_000] {
@@ -294,7 +300,7 @@ pub fn refused_requests_are_answered_shortly(http: &Http, command: &str) {
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// What the log of commands has of [`refused_requests_are_answered_shortly`], when the agent has ended.
+/// Checks the command log of [`refused_requests_are_answered_shortly`], after the agent has ended.
 pub fn refusals_cost_few_short_lines(log: &str) {
     let lines: Vec<Value> =
         log.lines().map(|line| serde_json::from_str(line).expect("a whole line")).collect();
@@ -305,7 +311,7 @@ pub fn refusals_cost_few_short_lines(log: &str) {
     assert!(log.lines().all(|line| line.len() < 1_000) && log.len() < 40_000, "{} bytes", log.len());
 }
 
-/// What is long or wrong is refused with a status of its own, and changes nothing.
+/// Checks that long or invalid requests are answered with an error status and change nothing.
 pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) {
     let host = format!("Host: {}", http.address);
     for (request, line) in requests {
@@ -318,7 +324,7 @@ pub fn what_is_long_or_wrong_is_refused(http: &Http, requests: &[(&str, &str)]) 
     assert_eq!(http.get("GET /api/status").0, 200);
 }
 
-/// Connections that ask for nothing are closed, and keep nobody out.
+/// Checks that idle connections are closed, and do not block other clients.
 pub fn idle_connections_are_closed(http: &Http) {
     let mut idle: Vec<TcpStream> = (0..100)
         .map(|_| {
@@ -335,8 +341,8 @@ pub fn idle_connections_are_closed(http: &Http) {
     assert!(!String::from_utf8_lossy(&rest).contains("200"));
 }
 
-/// Requests that wait for an event are so many at once; more are answered at once, and those that wait receive what they wait for. `begin`
-/// begins the first job of the agent.
+/// Checks that at most 64 requests wait for an event at once: further requests are answered at once, and the waiting
+/// ones receive their event. `begin` begins the first job of the agent.
 pub fn waiting_requests_are_bounded(http: &Http, begin: impl FnOnce()) {
     const MOST: usize = 64;
     const MORE: usize = 16;

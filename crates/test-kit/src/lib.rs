@@ -1,6 +1,6 @@
-//! What the tests and benchmarks of several crates share: the kept inputs of the fuzz targets, run on the stable toolchain,
-//! documents that show what commands print, pages whose commands are run, the data of an existing arm, a clock, the patience of
-//! tests, and requests to agents.
+//! Shared code of the tests and benchmarks of several crates: the kept inputs of the fuzz targets, run on the stable
+//! toolchain; documents that show the output of commands; pages whose commands are run; the data of an existing arm; a
+//! clock; the timeouts of tests; and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
@@ -16,14 +16,15 @@ pub mod written;
 use std::fs::read_dir;
 use std::path::{Path, PathBuf};
 
-/// The line in which a command shows the variables that count: documents leave it out, since they show the variable where it is set.
+/// Returns `true` for the line in which a command lists the variables in effect. Documents leave it out, because they
+/// show each variable next to the command that sets it.
 fn shows_variables(line: &str) -> bool {
     ["jtc: from the environment: ", "ucom: from the environment: "]
         .iter()
         .any(|start| line.starts_with(start))
 }
 
-/// A fuzz target's body; it panics when a promise is broken.
+/// Body of a fuzz target; it panics if a promise is broken.
 pub type Body = fn(&[u8]);
 
 /// A fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
@@ -33,8 +34,8 @@ pub type Target = (&'static str, Body);
 /// runs is printed, so a failing test shows it.
 ///
 /// # Panics
-/// When a body does, when there is no such target, and when nothing is kept for it: a name that is written wrong would
-/// otherwise be a test of nothing.
+/// If a body does, if the target does not exist, or if no input is kept for it: a misspelt name would otherwise test
+/// nothing.
 pub fn run_kept_inputs(targets: &[Target]) {
     for (target, body) in targets {
         let files = kept_inputs(target);
@@ -47,7 +48,7 @@ pub fn run_kept_inputs(targets: &[Target]) {
     }
 }
 
-/// The kept inputs of a target in the order of their names.
+/// Returns the kept inputs of a target in the order of their names.
 fn kept_inputs(target: &str) -> Vec<PathBuf> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
     let source = fuzz.join("fuzz_targets").join(target).with_extension("rs");

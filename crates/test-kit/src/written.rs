@@ -3,7 +3,8 @@ use std::path::Path;
 
 use crate::patience::Patience;
 
-/// The whole text of a file as soon as it has all of these words: who writes a log waits for no disk, and nobody for it.
+/// Returns the whole text of a file as soon as it contains all of these words. The wait is needed because a log is
+/// written without waiting for the disk.
 pub fn text_with(path: &Path, words: &[&str]) -> String {
     let mut patience = Patience::begin();
     loop {

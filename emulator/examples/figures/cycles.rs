@@ -1,4 +1,5 @@
-//! Cycles of one control step, and of the flight recorder behind it: the instructions that were executed, one after another, through llvm-mca's model of the core.
+//! Cycles of one control step, and of the flight recorder after it: the executed instructions in order, through
+//! llvm-mca's model of the core.
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
@@ -10,7 +11,7 @@ use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 use crate::rig::{Rig, Version};
 use crate::session::Session;
 
-/// What is measured: its name, its symbol, and the cycles that it should take at most.
+/// Measured parts: name, symbol, and maximum of cycles.
 const PARTS: [(&str, &str, u64); 2] = [
     ("control step in Operate", "control_step", 12_000),
     ("tick of the flight recorder", "record_step", 500),
@@ -38,7 +39,7 @@ pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Addresses of the instructions of the next call of a function of the tick.
+/// Returns the addresses of the instructions in the next call of a function of the tick.
 fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
     let entry = rig.board.machine.elf().symbol(symbol)?.address;
     let flight = rig.board.machine.elf().symbol("FLIGHT")?.address;
@@ -71,7 +72,7 @@ fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
     Ok(addresses)
 }
 
-/// Text of each instruction.
+/// Returns the text of each instruction.
 fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     let mut objdump = tool("llvm-objdump")?;
     let out = objdump.args(["-d", "--no-show-raw-insn", "--mcpu=cortex-m7", path]).output()?;
@@ -86,8 +87,8 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// The instructions one after another, as an assembler takes them: without jumps. The machine runs an IT block in one
-/// step; all its instructions are counted, as the hardware fetches them all.
+/// Returns the instructions in order, as an assembler takes them: without jumps. The machine runs an IT block in one
+/// step; all its instructions are counted, because the hardware fetches them all.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -105,8 +106,8 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
     Ok(lines)
 }
 
-/// A branch with a target that is near in any place. A call is a branch: llvm-mca would charge 100 cycles for each, by its own
-/// words because it does not model them.
+/// Replaces the target of a branch by one that is always near. A call becomes a branch: llvm-mca would charge 100
+/// cycles for each, according to its documentation because it does not model calls.
 fn without_target(code: &str) -> String {
     let (name, operands) = code.split_once(' ').unwrap_or((code, ""));
     let name = match name {
@@ -118,7 +119,7 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model has no comparison with zero, only that of two registers, which takes as long.
+    // The model has no comparison with zero, only a comparison of two registers, which takes as long.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }
@@ -129,7 +130,7 @@ fn without_target(code: &str) -> String {
     }
 }
 
-/// An instruction of an IT block without its condition.
+/// Returns an instruction of an IT block without its condition.
 fn unconditional(code: &str) -> String {
     const CONDITIONS: [&str; 14] =
         ["eq", "ne", "hs", "lo", "mi", "pl", "vs", "vc", "hi", "ls", "ge", "lt", "gt", "le"];
@@ -139,7 +140,7 @@ fn unconditional(code: &str) -> String {
     without_target(&format!("{plain}{width} {operands}"))
 }
 
-/// Cycles of the model for these instructions, executed once.
+/// Returns the cycles of the model for these instructions, executed once.
 fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     let mut mca = tool("llvm-mca")?;
     mca.args(["-mtriple=thumbv7em-none-eabihf", "-mcpu=cortex-m7", "-iterations=1"]);
@@ -157,7 +158,7 @@ fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     }
 }
 
-/// A program of LLVM, under its plain name or with a version.
+/// Finds a program of LLVM, under its plain name or with a version.
 fn tool(name: &str) -> Result<Command, Box<dyn Error>> {
     let versions = (14..=22).rev().map(|version| format!("{name}-{version}"));
     for program in std::iter::once(name.to_owned()).chain(versions) {

@@ -1,4 +1,4 @@
-//! The session that is measured: every state, with traffic on both lines all the time.
+//! The measured session: every state, with continuous traffic on both lines.
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -14,10 +14,10 @@ use crate::rig::Rig;
 const HOST: Port = Port::Usart2;
 /// Exception of the tick.
 const TIM7: usize = FIRST_LINE + 55;
-/// The one that only makes traffic.
+/// Port of the host that only generates traffic.
 const OTHER: Port = Port::Usart3;
 
-/// Instructions of some steps.
+/// Instruction counts of a group of steps.
 #[derive(Clone, Copy, Default)]
 pub struct Steps {
     pub count: u64,
@@ -34,13 +34,13 @@ impl Steps {
         self.count += 1;
     }
 
-    /// Of one step, in the mean.
+    /// Returns the mean of one step.
     pub fn mean(&self) -> u64 {
         self.sum / self.count.max(1)
     }
 }
 
-/// Longer than any ramp of the path time, ms.
+/// Time longer than any ramp of the path time, ms.
 const RAMP: u32 = 250;
 
 /// A rig whose control steps are counted.
@@ -49,13 +49,14 @@ pub struct Session {
     counter: openjtc_emulator::Counter,
     recorder: openjtc_emulator::Counter,
     calls: u64,
-    /// The flight recorder behind each control step.
+    /// Counts of the flight recorder after each control step.
     recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
-    /// Steps on the path at full speed, with nothing beside them.
+    /// Steps on the path at full speed, without other work.
     on_path: Steps,
-    /// The point of the last step, and steps since the path time went otherwise than a millisecond a tick.
+    /// Point of the last step, and number of steps since the path time last advanced by other than one millisecond per
+    /// tick.
     point: u32,
     steady: u32,
     traffic: Vec<Vec<u8>>,
@@ -63,7 +64,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Before the first tick.
+    /// Creates a session before the first tick.
     pub fn new(mut rig: Rig) -> Result<Self, Box<dyn Error>> {
         let counter = rig.board.machine.count("control_step")?;
         let recorder = rig.board.machine.count("record_step")?;
@@ -71,7 +72,7 @@ impl Session {
         // Not segment 0, which would stop the arm (J-30).
         let n = trajectory(&mut long, (1, 1, 2), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
-        // What a host could send at any time: refused, good, and bytes that are none, full of headers.
+        // Traffic that a host could send at any time: rejected frames, good frames, and invalid bytes full of headers.
         let traffic = vec![
             long,
             fixed::CLEAR_OCCURRED_ERRORS.to_vec(),
@@ -94,7 +95,7 @@ impl Session {
         })
     }
 
-    /// Everything.
+    /// Runs the whole session.
     pub fn run(&mut self) {
         self.hold();
         self.run_ms(1_000);
@@ -121,7 +122,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Somebody shoves a joint of the arm that is taught: the controller brings it to rest in the midst of its motion, without a command (J-25).
+    /// Pushes a joint of the taught arm: the controller brings the arm to rest in the middle of its motion, without a
+    /// command (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -132,7 +134,7 @@ impl Session {
         self.run_ms(200);
     }
 
-    /// From power-on to every joint enabled and held.
+    /// Runs from power-on until every joint is enabled and held.
     pub fn hold(&mut self) {
         self.until("the first tick", 50, |rig| rig.ticks > 0);
         self.run_ms(300);
@@ -143,7 +145,7 @@ impl Session {
         });
     }
 
-    /// Uploads a motion that takes every joint along, and starts it.
+    /// Uploads a motion that moves every joint, and starts it.
     pub fn execute(&mut self) {
         let goal = [0.6, 0.5, -0.6, 0.5, -0.4, 0.8];
         for segment in frames::trajectory(&frames::there_and_back(&[0.0; 6], &goal, 1.5, 1, 5), 5, 113) {
@@ -171,7 +173,7 @@ impl Session {
             self.calls = count.calls;
             self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
-            // The costliest of those served together; the default is none.
+            // The last event stands for the events that were served together; the default means no event.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
             self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
             self.point = point;
@@ -188,7 +190,7 @@ impl Session {
         }
     }
 
-    /// Lets time pass.
+    /// Runs `ms` milliseconds.
     pub fn run_ms(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.step());
     }
@@ -203,24 +205,24 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Steps without anything from a host: the name of the state, whether a status went out.
+    /// Returns the steps without an event from a host: the name of the state, and `true` if a status was sent.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps
             .iter()
             .map(|((state, status), steps)| (Code::<ControllerState>::new(*state).name(), *status, *steps))
     }
 
-    /// Steps on the path at full speed, without a status and without anything from a host.
+    /// Returns the steps on the path at full speed, without a status and without an event from a host.
     pub fn on_path(&self) -> Steps {
         self.on_path
     }
 
-    /// The flight recorder behind each control step.
+    /// Returns the counts of the flight recorder after each control step.
     pub fn recorded(&self) -> Steps {
         self.recorded
     }
 
-    /// Steps that work at something from a host: what it is, in which state.
+    /// Returns the steps that handle an event from a host: the name of the event, and the state.
     pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
         self.serving.iter().map(|((frame_type, state), steps)| {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
@@ -228,7 +230,8 @@ impl Session {
         })
     }
 
-    /// Lets time pass one instruction after another: the most instructions, outside the tick, for which interrupts were masked.
+    /// Runs one instruction at a time; returns the largest number of instructions, outside the tick, for which
+    /// interrupts were masked.
     pub fn longest_mask(&mut self, ms: u64) -> u64 {
         let (mut masked, mut longest) = (0, 0);
         for _ in 0..ms {
@@ -239,7 +242,7 @@ impl Session {
                 let before = machine.instructions();
                 machine.run_until(machine.now() + cycle);
                 if machine.instructions() == before {
-                    // It sleeps; what wakes it can be looked at a little late.
+                    // The core sleeps; the exception that wakes it may be checked a little late.
                     machine.run_until(machine.now() + 100 * cycle);
                 }
                 let tick = machine.chip().core.contexts.contains(&TIM7);
@@ -252,7 +255,7 @@ impl Session {
         longest
     }
 
-    /// The machine, with what it counted.
+    /// Returns the machine, with its counts.
     pub fn into_machine(self) -> Machine {
         self.rig.board.machine
     }

@@ -1,4 +1,5 @@
-//! Loads and stores of the core: which register of which peripheral they reach, and what has to be looked at afterwards.
+//! Loads and stores of the core: the register of the peripheral that each access reaches, and the checks that must
+//! follow.
 use std::collections::BTreeMap;
 
 use super::map::{
@@ -20,7 +21,7 @@ impl Chip {
         on
     }
 
-    /// A load by the core; what lies below a word is cut out.
+    /// Loads for the core; extracts an access smaller than a word from its word.
     pub fn load(&mut self, address: u32, size: usize, memory: &mut dyn Memory) -> u32 {
         let word = self.read_word(address & !3, memory);
         let value = word >> (8 * (address & 3));
@@ -75,7 +76,7 @@ impl Chip {
         }
     }
 
-    /// A store by the core.
+    /// Stores for the core.
     pub fn store(&mut self, address: u32, size: usize, value: u32, memory: &mut dyn Memory) {
         let now = self.now();
         let shift = 8 * (address & 3);
@@ -169,12 +170,13 @@ impl Chip {
         }
     }
 
-    /// The protection unit keeps the program out of bank 2.
+    /// Returns `true` if the protection unit blocks the program from bank 2.
     fn bank2_closed(&self) -> bool {
         !self.scs.protection(BANK2 + BANK2_SIZE - 1, false).allowed
     }
 
-    /// The core's way to bank 2; false when it is refused. While the bank is busy the core stands still.
+    /// Requests access of the core to bank 2; returns `false` if it is refused. While the bank is busy the core stands
+    /// still.
     fn reach_bank2(&mut self, address: u32, faults_masked: bool) -> bool {
         let protection = self.scs.protection(address, faults_masked);
         if !protection.allowed {
@@ -199,7 +201,7 @@ impl Chip {
         self.changed();
     }
 
-    /// A load from bank 2 by the core.
+    /// Loads from bank 2 for the core.
     pub fn load_bank2(&mut self, address: u32, size: usize, faults_masked: bool) -> u32 {
         if !self.reach_bank2(address, faults_masked) {
             return 0;
@@ -211,7 +213,7 @@ impl Chip {
         value
     }
 
-    /// A store to bank 2 by the core.
+    /// Stores to bank 2 for the core.
     pub fn store_bank2(&mut self, address: u32, size: usize, value: u32, faults_masked: bool) {
         if self.reach_bank2(address, faults_masked) {
             let (now, closed) = (self.now(), self.bank2_closed());
@@ -220,7 +222,7 @@ impl Chip {
         }
     }
 
-    /// After an access that may have changed lines or events: the loop looks before the next instruction.
+    /// Called after an access that may have changed lines or events: the loop checks them before the next instruction.
     fn changed(&mut self) {
         self.update_lines();
         self.core.attention = true;

@@ -12,18 +12,19 @@ pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;
 /// Entries of the log that are kept.
 const LOG: usize = 100_000;
 
-/// The other members of the bus.
+/// Other members of the bus.
 pub trait CanPeers {
-    /// A frame of the controller has passed at `end`; answers with the moments at which they are ready go to `answers`.
+    /// Receives a frame of the controller that has passed at `end`; pushes the answers to `answers`, each with the
+    /// moment at which it is ready.
     fn receive(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
-    /// Some member acknowledges frames.
+    /// Returns `true` if a member acknowledges frames.
     fn acknowledge(&self) -> bool;
 }
 
-/// What became of a frame.
+/// Outcome of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// It passed.
+    /// The frame was transmitted.
     Good,
     /// Destroyed by an error.
     Error,
@@ -40,20 +41,20 @@ pub struct BusEntry {
     pub end: Time,
     /// The frame.
     pub frame: CanFrame,
-    /// Sent by the controller.
+    /// `true` if the controller sent it.
     pub from_controller: bool,
-    /// What became of it.
+    /// Outcome of the frame.
     pub outcome: Outcome,
 }
 
-/// What is wrong with the bus at the moment.
+/// Present faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Frames that are destroyed from now on.
+    /// Number of frames that are destroyed from now on.
     pub destroy_next: u32,
-    /// Every frame is destroyed.
+    /// `true` if every frame is destroyed.
     pub destroy_all: bool,
-    /// The controller's line is cut.
+    /// `true` if the controller's line is cut.
     pub cut: bool,
 }
 
@@ -64,7 +65,7 @@ struct Queued {
 
 /// A frame that is being sent.
 pub struct Transmission {
-    /// Start and end.
+    /// Start, end and frame.
     pub entry: BusEntry,
     /// Transmit buffer of the controller; `None`: another member sends.
     pub buffer: Option<u32>,
@@ -78,41 +79,41 @@ pub struct Wire {
     queue: Vec<Queued>,
     on_wire: Option<Transmission>,
     free: Time,
-    /// What is wrong.
+    /// Present faults.
     pub fault: WireFault,
     log: VecDeque<BusEntry>,
     answers: Vec<(Time, CanFrame)>,
 }
 
 impl Wire {
-    /// Another member wants to send a frame from `ready` on.
+    /// Queues a frame that another member sends as soon as possible from `ready` on.
     pub fn put(&mut self, ready: Time, frame: CanFrame) {
         self.queue.push(Queued { ready, frame });
     }
 
-    /// Frames of other members that wait.
+    /// Returns the number of frames of other members that wait.
     pub fn waiting(&self) -> usize {
         self.queue.len()
     }
 
-    /// Everything that was on the bus, oldest first; the last 100 000.
+    /// Returns everything that was on the bus, oldest first; the last 100 000 entries.
     pub fn log(&self) -> &VecDeque<BusEntry> {
         &self.log
     }
 
-    /// Forget the log.
+    /// Clears the log.
     pub fn clear_log(&mut self) {
         self.log.clear();
     }
 
-    /// The controller is gone in the middle of a frame.
+    /// Drops the frame that the controller is sending, because the controller stops in the middle of it.
     pub fn drop_controller(&mut self) {
         if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
             self.on_wire = None;
         }
     }
 
-    /// When the wire changes next without the controller's doing.
+    /// Returns the time at which the wire changes next without an action of the controller.
     pub fn next_change(&self) -> Time {
         match &self.on_wire {
             Some(t) => t.entry.end,
@@ -120,7 +121,7 @@ impl Wire {
         }
     }
 
-    /// The frame that ended by `now`.
+    /// Returns the frame that ended by `now`.
     pub fn finished(&mut self, now: Time) -> Option<Transmission> {
         let done = self.on_wire.take_if(|t| t.entry.end <= now)?;
         self.free = done.entry.end;
@@ -131,24 +132,24 @@ impl Wire {
         Some(done)
     }
 
-    /// Buffer of the controller that is being sent.
+    /// Returns the buffer of the controller that is being sent.
     pub fn sending(&self) -> Option<u32> {
         self.on_wire.as_ref().and_then(|t| t.buffer)
     }
 
-    /// A frame is on the wire.
+    /// Returns `true` if a frame is on the wire.
     pub fn busy(&self) -> bool {
         self.on_wire.is_some()
     }
 
-    /// Earliest start of a frame up to `now`, when the controller could start its own at `own`.
+    /// Returns the earliest start of a frame up to `now`, if the controller could start its own at `own`.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);
         (self.on_wire.is_none() && first != NEVER && start <= now).then_some(start)
     }
 
-    /// Arbitration at `start`: the lowest identifier wins. `readable`: the controller's rates are those of the bus.
+    /// Arbitrates at `start`: the lowest identifier wins. `readable`: the controller's rates are those of the bus.
     pub fn arbitrate(&mut self, start: Time, own: Option<(u32, CanFrame)>, readable: bool) {
         let best = (0..self.queue.len())
             .filter(|&i| self.queue[i].ready <= start)
@@ -175,7 +176,7 @@ impl Wire {
             (Outcome::Good, length)
         };
         if outcome != Outcome::Good && !from_controller {
-            // The sender repeats it.
+            // The sender repeats the frame.
             self.queue.push(Queued { ready: start + length, frame });
         }
         let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
@@ -196,13 +197,13 @@ impl Wire {
     }
 }
 
-/// Order of arbitration: an 11-bit identifier beats a 29-bit one with the same first bits.
+/// Returns the arbitration rank: an 11-bit identifier beats a 29-bit one with the same first bits.
 pub fn rank(frame: &CanFrame) -> u32 {
     let id = frame.id();
     if id.is_extended() { id.value() << 1 | 1 } else { id.value() << 19 }
 }
 
-/// Time of a frame on the wire, intermission included.
+/// Returns the time of a frame on the wire, intermission included.
 pub fn frame_time(frame: &CanFrame) -> Time {
     let joint = u16::try_from(frame.id().value()).ok().and_then(|id| jtc_bus::Frame::new(id, frame.data()));
     if let Some(joint) = joint
@@ -212,7 +213,7 @@ pub fn frame_time(frame: &CanFrame) -> Time {
     {
         return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
     }
-    // Frames that the joint bus does not have: without their stuff bits, counted as one in ten.
+    // Frames that do not occur on the joint bus: their stuff bits are estimated as one in ten.
     let id_bits = if frame.is_extended() { 38 } else { 19 };
     let data_bits = 8 * frame.data().len() as u64;
     let bits = if !frame.is_fd() {

@@ -23,7 +23,7 @@ mod cccr {
     pub const DAR: u32 = 0x40;
     pub const FDOE: u32 = 0x100;
     pub const BRSE: u32 = 0x200;
-    /// Bits that need INIT and CCE to change.
+    /// Bits that can be changed only with INIT and CCE set.
     pub const PROTECTED: u32 = 0xF3E0;
 }
 
@@ -68,7 +68,7 @@ struct Fifo {
     lost: bool,
 }
 
-/// What an observer sees of the controller's state.
+/// State of the controller for observers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FdcanState {
     /// CCCR.
@@ -83,13 +83,13 @@ pub struct FdcanState {
     pub tec: u32,
     /// Receive error counter.
     pub rec: u32,
-    /// Bus-off.
+    /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// It takes part on the bus.
+    /// `true` if the controller takes part on the bus.
     pub online: bool,
     /// Nominal and data bit rate, bit/s.
     pub rates: (u32, u32),
-    /// Transmit requests that wait.
+    /// Transmit requests that are pending.
     pub pending: u32,
     /// Frames lost in a full FIFO.
     pub lost: u32,
@@ -127,7 +127,7 @@ pub struct Fdcan {
     txbtie: u32,
     txbcie: u32,
     plain: crate::plain::Plain,
-    /// When it takes part; `NEVER` in INIT.
+    /// Time from which the controller takes part; `NEVER` in INIT.
     online: Time,
     /// End of the sequence after bus-off.
     recovers: Time,
@@ -179,7 +179,7 @@ impl Default for Fdcan {
 }
 
 impl Fdcan {
-    /// Registers as after reset; the bus goes on and the message RAM keeps its contents.
+    /// Sets the registers as after reset; the bus continues and the message RAM keeps its contents.
     pub fn reset(&mut self) {
         let old = core::mem::take(self);
         self.ram = old.ram;
@@ -189,12 +189,12 @@ impl Fdcan {
         (self.lost, self.stored, self.rejected) = (old.lost, old.stored, old.rejected);
     }
 
-    /// Kernel clock.
+    /// Sets the kernel clock.
     pub fn set_clock(&mut self, hz: u64) {
         self.kernel_hz = hz;
     }
 
-    /// Nominal and data bit rate that the registers give, bit/s.
+    /// Returns the nominal and data bit rate that the registers give, bit/s.
     pub fn rates(&self) -> (u32, u32) {
         let rate =
             |prescaler: u32, quanta: u32| (self.kernel_hz / u64::from((prescaler + 1) * quanta)) as u32;
@@ -203,14 +203,14 @@ impl Fdcan {
         (nominal, data)
     }
 
-    /// Its rates are those of the bus within 1 %.
+    /// Returns `true` if its rates are those of the bus within 1 %.
     fn readable(&self) -> bool {
         let near = |rate: u32, of: u32| u64::from(rate.abs_diff(of)) * 100 <= u64::from(of);
         let (nominal, data) = self.rates();
         near(nominal, 1_000_000) && (self.cccr & cccr::BRSE == 0 || near(data, 5_000_000))
     }
 
-    /// State for observers.
+    /// Returns the state for observers.
     pub fn state(&self) -> FdcanState {
         FdcanState {
             cccr: self.cccr,
@@ -231,18 +231,18 @@ impl Fdcan {
         self.psr & 0x80 != 0
     }
 
-    /// It sends and receives from `online` on.
+    /// Returns the time from which the controller sends and receives: `online`, or `NEVER` in INIT, clock stop or bus-off.
     fn takes_part(&self) -> Time {
         if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
     }
 
-    /// When something happens next.
+    /// Returns the time of the next event.
     pub fn next_event(&self) -> Time {
         let own = if self.wire.busy() { NEVER } else { self.tx.since().max(self.takes_part()) };
         self.wire.next_change().min(own).min(self.recovers)
     }
 
-    /// Let everything up to `now` happen.
+    /// Executes everything up to `now`.
     pub fn advance(&mut self, now: Time) {
         loop {
             if self.recovers <= now {
@@ -306,7 +306,7 @@ impl Fdcan {
         }
     }
 
-    /// Warning, passive and bus-off follow from the counters.
+    /// Derives warning, passive and bus-off from the counters.
     fn update_status(&mut self) {
         let passive = self.tec >= 128 || self.rec >= 128;
         let warning = self.tec >= 96 || self.rec >= 96;
@@ -328,7 +328,7 @@ impl Fdcan {
         }
     }
 
-    /// The sequence after bus-off is over.
+    /// Ends the sequence after bus-off.
     fn recover(&mut self) {
         self.online = self.recovers;
         self.recovers = NEVER;
@@ -338,7 +338,7 @@ impl Fdcan {
         self.update_status();
     }
 
-    /// Interrupt lines 0 and 1.
+    /// Returns the levels of interrupt lines 0 and 1.
     pub fn lines(&self) -> [bool; 2] {
         let active = self.ir & self.ie;
         [active & !self.ils != 0 && self.ile & 1 != 0, active & self.ils != 0 && self.ile & 2 != 0]

@@ -1,4 +1,4 @@
-//! Transmit requests that wait.
+//! Pending transmit requests.
 use crate::clock::{NEVER, Time};
 
 /// Transmit requests.
@@ -11,7 +11,7 @@ pub(super) struct Pending {
     pub cancelled: u32,
     /// Buffers to be cancelled after the frame that is on the wire.
     pub cancel: u32,
-    /// Since when each has been requested.
+    /// Time since which each buffer has been requested.
     pub times: [Time; 32],
     /// Get index of the FIFO.
     pub get: u32,
@@ -20,7 +20,7 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// Since when there has been a request.
+    /// Returns the time since which a request has been pending.
     pub fn since(&self) -> Time {
         let bits = (0..32).filter(|&b| self.requests >> b & 1 == 1);
         bits.map(|b| self.times[b]).min().unwrap_or(NEVER)

@@ -1,13 +1,13 @@
 //! Message RAM of the FDCAN and its elements: filters, receive buffers and FIFOs, transmit buffers (RM0399 56.3.21).
 use can_link::{CanFrame, Id};
 
-/// Bytes.
+/// Size in bytes.
 pub const SIZE: usize = 10 * 1024;
 
 /// The RAM.
 pub struct MessageRam {
     words: Vec<u32>,
-    /// Elements that would lie outside.
+    /// Number of accesses to elements that would lie outside.
     pub outside: u32,
 }
 
@@ -22,24 +22,24 @@ pub const ELEMENT_SIZES: [u32; 8] = [8, 12, 16, 20, 24, 32, 48, 64];
 /// Payload bytes by length code.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// Where a frame that passed the filters goes.
+/// Destination of a frame after the filters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Target {
     /// FIFO 0 or 1, with the matching filter if there was one.
     Fifo(usize, Option<u32>),
     /// Dedicated receive buffer.
     Buffer(u32, u32),
-    /// Nowhere.
+    /// The frame is rejected.
     Reject,
 }
 
 impl MessageRam {
-    /// Word at a byte offset.
+    /// Returns the word at a byte offset.
     pub fn read(&self, offset: u32) -> u32 {
         self.words.get(offset as usize / 4).copied().unwrap_or(0)
     }
 
-    /// Replace the word at a byte offset.
+    /// Replaces the word at a byte offset.
     pub fn write(&mut self, offset: u32, value: u32) {
         match self.words.get_mut(offset as usize / 4) {
             Some(word) => *word = value,
@@ -47,8 +47,8 @@ impl MessageRam {
         }
     }
 
-    /// First match among the standard filters; `busy` marks receive buffers that hold new data: their filters do not
-    /// match. Registers SIDFC and GFC.
+    /// Returns the first match among the standard filters. `busy` marks receive buffers that hold new data: their
+    /// filters do not match. Registers SIDFC and GFC.
     pub fn standard(&self, id: u32, sidfc: u32, gfc: u32, busy: impl Fn(u32) -> bool) -> Target {
         let start = sidfc & 0xFFFC;
         for index in 0..(sidfc >> 16 & 0xFF) {
@@ -72,7 +72,7 @@ impl MessageRam {
         unmatched(gfc >> 4)
     }
 
-    /// As [`standard`](Self::standard) for 29-bit identifiers; registers XIDFC, XIDAM and GFC.
+    /// Like [`standard`](Self::standard), for 29-bit identifiers; registers XIDFC, XIDAM and GFC.
     pub fn extended(&self, id: u32, xidfc: u32, xidam: u32, gfc: u32, busy: impl Fn(u32) -> bool) -> Target {
         let start = xidfc & 0xFFFC;
         for index in 0..(xidfc >> 16 & 0x7F) {
@@ -100,7 +100,7 @@ impl MessageRam {
         unmatched(gfc >> 2)
     }
 
-    /// Store a received frame in an element with room for `room` bytes.
+    /// Stores a received frame in an element with `room` bytes of payload.
     pub fn store(&mut self, start: u32, room: u32, frame: &CanFrame, filter: Option<u32>, time: u16) {
         let id = frame.id();
         let r0 = if id.is_extended() { 1 << 30 | id.value() } else { id.value() << 18 };
@@ -119,8 +119,8 @@ impl MessageRam {
         }
     }
 
-    /// The frame of a transmit element with `room` bytes; bytes beyond the element are 0xCC as in the hardware. `fd`, `brs`:
-    /// what CCCR allows.
+    /// Returns the frame of a transmit element with `room` bytes of payload; bytes beyond the element are 0xCC as in
+    /// the hardware. `fd`, `brs`: enabled by CCCR.
     pub fn load(&self, start: u32, room: u32, fd: bool, brs: bool) -> Option<CanFrame> {
         let (t0, t1) = (self.read(start), self.read(start + 4));
         let id =
@@ -148,7 +148,8 @@ fn matches(kind: u32, id: u32, first: u32, second: u32) -> bool {
     }
 }
 
-/// `None`: a priority event only, which these models do not make; the search goes on as if it had matched nothing.
+/// Returns the target of a filter's action; `None`: a priority event only, which these models do not generate; the
+/// search continues as if the filter had not matched.
 fn of_action(action: u32, index: u32) -> Option<Target> {
     match action {
         1 | 5 => Some(Target::Fifo(0, Some(index))),

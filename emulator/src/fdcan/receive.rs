@@ -1,4 +1,4 @@
-//! Where a received frame goes: filters, dedicated buffers, FIFOs.
+//! Destination of a received frame: filters, dedicated buffers, FIFOs.
 use can_link::CanFrame;
 
 use super::ram::{ELEMENT_SIZES, Target};

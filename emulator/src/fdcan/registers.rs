@@ -4,7 +4,7 @@ use crate::clock::{NEVER, Time};
 use crate::fdcan::pending::Pending;
 
 impl Fdcan {
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&mut self, offset: u32, now: Time) -> u32 {
         self.advance(now);
         match offset {
@@ -56,7 +56,7 @@ impl Fdcan {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, offset: u32, value: u32, now: Time) {
         self.advance(now);
         let open = self.cccr & (cccr::INIT | cccr::CCE) == cccr::INIT | cccr::CCE;
@@ -73,7 +73,7 @@ impl Fdcan {
             0x84 if open => self.sidfc = value,
             0x88 if open => self.xidfc = value,
             0x90 if open => self.xidam = value,
-            // New data flags are cleared by writing 1.
+            // Writing 1 clears new data flags.
             0x98 | 0x9C => self.ndat[(offset as usize - 0x98) / 4] &= !value,
             0xA0 if open => self.fifos[0].config = value,
             0xA8 => self.fifos[0].acknowledge(value),
@@ -98,7 +98,7 @@ impl Fdcan {
         let open = before & (cccr::INIT | cccr::CCE) == cccr::INIT | cccr::CCE;
         let mut next = before;
         next = next & !(cccr::INIT | cccr::CSR | 0x8) | value & (cccr::INIT | cccr::CSR);
-        // CCE can be set only in INIT and falls with it.
+        // CCE can be set only in INIT and is cleared with it.
         next = next & !cccr::CCE | if before & cccr::INIT != 0 { value & cccr::CCE } else { 0 };
         if next & cccr::INIT == 0 {
             next &= !cccr::CCE;
@@ -107,7 +107,7 @@ impl Fdcan {
             next = next & !cccr::PROTECTED | value & cccr::PROTECTED;
             next = next & !4 | value & 4;
         }
-        // Clock stop is acknowledged at once.
+        // A clock stop is acknowledged at once.
         next |= (value & cccr::CSR) >> 1;
         self.cccr = next;
         if next & cccr::CCE != 0 && before & cccr::CCE == 0 {
@@ -147,7 +147,7 @@ impl Fifo {
         if size == 0 || self.fill == 0 {
             return;
         }
-        // Everything up to this element is free.
+        // Everything up to this element is freed.
         let freed = (index + size - self.get) % size + 1;
         self.fill = self.fill.saturating_sub(freed);
         self.get = (index + 1) % size;

@@ -15,14 +15,14 @@ impl Fdcan {
         self.txbc >> 24 & 0x3F
     }
 
-    /// The frame in a transmit buffer.
+    /// Returns the frame in a transmit buffer.
     pub(super) fn load(&self, buffer: u32) -> Option<CanFrame> {
         let room = ELEMENT_SIZES[(self.txesc & 7) as usize];
         let start = (self.txbc & 0xFFFC) + buffer * (room + 8);
         self.ram.load(start, room, self.cccr & cccr::FDOE != 0, self.cccr & cccr::BRSE != 0)
     }
 
-    /// The buffer that is sent next: the lowest identifier; of a FIFO only its oldest takes part.
+    /// Returns the buffer that is sent next: the lowest identifier; only the oldest entry of a FIFO takes part.
     pub(super) fn next_buffer(&self) -> Option<u32> {
         let dedicated = self.dedicated();
         let queue = self.txbc >> 30 & 1 == 1;
@@ -32,7 +32,7 @@ impl Fdcan {
         (0..32).filter(takes_part).min_by_key(|&b| (self.load(b).map_or(u32::MAX, |f| rank(&f)), b))
     }
 
-    /// TXBAR was written.
+    /// Handles a write to TXBAR.
     pub(super) fn request(&mut self, bits: u32, now: Time) {
         if self.cccr & cccr::CCE != 0 {
             return;
@@ -49,7 +49,7 @@ impl Fdcan {
         }
     }
 
-    /// TXBCR was written: what is on the wire is cancelled only if it fails.
+    /// Handles a write to TXBCR: a frame on the wire is cancelled only if it fails.
     pub(super) fn cancel(&mut self, bits: u32) {
         let bits = bits & self.tx.requests;
         for buffer in (0..32).filter(|b| bits >> b & 1 == 1) {
@@ -94,7 +94,7 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // An error-passive node that nobody answers does not count further: it may be alone.
+                // An error-passive node without acknowledgement does not count further: it may be alone.
                 if self.tec < 128 {
                     self.tec += 8;
                 }
@@ -117,7 +117,7 @@ impl Fdcan {
         (self.tx.requests >> self.dedicated().min(31)).count_ones()
     }
 
-    /// TXFQS.
+    /// Returns TXFQS.
     pub(super) fn fifo_status(&self) -> u32 {
         let size = self.fifo_size();
         let free = size.saturating_sub(self.fifo_fill());

@@ -1,11 +1,11 @@
-//! What the bank holds, and what is left of it when the power goes at a bad moment.
+//! The contents of the bank, and the contents that remain after a loss of power during an operation.
 use std::fmt;
 
 use super::OperationKind;
 
-/// First address.
+/// First address of the bank.
 pub const BANK2: u32 = 0x0810_0000;
-/// Bytes.
+/// Size of the bank in bytes.
 pub const BANK2_SIZE: u32 = 0x10_0000;
 /// Bytes that are programmed at once.
 pub const WORD: usize = 32;
@@ -15,15 +15,15 @@ const SECTOR_WORDS: usize = 128 * 1024 / WORD;
 /// State of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cell {
-    /// All ones: it can be programmed.
+    /// All ones: the word can be programmed.
     Erased,
-    /// It cannot.
+    /// The word cannot be programmed.
     Programmed,
     /// Reading it is an error.
     Unreadable,
 }
 
-/// What the bank holds, with or without power.
+/// Contents of the bank, with or without power.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Bank2 {
     pub(super) bytes: Vec<[u8; WORD]>,
@@ -44,8 +44,8 @@ impl fmt::Debug for Bank2 {
 }
 
 impl Bank2 {
-    /// A bank that holds these bytes from its begin on, as [`Self::bytes`] gave them: a word of ones is an erased one, and none is
-    /// unreadable. What exceeds the bank is left out.
+    /// Creates a bank that begins with these bytes, as [`Self::bytes`] returned them. A word of ones is erased, and no
+    /// word is unreadable. Bytes beyond the bank are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut bank = Self::default();
         for (n, word) in bytes
@@ -59,25 +59,25 @@ impl Bank2 {
         bank
     }
 
-    /// Bytes at an address, as they are read without regard to errors.
+    /// Returns the bytes at an address, without regard to errors.
     pub fn bytes(&self, address: u32, length: usize) -> Vec<u8> {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened()[at..at + length].to_vec()
     }
 
-    /// Puts bytes there, whatever there was; the words are programmed then.
+    /// Overwrites the bytes at an address, regardless of the old contents; afterwards the words are programmed.
     pub fn put(&mut self, address: u32, bytes: &[u8]) {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened_mut()[at..at + bytes.len()].copy_from_slice(bytes);
         self.cells[at / WORD..(at + bytes.len()).div_ceil(WORD)].fill(Cell::Programmed);
     }
 
-    /// Makes the word at an address one that cannot be read.
+    /// Makes the word at an address unreadable.
     pub fn damage(&mut self, address: u32) {
         self.cells[(address - BANK2) as usize / WORD] = Cell::Unreadable;
     }
 
-    /// Where the power goes in the middle of an operation, anything may be left of the words that it is at.
+    /// Simulates a loss of power in the middle of an operation: the affected words may hold any value.
     pub fn tear(&mut self, kind: OperationKind, word: &[u8; WORD], rng: &mut fastrand::Rng) {
         match kind {
             OperationKind::Erase { sector } => {
@@ -104,12 +104,12 @@ impl Bank2 {
         }
     }
 
-    /// A whole sector.
+    /// Erases a whole sector.
     pub fn erase_sector(&mut self, sector: usize) {
         (sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS).for_each(|n| self.erase(n));
     }
 
-    /// Programs a word; false when it was not erased, after which it is damaged.
+    /// Programs a word; returns `false` if it was not erased, after which it is damaged.
     pub fn program(&mut self, n: usize, bytes: &[u8; WORD]) -> bool {
         let erased = self.cells[n] == Cell::Erased;
         self.bytes[n].iter_mut().zip(bytes).for_each(|(old, new)| *old &= new);

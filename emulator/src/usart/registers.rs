@@ -22,7 +22,7 @@ impl Usart {
             | bit(self.idle_from.is_some() && !self.rx_wire.is_empty(), isr::BUSY)
     }
 
-    /// Interrupt line.
+    /// Returns the level of the interrupt line.
     pub fn line(&self) -> bool {
         let status = self.status();
         let pairs = [
@@ -37,7 +37,7 @@ impl Usart {
                 || self.cr3 & EIE != 0 && status & (isr::FE | isr::NE | isr::ORE) != 0)
     }
 
-    /// Read a word.
+    /// Reads a word.
     pub fn read(&mut self, offset: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) -> u32 {
         self.advance(now, dma, memory);
         match offset {
@@ -59,7 +59,7 @@ impl Usart {
         }
     }
 
-    /// Write a word.
+    /// Writes a word.
     pub fn write(&mut self, offset: u32, value: u32, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
         self.advance(now, dma, memory);
         match offset {

@@ -29,7 +29,7 @@ const TX: u32 = 0x800;
 /// An element with room for 24 bytes.
 const ELEMENT: u32 = 32;
 
-/// A member that acknowledges and stores what it receives.
+/// Member that acknowledges and stores the frames that it receives.
 #[derive(Clone, Default)]
 struct Listener(Rc<RefCell<Vec<(Time, CanFrame)>>>);
 
@@ -42,8 +42,8 @@ impl CanPeers for Listener {
     }
 }
 
-/// A machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz: two filters into receive buffers 0 and 1, two
-/// transmit buffers. `prescaler`: of the nominal phase.
+/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz: two filters into receive buffers 0 and
+/// 1, two transmit buffers. `prescaler`: of the nominal phase.
 fn with_prescaler(prescaler: u32, peers: Option<Listener>) -> Machine {
     let mut machine = machine(SLEEP, &[]);
     let rcc = 0x5802_4400;

@@ -6,14 +6,14 @@ use openjtc_emulator::{Elf, FIRST_LINE, RegisterARM, ResetCause, Symbol};
 use crate::programs::*;
 use crate::{MAIN, RESULT, image, machine, result};
 
-/// What an instruction takes at the 64 MHz after reset.
+/// Time of an instruction at the 64 MHz after reset.
 const CYCLE: u64 = SECOND / 64_000_000;
 
 #[test]
 fn f64_results_have_the_bits_of_the_pc() {
     const ROUNDS: usize = 500;
     let mut rng = fastrand::Rng::with_seed(7);
-    // Any bits at all but NaN: subnormal numbers, infinities and zeros of both signs are among them.
+    // Random bits except NaN: includes subnormal numbers, infinities and zeros of both signs.
     let mut number = || match rng.u8(..) {
         0 => 0.0,
         1 => -0.0,
@@ -27,7 +27,7 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // One pair at a time: the program leaves its results in the place of the next.
+    // Pairs are run singly, because the program leaves its results in the place of the next pair.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());
@@ -145,7 +145,7 @@ fn a_requested_reset_keeps_ram_and_adds_its_flag() {
     let chip = machine.chip();
     let causes: Vec<ResetCause> = chip.observers.resets.iter().map(|r| r.cause).collect();
     assert_eq!(causes, [ResetCause::PowerOn, ResetCause::Software, ResetCause::Software]);
-    // SFTRSTF beside PORRSTF.
+    // SFTRSTF in addition to PORRSTF.
     assert_eq!(chip.rcc.reset_flags() & (1 << 24 | 1 << 23), 1 << 24 | 1 << 23);
     machine.write_register(0x5802_44D0, 1 << 16);
     assert_eq!(machine.read_register(0x5802_44D0), 0);

@@ -1,4 +1,4 @@
-//! Bank 2 of the flash: locks, times, errors, the core that waits for it, what a loss of power leaves.
+//! Bank 2 of the flash: locks, times, errors, the core that waits for it, contents after a loss of power.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::flash::{BANK2, BANK2_SIZE, Bank2, Flash, OperationKind, WORD, sr};
 use openjtc_emulator::{Machine, ResetCause};
@@ -77,7 +77,7 @@ fn a_word_is_programmed_once_and_only_as_a_whole() {
     let end = 130 * MICROSECOND;
     assert_eq!((sr(&mut flash, end), flash.overwrites), (0, 0));
     assert_eq!(flash.load(AT + 28, 4), (0x1234_5678, false));
-    // Again, without erasing it: it cannot be read any more.
+    // Again, without erasing it: it becomes unreadable.
     program(&mut flash, AT, 0x1234_5678, end);
     assert_eq!((sr(&mut flash, 2 * end), flash.overwrites), (0, 1));
     assert!(flash.load(AT, 4).1);
@@ -174,7 +174,7 @@ fn an_unreadable_word_is_a_fault_and_outlasts_the_power() {
     assert_eq!(format!("{bank:?}"), "0 words programmed, 1 unreadable");
 }
 
-/// As a file keeps it while the board is off.
+/// The bytes are those of a file that keeps the bank while the board is off.
 #[test]
 fn a_bank_of_the_bytes_that_another_had_is_that_bank() {
     let mut bank = Bank2::default();

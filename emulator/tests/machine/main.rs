@@ -7,12 +7,12 @@ mod serial;
 
 use openjtc_emulator::{Elf, Machine};
 
-/// Where the main program of [`image`] begins.
+/// Address of the main program of [`image`].
 const MAIN: u32 = 0x0800_0400;
-/// First word that programs leave results in.
+/// Address of the first result word of programs.
 const RESULT: u32 = 0x2000_0000;
 
-/// A flash image: the vector table, the main program, and handlers by exception number.
+/// Returns a flash image: the vector table, the main program, and handlers by exception number.
 fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     let mut bytes = vec![0; 0x2000];
     let mut put = |at: usize, words: &[u16]| {
@@ -32,14 +32,14 @@ fn image(main: &[u16], handlers: &[(usize, &[u16])]) -> Elf {
     Elf::from_image(0x0800_0000, bytes)
 }
 
-/// A machine with such an image whose first words of results are zero.
+/// Returns a machine with such an image whose first result words are zero.
 fn machine(main: &[u16], handlers: &[(usize, &[u16])]) -> Machine {
     let mut machine = Machine::new(image(main, handlers), 1);
     assert!(machine.poke(RESULT, &[0; 64]));
     machine
 }
 
-/// A result word.
+/// Returns a result word.
 fn result(machine: &Machine, index: u32) -> u32 {
     machine.word(RESULT + 4 * index).unwrap()
 }

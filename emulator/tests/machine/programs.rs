@@ -1,4 +1,4 @@
-//! Small programs, assembled by hand once: the text above each is what its half-words mean.
+//! Small programs, assembled by hand once: the text above each is the source of its half-words.
 
 /// ```text
 /// b .

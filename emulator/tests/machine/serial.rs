@@ -1,4 +1,4 @@
-//! USART and DMA: every byte takes its time, and arrives where it should.
+//! USART and DMA: every byte takes its time on the wire and arrives at the right address.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::{FIRST_LINE, Machine};
 
@@ -22,7 +22,7 @@ const RXNE: u32 = 0x20;
 const DMA: u32 = 0x4002_0000 + 0x10 + 0x18;
 const RING: u32 = 0x3000_0000;
 
-/// A sleeping machine whose USART3 runs from the 64 MHz HSI with this divider.
+/// Returns a sleeping machine whose USART3 runs from the 64 MHz HSI with this divider.
 fn with_divider(brr: u32, over8: bool) -> Machine {
     let mut machine = machine(SLEEP, &[(FIRST_LINE + 39, CLOBBER), (FIRST_LINE + 12, CLOBBER)]);
     machine.write_register(0x5802_44E8, 1 << 18);
@@ -114,7 +114,7 @@ fn a_dma_ring_takes_a_stream_and_wraps() {
     machine.chip().usarts[1].host_write(start, &(1..=19).collect::<Vec<u8>>());
     machine.run_until(start + 4 * 10 * MICROSECOND + MICROSECOND);
     assert_eq!(machine.memory(RING, 4).unwrap(), [1, 2, 3, 4]);
-    // Half full: the line is high, and nobody clears its flag.
+    // Half full: the line is high, and its flag is never cleared.
     assert!(machine.chip().observers.latencies[FIRST_LINE + 12].entries > 0);
     machine.run_until(start + MILLISECOND);
     assert_eq!(machine.memory(RING, 8).unwrap(), [17, 18, 19, 12, 13, 14, 15, 16]);

@@ -3,10 +3,10 @@ use jtc_wire::Program;
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
 
-/// The boards, as their files are called.
+/// The boards, by the names of their files.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Rate of the program that [`fast_elf`] gives, Bd.
+/// Rate of the program that [`fast_elf`] returns, Bd.
 pub const FAST: u32 = 15_000_000;
 
 fn directory() -> PathBuf {
@@ -26,17 +26,17 @@ fn load(file: &str) -> Elf {
     Elf::parse(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Program of a board.
+/// Returns the program of a board.
 pub fn elf(board: &str) -> Elf {
     load(&format!("{board}.elf"))
 }
 
-/// Program of the first board for lines of 15 MBd.
+/// Returns the program of the first board for lines of 15 MBd.
 pub fn fast_elf() -> Elf {
     load(&format!("{}-{FAST}.elf", BOARDS[0]))
 }
 
-/// The record at the fixed address, as `docs/board.md` has it.
+/// The record at the fixed address, as documented in `docs/board.md`.
 #[derive(Debug)]
 pub struct Version {
     pub version: String,
@@ -50,7 +50,7 @@ pub struct Version {
     pub core_hz: u32,
 }
 
-/// Reads it from the file; `None` when it is not there.
+/// Reads it from the file; returns `None` if it is not there.
 pub fn version(elf: &Elf) -> Option<Version> {
     const ADDRESS: u32 = 0x0800_0400;
     let bytes = elf.segments.iter().find_map(|(start, data)| {
@@ -68,7 +68,8 @@ pub fn version(elf: &Elf) -> Option<Version> {
     Some(Version { version, board, build, points, segments, segment_points, tick_hz, baud, core_hz })
 }
 
-/// What stands in flash bank 1 when this file was loaded into an erased chip, and its CRC-32, bit by bit as the definition has it.
+/// Returns the length and CRC-32 of flash bank 1 after this file was loaded into an erased chip; the CRC is computed
+/// bit by bit from its definition.
 pub fn program(elf: &Elf) -> Program {
     const BANK1: std::ops::Range<u32> = 0x0800_0000..0x0810_0000;
     let mut flash = Vec::new();

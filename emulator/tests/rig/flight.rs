@@ -1,14 +1,14 @@
-//! The flight record, read from its bytes as any tool reads it.
+//! The flight record, decoded from its bytes as any tool decodes it.
 use jtc_bus::Frame;
 use jtc_core::{BusState, HOST_LINES};
 use jtc_wire::{UrgentCommand, UrgentCommands};
 
 /// Bytes of the record.
 pub const FLIGHT_SIZE: usize = 848;
-/// The version of the layout that is read here.
+/// Version of the layout that is decoded here.
 const LAYOUT: u16 = 3;
 
-/// A tick as the board recorded it.
+/// Tick as the board recorded it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
     pub phase: u32,
@@ -20,13 +20,13 @@ pub struct Flight {
     pub status_free: bool,
     pub wrong_format: u32,
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// What was offered, oldest first.
+    /// Offered events, oldest first.
     pub events: Vec<Event>,
     pub received: Vec<Frame>,
     pub state: u8,
     pub trajectory: u8,
     pub safety_output: bool,
-    /// So many of the events are done.
+    /// Number of events that are done.
     pub host_done: usize,
     /// Line of the record in the status.
     pub record_line: Option<usize>,
@@ -38,14 +38,14 @@ pub struct Flight {
     pub torque: [f64; 6],
 }
 
-/// What came from a host.
+/// Event from a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Event {
     /// 1 a frame, 2 a bad one, 3 noise.
     pub kind: u8,
     /// An urgent command was received after it.
     pub overtaken: bool,
-    /// It came on a plain line.
+    /// `true` if it came on a plain line.
     pub plain: bool,
     pub line: u8,
     pub frame_type: u8,
@@ -81,12 +81,12 @@ impl Bytes<'_> {
 }
 
 impl Flight {
-    /// The inputs are those of the tick, the outputs not yet.
+    /// The inputs belong to the tick, the outputs not yet.
     pub const PHASE_INPUTS: u32 = 1;
-    /// The outputs belong to the tick, too.
+    /// The outputs also belong to the tick.
     pub const PHASE_COMPLETE: u32 = 2;
 
-    /// `None` when these bytes are no record, as after power-on.
+    /// Returns `None` if these bytes are not a record, as after power-on.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);
@@ -148,7 +148,7 @@ impl Flight {
         })
     }
 
-    /// The state of the bus that went in.
+    /// Returns the bus state of the inputs.
     pub fn bus(&self) -> BusState {
         BusState { acknowledged: self.bus_state & 1 != 0, bus_off: self.bus_state & 2 != 0 }
     }

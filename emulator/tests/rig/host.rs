@@ -1,4 +1,4 @@
-//! A host on a line: what it sent, and what it received.
+//! A host on a line: the bytes that it sent and received.
 use std::collections::VecDeque;
 
 use jtc_wire::{Answer, FrameRef, FromDevice, Info, Response, Status, StatusReceiver};
@@ -12,9 +12,9 @@ use super::flight::Event;
 pub struct Host {
     /// Every byte it sent.
     pub sent: Vec<u8>,
-    /// What of them the device has named in its records.
+    /// Number of sent bytes up to the last frame that the device has named in its records.
     found: usize,
-    /// Bytes that must come next: the statuses of the controller beside the board.
+    /// Bytes that must come next: the statuses of the shadow controller.
     pub expected: VecDeque<u8>,
     receiver: StatusReceiver,
     /// The newest status.
@@ -27,16 +27,16 @@ pub struct Host {
     pub records: Vec<Response>,
     /// Bytes received.
     pub received: u64,
-    /// A start of the device that the bytes received so far are older than.
+    /// Time of a device reset, while the bytes received so far may be older than it.
     reset: Option<Time>,
 }
 
 impl Host {
-    /// Bytes from the device: those of the controller beside it, each of them.
+    /// Receives bytes from the device: each must be the byte of the shadow controller.
     pub fn receive(&mut self, bytes: &[WireByte]) {
         for byte in bytes {
             self.received += 1;
-            // What was on the line while the device was reset is cut off.
+            // Bytes that were on the line during the reset of the device are cut off.
             if self.reset.is_some_and(|reset| byte.end < reset) {
                 continue;
             }
@@ -58,19 +58,20 @@ impl Host {
         }
     }
 
-    /// Statuses, bad frames and bytes that are none.
+    /// Returns the counts of statuses, bad frames and invalid bytes.
     pub fn counters(&self) -> jtc_wire::StatusCounters {
         self.receiver.counters()
     }
 
-    /// Nothing that was on its way comes any more.
+    /// Drops all bytes that were on their way.
     pub fn device_was_reset(&mut self, time: Time) {
         self.reset = Some(time);
         self.expected.clear();
         self.receiver.clear();
     }
 
-    /// The bytes of a frame that the device has recorded: they were sent, and not before the last one.
+    /// Returns the bytes of a frame that the device has recorded: the host must have sent them after the last recorded
+    /// frame.
     pub fn frame(&self, event: &Event) -> Vec<u8> {
         let length = usize::from(event.len);
         let (_, bytes) = self.place(event);
@@ -92,7 +93,7 @@ impl Host {
             .unwrap_or_else(|| panic!("the host sent no frame like {event:?}"))
     }
 
-    /// The device has executed that frame.
+    /// Notes that the device has executed that frame.
     pub fn done(&mut self, event: &Event) {
         let (at, bytes) = self.place(event);
         self.found += at + bytes.len();

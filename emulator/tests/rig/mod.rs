@@ -1,5 +1,6 @@
-//! A board under test: the very ELF, the simulated arm on its joint bus, a host on each serial line, and beside it the
-//! same controller on this machine, which gets the inputs of the board's flight record, and must have the same outputs.
+//! A board under test: the board's own ELF file, the simulated arm on its joint bus, and a host on each serial line. In
+//! parallel, the same controller runs on this machine (the shadow controller) with the inputs of the board's flight
+//! record. Its outputs must be the same.
 //!
 //! Every millisecond of every test is checked: no tick is missing, all torques have the same bits as those computed
 //! here, the same frame and the same statuses go out on the wires, and the invariants of the simulator hold.
@@ -40,46 +41,46 @@ pub fn index(port: Port) -> usize {
     }
 }
 
-/// Board, hosts, and the controller that runs beside it.
+/// Board, hosts, and the shadow controller.
 pub struct Rig {
     /// The board.
     pub board: Board,
-    /// What each host sent and received.
+    /// Bytes that each host sent and received.
     pub hosts: [Host; 2],
     /// The controller on this machine; `None` until the board's first tick after a start.
     pub shadow: Option<Shadow>,
     /// The last complete flight record.
     pub flight: Flight,
-    /// What was on the joint bus in the last millisecond.
+    /// Frames on the joint bus in the last millisecond.
     pub bus: Vec<BusEntry>,
-    /// Ticks may be missing: the test hangs the board.
+    /// Ticks may be missing, because the test hangs the board.
     pub may_hang: bool,
     /// Ticks seen since the board started.
     pub ticks: u64,
-    /// What the flight recorder held when the board was reset.
+    /// Contents of the flight recorder when the board was reset.
     log: LogMemory,
     invariants: Invariants,
     flight_at: u32,
     mailbox_at: u32,
-    /// Where the program leaves what it has read of its flash (J-67).
+    /// Address at which the program leaves the length and CRC of its flash (J-67).
     program_at: u32,
     resets: usize,
-    /// Frames that the last ticks gave out and that were not on the bus yet.
+    /// Frames that the last ticks sent and that were not on the bus yet.
     to_pass: Vec<jtc_bus::Frame>,
 }
 
 impl Rig {
-    /// A board with power just switched on.
+    /// Creates a board that has just been switched on.
     pub fn new(board: &str) -> Self {
         Self::with(board, BoardConfig::default())
     }
 
-    /// In another world.
+    /// Creates a board with another configuration.
     pub fn with(board: &str, config: BoardConfig) -> Self {
         Self::of(elf(board), &config)
     }
 
-    /// With this very program.
+    /// Creates a board with this program.
     pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
         let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
         let mailbox_at = elf.symbol("ARM_STORE").expect("the mailbox").address;
@@ -103,13 +104,13 @@ impl Rig {
         }
     }
 
-    /// One millisecond of everything, with all checks.
+    /// Advances everything by one millisecond, with all checks.
     pub fn step(&mut self) {
         self.board.step();
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // A new program begins, and so does everything beside it but for the log.
+            // A new program begins: everything that runs in parallel also restarts, except the log.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }
@@ -173,12 +174,12 @@ impl Rig {
         self.flight = flight;
     }
 
-    /// The program's mailbox of the stored arm: words in the order of `firmware/src/arm_store.rs`.
+    /// Returns the program's mailbox of the stored arm: words in the order of `firmware/src/arm_store.rs`.
     fn mailbox(&self) -> [u32; 8] {
         core::array::from_fn(|n| self.board.machine.word(self.mailbox_at + 4 * n as u32).expect("memory"))
     }
 
-    /// How the board has just started.
+    /// Returns how the board has just started.
     fn start(&self, cause: u32) -> Start {
         let [.., address, length, sequence] = self.mailbox();
         let arm = (address != 0).then(|| {
@@ -190,7 +191,7 @@ impl Rig {
         Start { cause, boots: self.resets as u32, version, program, arm, log: self.log.clone() }
     }
 
-    /// What the controller sent passes unchanged and in order, or not at all.
+    /// Checks that the frames that the controller sent pass unchanged and in order, or not at all.
     fn take_bus(&mut self) {
         let wire = &mut self.board.machine.chip().fdcan.wire;
         self.bus = wire.log().iter().cloned().collect();
@@ -200,18 +201,18 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // The frame of the tick that runs now: its record is read after this.
+                // The frame of the tick that runs now: its record is read later.
                 continue;
             };
             self.to_pass.drain(..=at);
         }
     }
 
-    /// The flight record; a tick that lies across two milliseconds is waited for.
+    /// Returns the flight record; waits for a tick that extends over two milliseconds.
     fn complete_flight(&mut self) -> Option<Flight> {
-        // The longest takes a third of a millisecond: a model with all that follows from it.
+        // The longest tick takes a third of a millisecond: a model with all that follows from it.
         for _ in 0..80 {
-            // Half a record is none; and a tick may be due in this very moment.
+            // Half a record is not valid; and a tick may be due at this moment.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;
@@ -225,23 +226,23 @@ impl Rig {
         self.read_flight()
     }
 
-    /// The interrupt of the tick is being executed.
+    /// Returns `true` while the interrupt of the tick is executed.
     fn in_tick(&mut self) -> bool {
         self.board.machine.chip().core.contexts.contains(&TIM7)
     }
 
-    /// The flight record as it is now; `None` when there is none.
+    /// Returns the present flight record; `None` if the memory does not hold a record.
     pub fn read_flight(&mut self) -> Option<Flight> {
         let bytes = self.board.machine.memory(self.flight_at, FLIGHT_SIZE)?;
         Flight::parse(&bytes)
     }
 
-    /// Lets `ms` pass.
+    /// Runs `ms` milliseconds.
     pub fn run(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Lets time pass until `done`, at most `ms`.
+    /// Runs until `done`, at most `ms` milliseconds.
     #[track_caller]
     pub fn wait(&mut self, what: &str, ms: u64, mut done: impl FnMut(&mut Self) -> bool) {
         for _ in 0..=ms {
@@ -254,17 +255,17 @@ impl Rig {
         panic!("{what}: not within {ms} ms; {t:?}");
     }
 
-    /// What the controller beside the board computed, with the same bits as the board.
+    /// Returns the telemetry of the shadow controller, which has the same bits as the board's.
     pub fn telemetry(&self) -> Telemetry {
         self.shadow.as_ref().map(|s| s.telemetry()).unwrap_or_default()
     }
 
-    /// State of the controller.
+    /// Returns the state of the controller.
     pub fn state(&self) -> ControllerState {
         self.telemetry().state
     }
 
-    /// The host at a port sends bytes.
+    /// Sends bytes of the host at a port.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         self.hosts[index(port)].sent.extend_from_slice(bytes);
         self.board.write(port, bytes);
@@ -291,12 +292,12 @@ impl Rig {
         assert!(good, "refused: {response}");
     }
 
-    /// The newest status at a port.
+    /// Returns the newest status at a port.
     pub fn status(&self, port: Port) -> Status {
         self.hosts[index(port)].last.expect("a status was received")
     }
 
-    /// Default parameters by the host at `port`, then every joint enabled and held.
+    /// Sends default parameters by the host at `port`, then waits until every joint is enabled and held.
     #[track_caller]
     pub fn bring_up(&mut self, port: Port) {
         self.wait("the board is up", 50, |rig| rig.ticks > 0);
@@ -304,7 +305,7 @@ impl Rig {
         self.wait_for_hold(12_000);
     }
 
-    /// Sends the arm from where it is along a trajectory, out and back in so many seconds each, and lets `ms` of it pass.
+    /// Starts a trajectory from the present position, out and back in `seconds` each, and runs `ms` of it.
     #[track_caller]
     pub fn set_off(&mut self, port: Port, seconds: f64, ms: u64) {
         let here = self.telemetry().joints.map(|j| j.set_position);
@@ -317,7 +318,7 @@ impl Rig {
         assert_eq!(self.state(), ControllerState::Operate);
     }
 
-    /// Every joint enabled and held.
+    /// Waits until every joint is enabled and held.
     #[track_caller]
     pub fn wait_for_hold(&mut self, ms: u64) {
         self.wait("HoldPos with all joints enabled", ms, |rig| {
@@ -326,12 +327,12 @@ impl Rig {
         });
     }
 
-    /// A fault begins.
+    /// Begins a fault.
     pub fn inject(&mut self, kind: FaultKind) {
         self.board.inject(kind);
     }
 
-    /// A register, as a debugger reads it.
+    /// Reads a register, as a debugger does.
     pub fn register(&mut self, address: u32) -> u32 {
         self.board.machine.word(address).unwrap_or_else(|| panic!("no register at {address:#010x}"))
     }

@@ -1,4 +1,4 @@
-//! The same controller on this machine.
+//! The shadow controller: the board's controller, run on this machine.
 use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::{RECORDER_BLOCKS, Worked};
@@ -13,41 +13,41 @@ use super::host::Host;
 /// Causes of a start after which the controller reports that it failed (J-12): watchdog, hard fault, panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
-/// Memory of the flight recorder, in the pieces that the board has it in.
+/// Memory of the flight recorder, in the same pieces as on the board.
 pub type LogMemory = [Vec<Block>; 3];
 
-/// As it is after a loss of power.
+/// Returns the memory as it is after a loss of power.
 pub fn no_log() -> LogMemory {
     RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }
 
-/// The controller beside the board.
+/// The controller that runs in parallel with the board.
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
     recorder: Recorder<Vec<Block>, 3>,
-    /// What the last tick executed.
+    /// Work of the last tick.
     pub worked: Vec<Worked>,
     program: Program,
 }
 
-/// How a board started.
+/// Origin of a board's start.
 pub struct Start {
-    /// Cause, as the flight record has it.
+    /// Cause, as in the flight record.
     pub cause: u32,
-    /// The how-manieth start it is.
+    /// Number of this start.
     pub boots: u32,
-    /// What the program is.
+    /// Version record of the program.
     pub version: Version,
-    /// What stands in its flash (J-67).
+    /// Length and CRC of the program in flash (J-67).
     pub program: Program,
-    /// The arm that it found in its flash, and its number.
+    /// Arm that the board found in its flash, and its number.
     pub arm: Option<(Vec<u8>, u32)>,
-    /// What the flight recorder held before.
+    /// Previous contents of the flight recorder.
     pub log: LogMemory,
 }
 
 impl Shadow {
-    /// Beside a board that has just started.
+    /// Creates the controller for a board that has just started.
     pub fn new(start: Start) -> Self {
         let Start { cause, boots, version, program, arm, log } = start;
         let points = vec![RawPoint::default(); POINTS_MAX];
@@ -75,42 +75,42 @@ impl Shadow {
         Self { controller, recorder, program, worked: Vec::new() }
     }
 
-    /// The board has read its flash.
+    /// Notes that the board has read its flash.
     pub fn flash_is_read(&mut self) {
         self.controller.set_program(Some(self.program));
     }
 
-    /// What has become of the arm that was to be stored, as the board's mailbox has it after the tick.
+    /// Sets the result of the last StoreArm, as the board's mailbox shows it after the tick.
     pub fn stored(&mut self, state: StoreState, sequence: u32) {
         self.controller.set_store_state(state, sequence);
     }
 
-    /// The flight recorder.
+    /// Returns the flight recorder.
     pub fn recorder(&self) -> &Recorder<Vec<Block>, 3> {
         &self.recorder
     }
 
-    /// What the flight recorder leaves to the next start.
+    /// Returns the memory that the flight recorder leaves to the next start.
     pub fn into_log(self) -> LogMemory {
         self.recorder.into_memory()
     }
 
-    /// The controller.
+    /// Returns the controller.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         &self.controller
     }
 
-    /// What the last tick computed.
+    /// Returns the telemetry of the last tick.
     pub fn telemetry(&self) -> Telemetry {
         self.controller.telemetry()
     }
 
-    /// Settings.
+    /// Returns the settings.
     pub fn config(&self) -> &Config {
         self.controller.config()
     }
 
-    /// Runs the tick that the board recorded; everything that comes out must be the board's, to the bit.
+    /// Runs the tick that the board recorded; all outputs must be equal to the board's, to the bit.
     pub fn tick(&mut self, flight: &Flight, hosts: &mut [Host; 2]) {
         let bytes: Vec<Vec<u8>> = flight
             .events
@@ -175,7 +175,8 @@ fn host_event<'a>(event: &Event, bytes: &'a [u8]) -> HostEvent<'a> {
     HostEvent { line: event.line.into(), overtaken: event.overtaken, plain: event.plain, event: what }
 }
 
-/// J-04: the record goes to the line of its frame, the other gets the same status without one.
+/// Adds the expected status (J-04): the record goes to the line of its frame, the other line gets the same status
+/// without a record.
 fn expect_status(bytes: &[u8], line: Option<usize>, hosts: &mut [Host; 2]) {
     let status = Status::parse(bytes).expect("the controller makes good statuses");
     assert_eq!(status.response().is_some(), line.is_some());

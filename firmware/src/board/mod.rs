@@ -46,7 +46,7 @@ impl Pins {
         }
     }
 
-    /// Shows the state on the LEDs as the manual has it.
+    /// Shows the state on the LEDs as the manual specifies.
     pub fn show(&mut self, state: ControllerState) {
         let lit = match state {
             ControllerState::Start => [false, false, false],
@@ -61,19 +61,19 @@ impl Pins {
     }
 }
 
-/// An LED, dark.
+/// Returns an LED that is off.
 fn led(pin: Peri<'static, impl Pin>) -> Output<'static> {
     Output::new(pin, embassy_stm32::gpio::Level::Low, Speed::Low)
 }
 
-/// Gives a pin to a peripheral for good.
+/// Assigns a pin to a peripheral permanently.
 fn transmit(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, AfType::output(OutputType::PushPull, Speed::High));
     core::mem::forget(pin);
 }
 
-/// As `transmit`; pulled up, as an idle line is: nothing is received where nothing is connected.
+/// Like `transmit`, but pulled up to the level of an idle line, so that an unconnected input receives nothing.
 fn receive(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, AfType::input(Pull::Up));
@@ -83,8 +83,8 @@ fn receive(pin: Peri<'static, impl Pin>, function: u8) {
 /// Port D bit of the safety output; all boards have it there.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
-/// First of all after a reset: the safety output drives 0, whatever the start-up of the clocks comes to. Drives may
-/// still hold the torque of before.
+/// Drives the safety output to 0, first of all after a reset, even if the clocks do not start. The drives may still
+/// hold the torque of the last program.
 pub fn safety_output_low_at_start() {
     pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
     // Reading back makes sure that the clock runs.
@@ -93,7 +93,7 @@ pub fn safety_output_low_at_start() {
     pac::GPIOD.moder().modify(|w| w.set_moder(SAFETY_OUTPUT_BIT, pac::gpio::vals::Moder::OUTPUT));
 }
 
-/// Takes the safety output to 0 from anywhere, whatever state the program is in.
+/// Takes the safety output to 0. Can be called from anywhere and in any state of the program.
 pub fn safety_output_low() {
     pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));
 }

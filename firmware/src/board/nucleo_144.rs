@@ -1,11 +1,11 @@
-//! NUCLEO-H743ZI2 (MB1364), with an STM32H743ZI, and NUCLEO-H745ZI-Q (MB1363), whose STM32H745ZI has a Cortex-M4 as well, which is
-//! parked: what the controller uses is at the same pins of both.
+//! NUCLEO-H743ZI2 (MB1364), with an STM32H743ZI, and NUCLEO-H745ZI-Q (MB1363), whose STM32H745ZI also has a Cortex-M4,
+//! which is parked. The controller uses the same pins on both boards.
 use embassy_stm32::Peripherals;
 
 use super::{Board, Pins, led, receive, transmit};
 use crate::uart::Line;
 
-/// Gives every pin its job.
+/// Assigns a function to every pin.
 pub fn wire(p: Peripherals) -> Board {
     // FDCAN1
     receive(p.PD0, 9);

@@ -27,21 +27,21 @@ impl SafetyInput {
         pac::EXTI.ftsr(0).modify(|w| w.set_line(line, true));
         pac::EXTI.imr(0).modify(|w| w.set_line(line, true));
         let mut input = Self { pin, mask: 1 << (line % 16) };
-        // What the pin did before it was an input does not count.
+        // A falling edge from the time before the pin was an input does not count.
         input.take_edge();
         input
     }
 
-    /// 1 now, and since the last call.
+    /// Returns `true` if the level is 1 now and has been 1 since the last call.
     pub fn is_safe(&mut self) -> bool {
-        // The edge first: one that comes in between is seen by the level, or by the next call.
+        // The edge first: if one comes between the two reads, the level or the next call shows it.
         let edge = self.take_edge();
         !edge && self.pin.is_high()
     }
 
-    /// There was a falling edge since the last call.
+    /// Returns `true` if there was a falling edge since the last call.
     fn take_edge(&mut self) -> bool {
-        // As a mask: an index of a line is checked, and the tick has no way to a panic.
+        // A mask, because an index is bounds-checked and the tick must contain no panic path.
         let edges = pac::EXTI.pr(0).read().0 & self.mask;
         // A 1 clears its bit and leaves the others.
         pac::EXTI.pr(0).write(|w| w.0 = edges);

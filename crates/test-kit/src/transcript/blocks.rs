@@ -1,59 +1,59 @@
-//! The fenced blocks of a page, and the comments that say how each is run.
+//! The fenced blocks of a page, and the comments that specify how each is run.
 
 use std::ops::Range;
 
-/// What a block holds.
+/// Kind of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Commands behind `$ `, each with what it prints.
+    /// Commands after `$ `, each with its output.
     Console,
-    /// Commands alone.
+    /// Commands without output.
     Sh,
-    /// A text that is typed where a program runs.
+    /// Text that is typed into a running program.
     Text,
 }
 
-/// A block that a run of the page has to do something about.
+/// A block that is used when the page is run.
 #[derive(Clone, Debug)]
 pub struct Block {
-    /// What it holds.
+    /// Kind of the block.
     pub kind: Kind,
-    /// Line of its fence, from 1.
+    /// Line of its fence, counted from 1.
     pub line: usize,
-    /// Its lines without the fences, as bytes of the page.
+    /// Its lines without the fences, as a byte range of the page.
     pub body: Range<usize>,
     /// The text between the fences.
     pub text: String,
-    /// What the comment directly above it says, part by part.
+    /// Parts of the comment directly above the block.
     notes: Vec<String>,
-    /// The program that the page is about, where it names one.
+    /// Program that the page names, if any.
     page: Option<String>,
 }
 
 impl Block {
-    /// What stands behind `key:` in its comment.
+    /// Returns the text after `key:` in its comment.
     pub fn note(&self, key: &str) -> Option<&str> {
         self.notes.iter().find_map(|note| note.strip_prefix(key)?.strip_prefix(':')).map(str::trim)
     }
 
-    /// Whether its comment has these words.
+    /// Returns `true` if a part of its comment is `words`.
     pub fn says(&self, words: &str) -> bool {
         self.notes.iter().any(|note| note == words)
     }
 
-    /// The program whose tests run it.
+    /// Returns the program whose tests run it.
     pub fn program(&self) -> Option<&str> {
         self.note("program").or(self.page.as_deref())
     }
 }
 
-/// A comment of one line.
+/// Returns the text of a comment of one line.
 fn comment(line: &str) -> Option<&str> {
     line.trim().strip_prefix("<!--")?.strip_suffix("-->").map(str::trim)
 }
 
-/// The blocks of a page in their order. Those that tests write themselves, between `<!-- … begin -->` and `<!-- … end -->`, are left out, and
-/// so are texts that nobody types.
+/// Returns the blocks of a page in order. Leaves out blocks that tests generate, between `<!-- … begin -->` and
+/// `<!-- … end -->`, and texts that are not typed.
 pub fn blocks(page: &str) -> Vec<Block> {
     let named = page.lines().filter_map(comment).find_map(|text| text.strip_prefix("commands:"));
     let named = named.map(|name| name.trim().to_owned());
@@ -96,17 +96,17 @@ pub fn blocks(page: &str) -> Vec<Block> {
     found
 }
 
-/// A command of a block and what the page says that it prints.
+/// A command of a block, and its output on the page.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Step {
-    /// What is typed; empty where a block goes on with what a program prints that runs already.
+    /// Command to type; empty if the block continues the output of a program that runs already.
     pub command: String,
-    /// The lines below it.
+    /// Lines below it.
     pub shown: Vec<String>,
 }
 
 impl Block {
-    /// Its commands. A line behind `> ` goes on with the command above it.
+    /// Returns its commands. A line after `> ` continues the command above it.
     pub fn steps(&self) -> Vec<Step> {
         let mut steps: Vec<Step> = Vec::new();
         for line in self.text.lines() {
@@ -130,7 +130,7 @@ impl Block {
     }
 }
 
-/// The text of a console block with these steps.
+/// Returns the text of a console block with these steps.
 pub fn written(steps: &[Step]) -> String {
     let mut text = String::new();
     for step in steps {

@@ -1,15 +1,15 @@
-//! Whether a command printed what the page shows.
+//! Comparison of the output of a command with the page.
 
 /// The line of a page that stands for any number of lines.
 const LEFT_OUT: &str = "...";
 
-/// Whether these lines are what the page shows: line by line, where `...` stands for any number of lines. With `varying` numbers are not
-/// compared, but for those of joints and boards.
+/// Returns `true` if the printed lines match the page, line by line; `...` stands for any number of lines. With
+/// `varying`, numbers are not compared, except those of joints and boards.
 pub fn same(shown: &[String], printed: &[String], varying: bool) -> bool {
     let prepared = |lines: &[String]| -> Vec<String> {
         let line = |line: &String| if varying { masked(line) } else { line.trim_end().to_owned() };
         let lines: Vec<String> = lines.iter().map(line).collect();
-        // Blank lines at the end are not seen on a page.
+        // Blank lines at the end are not visible on a page.
         let end = lines.iter().rposition(|line| !line.is_empty()).map_or(0, |last| last + 1);
         lines[..end].to_vec()
     };
@@ -26,7 +26,8 @@ fn fits(shown: &[String], printed: &[String]) -> bool {
     }
 }
 
-/// The line with `#` in the place of each number and one blank in the place of each gap, which is as wide as the numbers beside it need.
+/// Returns the line with `#` for each number and one blank for each gap, because the width of a gap depends on the
+/// adjacent numbers.
 fn masked(line: &str) -> String {
     let words: Vec<&str> = line.split_whitespace().collect();
     let mut out = Vec::new();
@@ -43,7 +44,7 @@ fn numbers_masked(word: &str) -> String {
     let mut rest = word;
     while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
         let (before, from) = rest.split_at(at);
-        // A sign is a part of the number.
+        // The sign is a part of the number.
         out += before.strip_suffix(['-', '+', '−']).unwrap_or(before);
         out.push('#');
         rest = &from[number_length(from)..];
@@ -51,8 +52,8 @@ fn numbers_masked(word: &str) -> String {
     out + rest
 }
 
-/// Bytes of the number that the text begins with: decimal, with an exponent, or hexadecimal where `0x` or a length of eight digits and a
-/// letter among them show that.
+/// Returns the length in bytes of the number at the beginning of the text: decimal, with an exponent, or hexadecimal if
+/// it has `0x`, or eight digits with a letter among them.
 fn number_length(text: &str) -> usize {
     let while_of = |text: &str, of: fn(char) -> bool| text.find(|c| !of(c)).unwrap_or(text.len());
     if let Some(digits) = text.strip_prefix("0x") {
@@ -62,7 +63,7 @@ fn number_length(text: &str) -> usize {
     if hash >= 8 && text[..hash].contains(|c: char| c.is_ascii_alphabetic()) {
         return hash;
     }
-    // A full stop at the end of a sentence is no part of it.
+    // A full stop at the end of a sentence does not belong to the number.
     let plain = text[..while_of(text, |c| c.is_ascii_digit() || c == '.')].trim_end_matches('.').len();
     let exponent = text[plain..].strip_prefix('e').map_or(0, |rest| {
         let sign = usize::from(rest.starts_with(['-', '+']));

@@ -1,20 +1,23 @@
-//! Pages whose commands are run: what a person types who follows a page, and what it shows that is printed.
+//! Pages whose commands are run as a reader of the page would type them, and compared with the output that the page
+//! shows.
 //!
-//! A page is followed from top to bottom in a folder of its own. Fenced blocks of the kind `console` (commands behind `$ `, output below)
-//! and `sh` (commands alone) are run by the tests of the program that the page names with a comment, `<!-- commands: jtc -->`. Each command has to
-//! succeed, unless the next one is `echo $?`, and to print what the page shows, where a line `...` stands for any number of lines. A comment
-//! directly above a block says more, parted by semicolons:
+//! A page is followed from top to bottom in a folder of its own. Fenced blocks of the kind `console` (commands after
+//! `$ `, output below) and `sh` (commands without output) are run by the tests of the program that the page names with a
+//! comment, `<!-- commands: jtc -->`. Each command must succeed, unless the next one is `echo $?`, and must print the
+//! output on the page; a line `...` stands for any number of lines. A comment directly above a block gives options,
+//! separated by semicolons:
 //!
 //! - `not run: REASON`: left out, and counted with its reason.
-//! - `numbers vary`: numbers are not compared, but for those of joints and boards.
-//! - `terminal: NAME`: typed in a terminal of its own; the last command goes on. Where the block shows no command, the terminal is waited for
-//!   until it has printed these lines. `Ctrl-C` beside it interrupts that program first.
-//! - `in tests: WORDS`: options behind the last command, so that a test takes no longer than it has to.
-//! - `typed: NAME`: the lines of a `text` block are typed where the program of that terminal runs.
+//! - `numbers vary`: numbers are not compared, except those of joints and boards.
+//! - `terminal: NAME`: typed in a terminal of its own; the last command keeps running. If the block shows no command,
+//!   the test waits until the terminal has printed these lines. With `Ctrl-C`, that program is interrupted first.
+//! - `in tests: WORDS`: options added to the last command, so that a test takes no longer than necessary.
+//! - `typed: NAME`: the lines of a `text` block are typed into the program that runs in that terminal.
 //! - `program: NAME`: another program than the page's runs it.
 //!
-//! `/tmp/jtc` and other places in `/tmp` lie in the page's folder, and a port that a program is given by `in tests` (`127.0.0.1:0`) takes the
-//! place of the one that the page shows. `UPDATE_DOCS=1` writes what the commands print into the page, where it has changed.
+//! `/tmp/jtc` and other paths in `/tmp` are in the page's folder. A port that `in tests` gives to a program
+//! (`127.0.0.1:0`) replaces the port that the page shows. `UPDATE_DOCS=1` updates the page if the output of its
+//! commands has changed.
 
 mod blocks;
 mod compare;
@@ -29,22 +32,23 @@ pub use blocks::{Block, Kind, Step, blocks};
 use compare::same;
 use terminal::Terminal;
 
-/// What was done of a page.
+/// Result of following a page.
 #[derive(Debug, Default)]
 pub struct Followed {
     /// Commands that were run.
     pub commands: usize,
-    /// Reasons of blocks that were not.
+    /// Reasons of blocks that were not run.
     pub left_out: Vec<String>,
-    /// What the page does not say as it is.
+    /// Differences between the page and the output.
     pub wrong: Vec<String>,
 }
 
-/// Follows every page that has blocks of this program, beside each other: README.md and those of docs/. `programs` is the folder of the
-/// program.
+/// Follows every page that has blocks of this program, in parallel: README.md and those of docs/. `programs` is the
+/// folder of the program.
 ///
 /// # Panics
-/// When a page shows something else than its commands print, with the first lines that differ of each block; when there is no such page.
+/// If a page differs from the output of its commands, with the first lines that differ of each block; if no page has
+/// such blocks.
 pub fn follow_all(program: &str, programs: &Path) {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let docs = std::fs::read_dir(root.join("docs")).expect("docs/");
@@ -77,12 +81,12 @@ pub fn follow_all(program: &str, programs: &Path) {
     );
 }
 
-/// Follows one page, and writes it again where that is asked for.
+/// Follows one page, and updates it if `UPDATE_DOCS` is set.
 pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
     let text = std::fs::read_to_string(page).expect("a page");
     let mut run = Run::new(programs, page);
     let mut new = text.clone();
-    // From behind, so that places stay where they are.
+    // From the end to the beginning, so that earlier positions stay valid.
     let mut changed = Vec::new();
     for block in blocks(&text).iter().filter(|block| block.program() == Some(program)) {
         if let Some(reason) = block.note("not run") {
@@ -98,7 +102,7 @@ pub fn follow(page: &Path, program: &str, programs: &Path) -> Followed {
         if new != text {
             std::fs::write(page, new).expect("the page can be written");
         }
-        // A command that fails is wrong on any page.
+        // A command that fails is an error on any page.
         run.done.wrong.retain(|text| text.contains("exit code"));
     }
     std::mem::take(&mut run.done)
@@ -109,14 +113,14 @@ struct Run {
     folder: PathBuf,
     programs: PathBuf,
     terminals: BTreeMap<String, Terminal>,
-    /// Those in which a program has taken the place of the shell.
+    /// Terminals in which a program has replaced the shell.
     taken: BTreeSet<String>,
-    /// What the page has in place of what there is.
+    /// Texts of the page, and the real texts that replace them.
     places: Vec<(String, String)>,
     done: Followed,
 }
 
-/// The terminal that a page types in where it names none.
+/// Default terminal, for blocks that name no terminal.
 const OWN: &str = "";
 
 impl Run {
@@ -137,19 +141,19 @@ impl Run {
         self.terminals.entry(name.to_owned()).or_insert_with(new)
     }
 
-    /// What is typed for what the page shows.
+    /// Returns the real command for a command of the page.
     fn real(&self, shown: &str) -> String {
         self.places.iter().fold(shown.to_owned(), |text, (page, real)| text.replace(page, real))
     }
 
-    /// What the page shows of what was printed.
+    /// Returns the form of a printed line on the page.
     fn on_page(&self, line: &str) -> String {
         let line =
             self.places.iter().rev().fold(line.to_owned(), |text, (page, real)| text.replace(real, page));
         line.trim_end().to_owned()
     }
 
-    /// Runs a block; its steps with what they print, where the page shows something else.
+    /// Runs a block. Returns its steps with their output if the page shows other output.
     fn block(&mut self, block: &Block) -> Option<Vec<Step>> {
         if let Some(name) = block.note("typed") {
             for step in block.steps() {
@@ -160,7 +164,7 @@ impl Run {
         }
         let mut steps = block.steps();
         if steps.is_empty() {
-            // A page that is being written.
+            // The page has no output yet.
             steps.push(Step { command: String::new(), shown: Vec::new() });
         }
         let name = block.note("terminal").unwrap_or(OWN).to_owned();
@@ -198,12 +202,12 @@ impl Run {
         changed.then_some(steps)
     }
 
-    /// Starts what goes on, or waits for what it prints later: its lines so far.
+    /// Starts a program that keeps running, or waits for its later output. Returns the lines so far.
     fn go_on(&mut self, block: &Block, name: &str, step: &Step) -> Vec<String> {
         let (varying, shown) = (block.says("numbers vary"), step.shown.clone());
         let starts = !step.command.is_empty();
         if starts {
-            // Whatever ran there has been ended by whoever types something else.
+            // A program that still runs in this terminal is ended first.
             if !self.taken.insert(name.to_owned()) {
                 self.terminals.remove(name);
             }
@@ -215,7 +219,7 @@ impl Run {
             self.terminal(name).interrupt();
         }
         let Some(last) = shown.iter().rfind(|line| !line.is_empty()).cloned() else {
-            // A page that is being written: what comes soon.
+            // The page has no output yet: take the lines that come within 6 s of each other.
             let mut printed = Vec::new();
             while std::env::var_os("UPDATE_DOCS").is_some()
                 && let Some(line) = self.terminal(name).line(Duration::from_secs(6))
@@ -226,7 +230,7 @@ impl Run {
         };
         let places = std::cell::RefCell::new(self.places.clone());
         let is_last = |line: &str| {
-            // The port that it was given in place of the page's.
+            // Port that the program was given instead of the page's.
             if let (Some(port), Some(real)) = (port(&shown.join("\n")), port(line))
                 && starts
                 && port != real
@@ -244,7 +248,7 @@ impl Run {
         if starts {
             return printed;
         }
-        // What came meanwhile, and is not shown, is nobody's business.
+        // Ignores the output before the first line that the page shows.
         let from = printed.iter().position(|line| same(&shown[..1], std::slice::from_ref(line), varying));
         printed[from.unwrap_or(0)..].to_vec()
     }
@@ -257,7 +261,7 @@ impl Drop for Run {
     }
 }
 
-/// The first port of this computer in a text, with its colon.
+/// Returns the first port of this computer in a text, with its colon.
 fn port(text: &str) -> Option<String> {
     let (_, rest) = text.split_once("127.0.0.1:")?;
     let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
@@ -278,7 +282,7 @@ fn difference(block: &Block, step: &Step, printed: &[String]) -> String {
 mod tests {
     use super::*;
 
-    /// A page in a file of its own, followed.
+    /// Follows a page in a file of its own.
     fn followed(name: &str, text: &str) -> Followed {
         let page = std::env::temp_dir().join(format!("{name}-{}.md", std::process::id()));
         std::fs::write(&page, text).expect("a file");

@@ -1,4 +1,4 @@
-//! A terminal of the person who follows a page: a shell, and what it prints.
+//! Terminal of the reader who follows a page: a shell, and its output.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use std::time::Duration;
 
 use crate::patience::Patience;
 
-/// What the shell prints behind each command, before its exit code. No command prints it.
+/// Mark that the shell prints after each command, before its exit code. No command prints it.
 const END: &str = "\u{1}end of the command ";
 
-/// A shell, or the program that has taken its place.
+/// A shell, or the program that has replaced it.
 pub struct Terminal {
     child: Child,
     stdin: ChildStdin,
@@ -19,7 +19,8 @@ pub struct Terminal {
 }
 
 impl Terminal {
-    /// A shell in this folder. `programs` is looked through first for commands; variables that begin with one of `without` are not there.
+    /// Starts a shell in this folder. Commands are searched in `programs` first; variables that begin with an element
+    /// of `without` are removed.
     pub fn new(folder: &Path, programs: &Path, without: &[&str]) -> Self {
         let mut shell = Command::new("bash");
         shell.args(["--norc", "--noprofile"]).current_dir(folder);
@@ -29,7 +30,7 @@ impl Terminal {
         let path = std::env::var("PATH").unwrap_or_default();
         let state = folder.join(".home");
         std::fs::create_dir_all(&state).expect("a home");
-        // Where agents leave what only their user may read.
+        // Directory in which agents keep files that only their user may read.
         std::fs::set_permissions(&state, std::os::unix::fs::PermissionsExt::from_mode(0o700))
             .expect("rights");
         shell.env("PATH", format!("{}:{path}", programs.display())).env("COLUMNS", "100");
@@ -55,10 +56,10 @@ impl Terminal {
         Self { child, stdin, lines }
     }
 
-    /// Runs a command to its end: what it printed, and its exit code.
+    /// Runs a command to its end; returns its output and its exit code.
     ///
     /// # Panics
-    /// When it does not end.
+    /// If the command does not end.
     pub fn run(&mut self, command: &str) -> (Vec<String>, i32) {
         // The command has no stdin: it would read what is typed next. The subshell sets `$?` for the next command.
         let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
@@ -68,7 +69,7 @@ impl Terminal {
             let Some(line) = Patience::begin().receive(&self.lines) else {
                 panic!("`{command}` does not end; it printed\n{}", printed.join("\n"))
             };
-            // Behind a line that does not end, too.
+            // The mark may also follow a line without an end.
             if let Some((before, code)) = line.split_once(END) {
                 printed.extend(Some(before.to_owned()).filter(|before| !before.is_empty()));
                 return (printed, code.trim().parse().expect("a code"));
@@ -77,7 +78,7 @@ impl Terminal {
         }
     }
 
-    /// Has a command take the place of the shell, and go on.
+    /// Replaces the shell by a command, which keeps running.
     pub fn start(&mut self, command: &str) {
         self.type_line(&format!("exec {command}"));
     }
@@ -87,12 +88,12 @@ impl Terminal {
         writeln!(self.stdin, "{line}").expect("it reads what is typed");
     }
 
-    /// The next line; `None` when none comes within this time, or any more.
+    /// Returns the next line; `None` if no line comes within this time, or at the end of the output.
     pub fn line(&mut self, within: Duration) -> Option<String> {
         self.lines.recv_timeout(within).ok()
     }
 
-    /// The lines up to one that is `last`, with it; all that came where it does not.
+    /// Returns the lines up to and including the first that is `last`; all lines so far if none is.
     pub fn lines_until(&mut self, last: impl Fn(&str) -> bool) -> Vec<String> {
         let (mut patience, mut printed) = (Patience::begin(), Vec::new());
         while let Some(line) = patience.receive(&self.lines) {
@@ -105,7 +106,7 @@ impl Terminal {
         printed
     }
 
-    /// Ctrl-C, to the program that has taken the place of the shell.
+    /// Sends Ctrl-C to the program that has replaced the shell.
     pub fn interrupt(&self) {
         Command::new("kill").args(["-INT", &self.child.id().to_string()]).status().expect("kill");
     }

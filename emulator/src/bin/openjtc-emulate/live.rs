@@ -11,35 +11,35 @@ use crate::frames::{Frames, GAP, Incoming};
 use crate::log::DefmtLog;
 use crate::pty::{Pty, PtyError};
 
-/// Bytes of the host that wait for the line.
+/// Largest number of bytes of the host that wait for the line.
 const WAITING_MAX: usize = 4096;
 /// Longest wait for a host to read, when virtual time runs free.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that is made up for.
+/// Largest delay that is caught up.
 const CATCH_UP: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(1);
 
-/// How virtual time goes.
+/// Speed of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
-    /// With the clock.
+    /// Virtual time follows the clock.
     Realtime,
     /// As fast as it can.
     Max,
 }
 
-/// The loop's state.
+/// State of the loop.
 pub struct Live {
     board: Board,
     port: Port,
-    /// The host's rate; `None`: that of the firmware.
+    /// Rate of the host; `None`: that of the firmware.
     baud: Option<u32>,
     pty: Pty,
     speed: Speed,
     log: Option<DefmtLog>,
     frames: Frames,
     incoming: Incoming,
-    /// Bytes that the terminal did not take at once.
+    /// Bytes that the terminal did not accept at once.
     rest: Vec<u8>,
     connected: bool,
     ready: bool,
@@ -48,7 +48,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// A board that has just been switched on, behind a terminal.
+    /// Creates a board that has just been switched on, with this terminal.
     pub fn new(
         board: Board,
         port: Port,
@@ -74,7 +74,7 @@ impl Live {
         }
     }
 
-    /// What bank 2 of the flash holds if the power goes now.
+    /// Returns the contents of bank 2 of the flash if the power fails now.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.board.machine.cut_power(seed)
     }
@@ -92,7 +92,7 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // Longer than that is not made up for: time goes on from here.
+                    // A longer delay is not caught up: time continues from here.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -136,8 +136,9 @@ impl Live {
         }
     }
 
-    /// Virtual time waits a little for the next bytes of a frame, which are still on their way through the operating system: the board itself
-    /// measures the gap. Bytes that the line has not carried yet are not waited for.
+    /// Stops virtual time briefly for the next bytes of a frame that are still on their way through the operating
+    /// system, because the board itself measures the gap. Does not wait while bytes of the host still wait for the
+    /// line. Returns `true` if it waited.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);
@@ -147,7 +148,7 @@ impl Live {
         Ok(true)
     }
 
-    /// The firmware's log, and what nobody wants to see: resets and faults.
+    /// Prints the firmware's log, resets and faults.
     fn report(&mut self) -> Result<(), Box<dyn Error>> {
         let ms = self.board.now_ms();
         if let Some(log) = &mut self.log {
@@ -192,7 +193,8 @@ impl Live {
         Ok(())
     }
 
-    /// A host that does not read must not hold up the arm: in real time nothing waits.
+    /// Writes the remaining bytes to the terminal. A host that does not read must not delay the arm: in real time this
+    /// never waits.
     fn write_rest(&mut self) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

@@ -1,25 +1,25 @@
-//! The firmware's defmt log in plain words, by the program `defmt-print`.
+//! The firmware's defmt log as text, by the program `defmt-print`.
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-/// The program that decodes, which gets the bytes and prints lines.
+/// Decoder process: receives the bytes and prints lines.
 pub struct DefmtLog(Child);
 
 impl DefmtLog {
-    /// For the firmware with this ELF file.
+    /// Starts the decoder for the firmware with this ELF file.
     pub fn new(elf: &Path) -> Result<Self, String> {
         let child = Command::new("defmt-print")
             .arg("-e")
             .arg(elf)
             .stdin(Stdio::piped())
-            // The standard output is for `ready:`.
+            // The standard output is reserved for `ready:`.
             .stdout(io::stderr())
             .spawn();
         child.map(Self).map_err(|e| format!("defmt-print: {e}; install it with `cargo install defmt-print`"))
     }
 
-    /// Pass bytes on.
+    /// Passes bytes to the decoder.
     pub fn print(&mut self, bytes: &[u8]) -> io::Result<()> {
         match &mut self.0.stdin {
             Some(input) if !bytes.is_empty() => input.write_all(bytes),
@@ -30,7 +30,7 @@ impl DefmtLog {
 
 impl Drop for DefmtLog {
     fn drop(&mut self) {
-        // The end of its input ends the program.
+        // The decoder ends at the end of its input.
         drop(self.0.stdin.take());
         let _ = self.0.wait();
     }

@@ -1,4 +1,4 @@
-//! The emulated controller board behind a pseudo-terminal, with simulated drives on its joint bus.
+//! The emulated controller board with a pseudo-terminal as its serial port, and with simulated drives on its joint bus.
 #![forbid(unsafe_code)]
 
 #[path = "../../../../crates/jtc-cli/src/serve/frames.rs"]
@@ -111,7 +111,7 @@ fn run(args: &Args) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Bank 2 as an earlier run left it; a new one where there was none.
+/// Returns bank 2 as an earlier run left it, or a new bank if the file does not exist.
 fn kept(path: &Path) -> Result<Bank2, String> {
     match std::fs::read(path) {
         Ok(bytes) if bytes.len() == BANK2_SIZE as usize => Ok(Bank2::from_bytes(&bytes)),

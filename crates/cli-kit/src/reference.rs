@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use clap::{Arg, Command, CommandFactory};
 
-/// The page of all commands: usage, arguments, options with defaults and variables, and the text below the help. `opening` stands under the
-/// title.
+/// Returns the page of all commands: usage, arguments, options with defaults and variables, and the text below the
+/// help. `opening` follows the title.
 pub fn markdown<Cli: CommandFactory>(opening: &str) -> String {
     let mut command = Cli::command();
     command.build();
@@ -22,7 +22,7 @@ fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "help" || has_options(sub))
 }
 
-/// Our own `help` has words to choose from, that of the library has none.
+/// Our own `help` has arguments, that of the library has none.
 fn has_options(command: &Command) -> bool {
     command.get_name() == "help"
         && command.get_subcommands().next().is_none()
@@ -37,7 +37,7 @@ fn walk(command: &Command, path: &str, page: &mut String) {
     }
 }
 
-/// What a command is for, its usage, its arguments and what stands below its help.
+/// Writes the purpose of a command, its usage, its arguments and the text below its help.
 fn one(command: &Command, top: bool, page: &mut String) {
     if let Some(about) = command.get_about() {
         let _ = write!(page, "{}.\n\n", text(&about.to_string()));
@@ -50,7 +50,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();
     let _ = write!(page, "```text\n{}\n```\n\n", lines.join("\n"));
-    // Those of every command are shown once, at the top.
+    // Options of every command are shown once, at the top.
     let shown = |arg: &&Arg| {
         !arg.is_hide_set()
             && !["help", "version"].contains(&arg.get_id().as_str())
@@ -63,12 +63,18 @@ fn one(command: &Command, top: bool, page: &mut String) {
     if !rows.is_empty() {
         let _ = write!(page, "| | |\n|---|---|\n{rows}\n");
     }
-    if let Some(after) = command.get_after_help() {
-        let _ = write!(page, "```text\n{}\n```\n\n", after.to_string().trim());
+    let after = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    for block in after.trim().split("\n\n").filter(|block| !block.is_empty()) {
+        // Examples and tables are indented.
+        let _ = if block.lines().any(|line| line.starts_with(' ')) {
+            write!(page, "```text\n{block}\n```\n\n")
+        } else {
+            write!(page, "{}\n\n", text(block))
+        };
     }
 }
 
-/// An argument as it is typed.
+/// Returns an argument as typed.
 fn names(arg: &Arg) -> String {
     let takes = arg.get_action().takes_values();
     let values: Vec<String> = match arg.get_value_names() {
@@ -88,7 +94,7 @@ fn names(arg: &Arg) -> String {
     format!("`{}`", format!("{typed} {values}").trim())
 }
 
-/// What an argument is for, what it can be, its default and its variable.
+/// Returns the purpose of an argument, its possible values, its default and its variable.
 fn meaning(arg: &Arg) -> String {
     let help = arg.get_long_help().or_else(|| arg.get_help());
     let mut words = help.map(|help| text(&help.to_string())).unwrap_or_default();
@@ -109,10 +115,10 @@ fn meaning(arg: &Arg) -> String {
     words
 }
 
-/// Text of the help in a line of Markdown: no sign in it has a meaning of its own, but for code.
+/// Converts text of the help to a line of Markdown: characters are escaped, except in code.
 fn text(help: &str) -> String {
     let mut out = String::new();
-    for (n, part) in help.replace('\n', " ").split('`').enumerate() {
+    for (n, part) in help.replace("\n\n", " ").replace('\n', " ").split('`').enumerate() {
         if n > 0 {
             out.push('`');
         }
@@ -148,7 +154,7 @@ mod tests {
     #[derive(clap::Subcommand)]
     enum Commands {
         /// Go <there>
-        #[command(after_help = "Examples:\n  try go")]
+        #[command(after_help = "It goes <far>.\n\nExamples:\n  try go")]
         Go {
             /// How fast
             #[arg(long, value_name = "N", default_value_t = 3)]
@@ -162,7 +168,7 @@ mod tests {
         assert!(page.starts_with("# Commands of try\n\nOpening.\n\n## try\n\nTries things."), "{page}");
         assert!(page.contains("## try go\n\nGo \\<there\\>.\n"), "{page}");
         assert!(page.contains("| `--speed N` | How fast; default `3` |"), "{page}");
-        assert!(page.contains("```text\nExamples:\n  try go\n```"), "{page}");
+        assert!(page.contains("\n\nIt goes \\<far\\>.\n\n```text\nExamples:\n  try go\n```"), "{page}");
         assert_eq!(page.matches("--json").count(), 1, "once, and not in each command: {page}");
     }
 }

@@ -15,7 +15,25 @@ pub use screen::Picture;
 #[cfg(unix)]
 pub use terminal::Terminal;
 
-/// The output of a command and how it ended.
+/// Checks that each paragraph of prose below the help of a command is one line, because clap wraps it to the terminal. Lines that begin
+/// with a space are examples or tables.
+///
+/// # Panics
+///
+/// A paragraph has several lines.
+pub fn check_help_is_wrapped_once(command: &clap::Command) {
+    for help in [command.get_after_help(), command.get_after_long_help(), command.get_long_about()] {
+        let text = help.map(ToString::to_string).unwrap_or_default();
+        let is_prose = |line: &str| !line.is_empty() && !line.starts_with(' ');
+        for (line, next) in text.lines().zip(text.lines().skip(1)) {
+            let broken = is_prose(line) && !line.ends_with(':') && is_prose(next);
+            assert!(!broken, "{}: a line break within a paragraph:\n{line}\n{next}", command.get_name());
+        }
+    }
+    command.get_subcommands().for_each(check_help_is_wrapped_once);
+}
+
+/// Output of a command and its exit code.
 pub struct CommandOutput {
     /// Its exit code; −1 when a signal ended it.
     pub code: i32,
@@ -26,26 +44,26 @@ pub struct CommandOutput {
 }
 
 impl CommandOutput {
-    /// Its result: the last line of its stdout as one JSON object; panics if it is none.
+    /// Returns its result: the last line of its stdout as one JSON object; panics if the line is not JSON.
     pub fn json(&self) -> Value {
         let error = |e| panic!("{e}: stdout is {:?}, stderr {:?}", self.out, self.err);
         serde_json::from_str(self.out.trim().lines().last().unwrap_or_default()).unwrap_or_else(error)
     }
 
-    /// The lines of its stderr as JSON objects; panics if one is none.
+    /// Returns the lines of its stderr as JSON objects; panics if a line is not JSON.
     pub fn events(&self) -> Vec<Value> {
         let parse = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line:?}"));
         self.err.lines().map(parse).collect()
     }
 
-    /// The same, once it ended with this code; panics if it ended with another.
+    /// Returns the output if the command ended with this code; panics otherwise.
     pub fn ends(self, code: i32) -> Self {
         assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.out, self.err);
         self
     }
 }
 
-/// A program without the variables that the surroundings may have set for it: those that begin with `prefix`.
+/// Returns a program without environment variables that begin with `prefix`.
 pub fn program(path: &str, prefix: &str) -> Command {
     let mut command = Command::new(path);
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with(prefix)) {
@@ -54,7 +72,7 @@ pub fn program(path: &str, prefix: &str) -> Command {
     command
 }
 
-/// Runs a command with these words, and this text on its stdin, to its end.
+/// Runs a command with these words and this stdin to its end.
 pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     let pipes = command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = pipes.spawn().expect("it starts");
@@ -63,7 +81,7 @@ pub fn run(mut command: Command, words: &[&str], stdin: &str) -> CommandOutput {
     ended(child)
 }
 
-/// The output of a started command, once it has ended.
+/// Returns the output of a started command, after it has ended.
 pub fn ended(child: Child) -> CommandOutput {
     let output = child.wait_with_output().expect("it ends");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

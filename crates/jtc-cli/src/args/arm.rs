@@ -9,52 +9,66 @@ use super::{AcceptArgs, LinkArgs, OverwriteArgs};
 /// `jtc arm …`
 #[derive(Debug, Subcommand)]
 pub enum ArmCommand {
-    /// Make an arm file from a robot description (URDF); what had to be turned or guessed is listed
-    #[command(
-        after_help = "The arm is six revolute or continuous joints in a chain. Where more joints move (a gripper,\n\
-                      a seventh axis, a second arm), --joints or --tip selects the six; the others are\n\
-                      held at 0. Rotor inertia, gains, acceleration limit and more are in no URDF: starting\n\
-                      values are proposed by rules that are written into the file, and marked there.\n\nExamples:\n  \
-                      jtc arm import ur5.urdf -o ur5.toml\n  \
-                      jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
-                      jtc arm import two-arms.urdf --tip left_tool0 -o left.toml"
-    )]
+    /// Make an arm file from a robot description (URDF)
+    #[command(after_help = "The command lists everything that it turned or guessed.\n\n\
+            The arm is a chain of six revolute or continuous joints. If more joints move (a gripper, a seventh \
+            axis, a second arm), select the six with --joints or --tip. The other joints are held at 0.\n\n\
+            A URDF does not contain rotor inertia, gains, acceleration limits and more. The command proposes \
+            starting values by rules. The file contains the rules, and marks the proposed values.\n\n\
+            Examples:\n  \
+            jtc arm import ur5.urdf -o ur5.toml\n  \
+            jtc arm import z1.urdf --joints joint1,joint2,joint3,joint4,joint5,joint6 -o z1.toml\n  \
+            jtc arm import two-arms.urdf --tip left_tool0 -o left.toml")]
     Import(ImportArgs),
-    /// Whether an arm is physical, complete, held by its drives and taken by the controller
+    /// Check that an arm is physical, complete and usable
     #[command(
-        after_help = "Exit code 4: the controller would refuse it. 0: it would not; warnings may be there, among\n\
-                      them what is only proposed and poses in which gravity is more than a drive can hold.\n\nExamples:\n  \
-                      jtc arm check ur5.toml\n  jtc --json arm check ur5.toml | jq .findings[].what"
+        after_help = "The check also tests that the drives can hold the arm and that the controller accepts it.\n\n\
+            Exit code 4 means that the controller would refuse the arm, and 0 that it would accept it. Warnings \
+            are possible with exit code 0. Examples are values that are only proposed, and poses in which \
+            gravity is more than a drive can hold.\n\n\
+            Examples:\n  \
+            jtc arm check ur5.toml\n  \
+            jtc --json arm check ur5.toml | jq .findings[].what"
     )]
     Check {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
     },
-    /// All numbers of an arm, with unit, range, default and where each comes from; without a file, of the controller's arm
-    #[command(after_help = "Examples:\n  jtc arm show ur5.toml\n  jtc arm show ur5.toml --deg\n  \
-                            jtc --json arm show ur5.toml | jq '.values[] | select(.from == \"proposed\")'")]
+    /// Show all parameters of an arm, with unit, range and source
+    #[command(
+        after_help = "The command shows each value with its unit, range, default and source. Without a file, the values are \
+        those of the controller's arm.\n\n\
+        Examples:\n  \
+        jtc arm show ur5.toml\n  \
+        jtc arm show ur5.toml --deg\n  \
+        jtc --json arm show ur5.toml | jq '.values[] | select(.from == \"proposed\")'"
+    )]
     Show {
-        /// Arm file (TOML) or robot description (URDF); without it the controller is asked
+        /// Arm file (TOML) or robot description (URDF).
+        ///
+        /// Without a file the command asks the controller
         file: Option<PathBuf>,
-        /// Angles in degrees
+        /// Show angles in degrees
         #[arg(long)]
         deg: bool,
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Give the controller the whole arm: settings, gains, friction, model and name; read it back and compare
-    #[command(
-        after_help = "Settings change while the controller is in Init or Error only: `jtc disable` takes the torque off.\n\
-                      --store keeps the arm over a loss of power; the controller is then in Init, and `jtc params use-defaults` or\n\
-                      `jtc recover --defaults` puts the stored arm in use.\n\
-                      A controller without extensions takes friction, gains and model only; where its own limits, gravity or\n\
-                      rotor inertia differ, nothing is sent unless --accept-device-limits is given.\n\nExamples:\n  \
-                      jtc arm push my-arm.toml\n  jtc arm push my-arm.toml --store"
-    )]
+    /// Send a whole arm to the controller, read back and compare
+    #[command(after_help = "The whole arm is settings, gains, friction, model and name.\n\n\
+            Settings can change only while the controller is in Init or Error. `jtc disable` takes the torque \
+            off.\n\n\
+            --store keeps the arm after a loss of power. The controller is then in Init, and `jtc params \
+            use-defaults` or `jtc recover --defaults` puts the stored arm in use.\n\n\
+            A controller without extensions takes only friction, gains and model. If its own limits, gravity or \
+            rotor inertia differ, nothing is sent unless you give --accept-device-limits.\n\n\
+            Examples:\n  \
+            jtc arm push my-arm.toml\n  \
+            jtc arm push my-arm.toml --store")]
     Push {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
-        /// Keep it over a loss of power
+        /// Keep the arm after a loss of power
         #[arg(long)]
         store: bool,
         #[command(flatten)]
@@ -62,10 +76,10 @@ pub enum ArmCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// The controller's arm as a file
+    /// Write the controller's arm to a file
     #[command(after_help = "Examples:\n  jtc arm pull -o board.toml")]
     Pull {
-        /// Arm file to write
+        /// Write this arm file
         #[arg(short, long, env = "JTC_PULL_OUT", value_name = "FILE")]
         out: PathBuf,
         #[command(flatten)]
@@ -73,10 +87,11 @@ pub enum ArmCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// What of an arm file differs from the controller's arm; exit code 4 if anything does
-    #[command(
-        after_help = "Examples:\n  jtc arm diff my-arm.toml\n  jtc --json arm diff my-arm.toml | jq .differences"
-    )]
+    /// Compare an arm file with the controller's arm
+    #[command(after_help = "Exit code 4 means that at least one value differs.\n\n\
+            Examples:\n  \
+            jtc arm diff my-arm.toml\n  \
+            jtc --json arm diff my-arm.toml | jq .differences")]
     Diff {
         /// Arm file (TOML) or robot description (URDF)
         file: PathBuf,
@@ -88,16 +103,16 @@ pub enum ArmCommand {
 /// Options of `jtc arm import`.
 #[derive(Args, Debug)]
 pub struct ImportArgs {
-    /// Robot description
+    /// Robot description (URDF)
     #[arg(value_name = "URDF")]
     pub urdf: PathBuf,
-    /// Arm file to write
+    /// Write this arm file
     #[arg(short, long, env = "JTC_IMPORT_OUT", value_name = "FILE")]
     pub out: PathBuf,
-    /// The six joints that move, base to wrist
+    /// Select the six joints that move, from base to wrist
     #[arg(long, value_name = "A,B,C,D,E,F", value_delimiter = ',')]
     pub joints: Option<Vec<String>>,
-    /// The link that is the flange
+    /// Select the link that is the flange
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
     #[command(flatten)]

@@ -8,32 +8,39 @@ use super::LinkArgs;
 /// `jtc bench …`
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
-    /// These joints are not there, and no others
+    /// Set these joints absent, and all others present
     #[command(
-        after_help = "Each joint, counted from 1, is given with the angle at which the model has it. In Init or Error only: `jtc disable`\n\
-                            takes the torque off before. No node is waited for at these joints, and their torque is zero. While a joint\n\
-                            is absent no motion is executed and nothing is taught; the others are held, with the torque that the model has\n\
-                            for the whole arm, and can be jogged: push the model of what is on the bench. A drive that answers all the\n\
-                            same is an error. It is not stored: after the controller was switched off all joints are expected again.\n\nExamples:\n  \
-                            jtc bench absent 3=0.5 4=0\n  jtc bench absent 2=90 3=-45 --deg"
+        after_help = "Name each joint, counted from 1, with the angle that it has in the model. The controller accepts \
+            this only in Init or Error. Take the torque off first with `jtc disable`.\n\n\
+            The controller does not wait for nodes at these joints, and their torque is zero. While a joint is \
+            absent, the controller does not execute motions, and you cannot teach. The other joints are held, \
+            and you can jog them. Their torque is that of the model of the whole arm: push the model of the arm \
+            on the bench.\n\n\
+            A drive that answers at an absent joint is an error. The setting is not stored: after a power cycle \
+            all joints are expected again.\n\n\
+            Examples:\n  \
+            jtc bench absent 3=0.5 4=0\n  \
+            jtc bench absent 2=90 3=-45 --deg"
     )]
     Absent {
-        /// Joint and angle, rad: 3=0.5
+        /// Joint and its angle in rad, as 3=0.5
         #[arg(required = true, value_name = "JOINT=RAD", value_parser = joint)]
         joints: Vec<(Joint, f64)>,
-        /// The angles are degrees
+        /// Read the angles as degrees
         #[arg(long)]
         deg: bool,
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// All joints are there
-    #[command(after_help = "In Init or Error only.\n\nExamples:\n  jtc bench present")]
+    /// Set all joints present
+    #[command(after_help = "The controller accepts this only in Init or Error.\n\n\
+        Examples:\n  \
+        jtc bench present")]
     Present {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Which joints are set absent, and where
+    /// Show the absent joints and their angles
     #[command(after_help = "Examples:\n  jtc bench show\n  jtc --json bench show | jq .absent")]
     Show {
         #[command(flatten)]

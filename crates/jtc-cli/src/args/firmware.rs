@@ -9,40 +9,42 @@ use super::LinkArgs;
 /// `jtc firmware …`
 #[derive(Debug, Subcommand)]
 pub enum FirmwareCommand {
-    /// The images that are installed, and the boards' drives that are mounted
+    /// List installed images and mounted board drives
     #[command(
-        after_help = "Images are listed by firmware.json in the folder that OPENJTC_FIRMWARE names, else in\n\
-                            ../share/openjtc/firmware beside this program, else in /usr/share/openjtc/firmware.\n\n\
-                            Examples:\n  \
-                            jtc firmware list\n  \
-                            jtc --json firmware list | jq -r .drives[].path"
+        after_help = "The file firmware.json lists the images. The command reads it in the folder that OPENJTC_FIRMWARE \
+            names. Without this variable, the folder is ../share/openjtc/firmware next to this program, else \
+            /usr/share/openjtc/firmware.\n\n\
+            Examples:\n  \
+            jtc firmware list\n  \
+            jtc --json firmware list | jq -r .drives[].path"
     )]
     List,
-    /// Put an image onto a Nucleo board by the drive of its ST-LINK, and prove that it runs
-    #[command(
-        after_help = "The board is reset: an arm that it holds falls. The serial port of the drive's own USB device\n\
-                            (known on Linux) is always asked, and --port beside it; a port that cannot be asked, and a\n\
-                            controller that reports torque, end the command with 4, whatever options are given. Without a\n\
-                            question a board is flashed only where its own port reports no torque, every joint answers it\n\
-                            and the gripper is off; else this is asked on a terminal, --yes answers. How the core is\n\
-                            supplied is known where that port reports the very board of the image; else a board that comes\n\
-                            in both kinds needs --accept-supply. What runs afterwards is asked over the same port, and\n\
-                            compared with the image by the CRC-32 of what the program finds in its own flash. --baud is the\n\
-                            rate of what runs before; afterwards it is that of the image. The stored arm may be lost:\n\
-                            `jtc arm pull -o FILE` before.\n\n\
-                            Examples:\n  \
-                            jtc firmware flash\n  \
-                            jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
-                            jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2 --port /dev/ttyUSB0\n  \
-                            jtc firmware flash --image openjtc.bin --no-read-back --yes"
-    )]
+    /// Flash a Nucleo board through its ST-LINK drive, and verify
+    #[command(after_help = "Flashing resets the board: an arm that it holds falls.\n\n\
+            The command always asks the serial port of the drive's own USB device (known on Linux), and also \
+            --port. If a port cannot be asked, or if a controller reports torque, the command ends with exit \
+            code 4. No option overrides this.\n\n\
+            The command flashes without a question only under three conditions. The board's own port reports no \
+            torque, every joint answers it, and the gripper is off. Otherwise the command asks on a terminal. \
+            --yes answers this question.\n\n\
+            The core supply is known if that port reports exactly the board of the image. Otherwise a board \
+            that exists with both supplies needs --accept-supply.\n\n\
+            Afterwards the command asks over the same port which firmware runs. The firmware reports the CRC-32 \
+            of its own flash, and the command compares it with the image. --baud is the rate before flashing. \
+            Afterwards the rate is that of the image.\n\n\
+            The stored arm can be lost: save it before with `jtc arm pull -o FILE`.\n\n\
+            Examples:\n  \
+            jtc firmware flash\n  \
+            jtc firmware flash --board nucleo-h745zi-q --accept-supply\n  \
+            jtc firmware flash --image openjtc.elf --drive /media/me/NOD_H743ZI2 --port /dev/ttyUSB0\n  \
+            jtc firmware flash --image openjtc.bin --no-read-back --yes")]
     Flash(FlashArgs),
-    /// Whether a board runs an image; nothing is written
+    /// Verify that a board runs an image; nothing is written
     #[command(
-        after_help = "Without --image or --board the image is that of the board which the controller reports.\n\n\
-                            Examples:\n  \
-                            jtc firmware verify\n  \
-                            jtc firmware verify --image openjtc.bin --port /dev/ttyACM0"
+        after_help = "Without --image or --board, the command uses the image of the board that the controller reports.\n\n\
+            Examples:\n  \
+            jtc firmware verify\n  \
+            jtc firmware verify --image openjtc.bin --port /dev/ttyACM0"
     )]
     Verify {
         #[command(flatten)]
@@ -52,13 +54,15 @@ pub enum FirmwareCommand {
     },
 }
 
-/// Which image.
+/// Options that select the image.
 #[derive(Args, Clone, Debug)]
 pub struct ImageArgs {
-    /// Image, a binary (.bin) or an ELF file
+    /// Use this image, a binary (.bin) or an ELF file
     #[arg(long, value_name = "FILE", conflicts_with = "board")]
     pub image: Option<PathBuf>,
-    /// The installed image of this board: nucleo-h745zi-q, nucleo-h745zi-q-ldo or nucleo-h743zi2
+    /// Use the installed image of this board.
+    ///
+    /// Names are nucleo-h745zi-q, nucleo-h745zi-q-ldo and nucleo-h743zi2
     #[arg(long, value_name = "NAME")]
     pub board: Option<String>,
 }
@@ -68,25 +72,34 @@ pub struct ImageArgs {
 pub struct FlashArgs {
     #[command(flatten)]
     pub image: ImageArgs,
-    /// Where the drive of the board is mounted; default: the only one found
+    /// Use the board drive that is mounted at this directory.
+    ///
+    /// Default: the only drive found
     #[arg(long, env = "JTC_DRIVE", value_name = "DIR")]
     pub drive: Option<PathBuf>,
-    /// Do not ask: the arm is supported, its drives are without power, and the safety wires are as in the image
+    /// Do not ask, and confirm that flashing is safe.
+    ///
+    /// You confirm that the arm is supported, that its drives have no power, and that the safety wires are as in the
+    /// image
     #[arg(long)]
     pub yes: bool,
-    /// The drive does not name its board: it is that of the image
+    /// Assume the board of the image if the drive does not name one
     #[arg(long)]
     pub assume_board: bool,
-    /// The solder bridges of the board are set to the core supply of the image
+    /// Confirm that the solder bridges match the core supply.
+    ///
+    /// You confirm that the solder bridges of the board are set to the core supply of the image
     #[arg(long)]
     pub accept_supply: bool,
-    /// Flash also a board that runs this very image
+    /// Flash also a board that already runs this image
     #[arg(long)]
     pub again: bool,
-    /// Do not ask the controller afterwards what it runs: nothing proves that the image arrived
+    /// Do not ask the controller afterwards which image it runs.
+    ///
+    /// Then the command cannot verify that the image arrived
     #[arg(long)]
     pub no_read_back: bool,
-    /// How long the board may take to run the image, s
+    /// Wait this long for the board to run the image, s (1 to 3600)
     #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub wait: u64,
     #[command(flatten)]

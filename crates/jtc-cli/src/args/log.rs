@@ -9,23 +9,28 @@ use super::{LinkArgs, OverwriteArgs};
 /// `jtc log …`
 #[derive(Debug, Subcommand)]
 pub enum LogCommand {
-    /// Read the flight recorder: what broke first, what came before it and what followed
+    /// Read the flight recorder, and report the first error
     #[command(
-        after_help = "The controller records every tick, and stops 0.3 s after the first error. The log is kept over a reset and until\n\
-                      `jtc log clear`; clearing errors does not clear it. It may be read while the arm moves: recording rests meanwhile.\n\
-                      The ticks are run through the controller's own program again, with the arm that the controller has now. Where the\n\
-                      log is of another arm, --arm names its file.\n\
-                      -o writes a recording that Foxglove and PlotJuggler plot, with the log in it for `jtc log replay`.\n\nExamples:\n  \
-                      jtc log fetch\n  jtc log fetch -o fault.mcap --report fault.html"
+        after_help = "The report shows the first error, the events before it and the events after it.\n\n\
+            The controller records every tick, and stops 0.3 s after the first error. The log survives a reset \
+            and stays until `jtc log clear`. Clearing errors does not clear the log. You can read the log while \
+            the arm moves: recording pauses meanwhile.\n\n\
+            The command runs the ticks through the controller's own program again, with the arm that the \
+            controller has now. If the log is of another arm, name its file with --arm.\n\n\
+            -o writes a recording that Foxglove and PlotJuggler can plot. The file also contains the log, for \
+            `jtc log replay`.\n\n\
+            Examples:\n  \
+            jtc log fetch\n  \
+            jtc log fetch -o fault.mcap --report fault.html"
     )]
     Fetch {
-        /// Write the recording here (.mcap)
+        /// Write the recording to this .mcap file
         #[arg(short, long, env = "JTC_LOG_OUT", value_name = "FILE.mcap")]
         out: Option<PathBuf>,
-        /// Write the report page here (.html)
+        /// Write the report page to this .html file
         #[arg(long, env = "JTC_LOG_REPORT", value_name = "FILE.html")]
         report: Option<PathBuf>,
-        /// The arm of the log, where it is not the one that the controller has now
+        /// Use this arm if the log is not of the controller's arm
         #[arg(long, env = "JTC_ARM", value_name = "FILE")]
         arm: Option<PathBuf>,
         #[command(flatten)]
@@ -33,21 +38,24 @@ pub enum LogCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Forget the log, and record anew
+    /// Clear the log, and start to record again
     #[command(after_help = "Examples:\n  jtc log clear")]
     Clear {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Run a fetched log through the controller's program, and name the first tick that differs
+    /// Replay a fetched log, and name the first tick that differs
     #[command(
-        after_help = "Exit code 4: a tick differs, or none could be replayed.\n\nExamples:\n  jtc log replay fault.mcap\n  \
-                      jtc --json log replay fault.mcap | jq .difference"
+        after_help = "The command runs the log through the controller's program. Exit code 4 means that a tick differs, \
+            or that no tick could be replayed.\n\n\
+            Examples:\n  \
+            jtc log replay fault.mcap\n  \
+            jtc --json log replay fault.mcap | jq .difference"
     )]
     Replay {
-        /// A file that `jtc log fetch` wrote
+        /// Recording from `jtc log fetch`
         file: PathBuf,
-        /// The arm of the log, where it is not the one in the file
+        /// Use this arm if the log is not of the arm in the file
         #[arg(long, env = "JTC_ARM", value_name = "FILE")]
         arm: Option<PathBuf>,
     },

@@ -11,7 +11,7 @@ use super::{AcceptArgs, LinkArgs};
 pub struct MonitorArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// End after so many statuses
+    /// End after this number of statuses
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
@@ -21,7 +21,7 @@ pub struct MonitorArgs {
 pub struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Clear the memory of errors that occurred, too
+    /// Clear also the memory of errors that occurred
     #[arg(long)]
     pub occurred: bool,
 }
@@ -29,19 +29,19 @@ pub struct ClearArgs {
 /// Options of `jtc reset`.
 #[derive(Args, Debug)]
 pub struct ResetArgs {
-    /// Joints, counted from 1: 2, or 1,3
+    /// Reset these joints, counted from 1, as 2 or 1,3
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = clap::value_parser!(u8).range(1..=6))]
     pub joints: Vec<u8>,
-    /// The gripper
+    /// Reset the gripper
     #[arg(long)]
     pub gripper: bool,
-    /// All joints and the gripper
+    /// Reset all joints and the gripper
     #[arg(long)]
     pub all: bool,
-    /// Do not ask: the arm may lose torque
+    /// Do not ask (the arm can lose torque)
     #[arg(long)]
     pub yes: bool,
-    /// A bit mask, as older versions took it: refused, with what to type instead
+    /// Bit mask of older versions (refused, with the replacement)
     #[arg(hide = true, value_name = "MASK")]
     pub mask: Option<String>,
     #[command(flatten)]
@@ -51,7 +51,7 @@ pub struct ResetArgs {
 /// Options of `jtc gripper`.
 #[derive(Args, Debug)]
 pub struct GripperArgs {
-    /// The pump
+    /// State of the pump
     pub pump: Switch,
     #[command(flatten)]
     pub link: LinkArgs,
@@ -60,9 +60,9 @@ pub struct GripperArgs {
 /// On or off.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum Switch {
-    /// On.
+    /// Switch the pump on.
     On,
-    /// Off.
+    /// Switch the pump off.
     Off,
 }
 
@@ -71,10 +71,10 @@ pub enum Switch {
 pub struct RecoverArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Arm file whose friction, gains and arm model the controller is given, all three
+    /// Send friction, gains and arm model of this arm file
     #[arg(long, value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Give the controller's own defaults, those of its built-in arm, when it misses parameters
+    /// Use the controller's built-in arm if parameters are missing
     #[arg(long)]
     pub defaults: bool,
     #[command(flatten)]
@@ -84,16 +84,18 @@ pub struct RecoverArgs {
 /// Options of `jtc jog`.
 #[derive(Args, Debug)]
 pub struct JogArgs {
-    /// Joint, counted from 1; without it the keys of the terminal jog
+    /// Joint, counted from 1 (1 to 6).
+    ///
+    /// Without a joint, you jog with the keys of the terminal
     #[arg(value_name = "JOINT", value_parser = clap::value_parser!(u8).range(1..=6), requires = "rate")]
     pub joint: Option<u8>,
     /// Velocity, rad/s
     #[arg(value_name = "RATE", allow_negative_numbers = true)]
     pub rate: Option<f64>,
-    /// The rate is in degrees a second
+    /// Read the rate as degrees per second
     #[arg(long)]
     pub deg: bool,
-    /// End after so many seconds
+    /// End after this time, s
     #[arg(long, value_name = "S")]
     pub duration: Option<f64>,
     #[command(flatten)]

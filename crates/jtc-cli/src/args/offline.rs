@@ -9,15 +9,17 @@ use super::OverwriteArgs;
 /// Options of `jtc dynamics`.
 #[derive(Args, Debug)]
 pub struct DynamicsArgs {
-    /// What to compute
+    /// Quantity to compute
     pub what: DynamicsKind,
-    /// Arm, TOML or URDF; default: the built-in one
+    /// Use this arm, TOML or URDF (default: the built-in arm)
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Gravity in the base frame, m/s²; default: the arm file's
+    /// Set gravity in the base frame, m/s².
+    ///
+    /// Default: the gravity of the arm file
     #[arg(long, value_name = "X,Y,Z", value_parser = gravity, allow_hyphen_values = true)]
     pub gravity: Option<[f64; 3]>,
-    /// Count the drives' reflected rotor inertias of the arm file, too
+    /// Include the reflected rotor inertias of the arm file
     #[arg(long)]
     pub rotors: bool,
 }
@@ -25,27 +27,31 @@ pub struct DynamicsArgs {
 /// Kinds of dynamics.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum DynamicsKind {
-    /// Torques of a motion.
+    /// Compute the torques of a motion.
     Inverse,
-    /// Accelerations of torques.
+    /// Compute the accelerations that torques cause.
     Forward,
-    /// Mass matrix, row by row.
+    /// Compute the mass matrix, row by row.
     Mass,
 }
 
 /// Options of `jtc explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// Name, number or words of the code as a screen shows them, or `faults` for the form of fault files; without it: the list
+    /// Name, number or words of the code, as a screen shows them.
+    ///
+    /// `faults` explains the format of fault files. Without a code, the command lists all codes
     pub code: Vec<String>,
 }
 
 /// Options of `jtc example`.
 #[derive(Args, Debug)]
 pub struct ExampleArgs {
-    /// Name of the example; without it, or `list`: what there is
+    /// Name of the example.
+    ///
+    /// Without a name, or with `list`, the command lists all examples
     pub name: Option<String>,
-    /// Directory to write it to; default: this one
+    /// Write to this directory (default: the current one)
     #[arg(short = 'o', long = "out", env = "JTC_EXAMPLE_DIR", value_name = "DIR")]
     pub dir: Option<PathBuf>,
     #[command(flatten)]
@@ -55,7 +61,7 @@ pub struct ExampleArgs {
 /// Options of `jtc help`.
 #[derive(Args, Debug)]
 pub struct HelpArgs {
-    /// A page (files, faults, events) or the words of a command
+    /// Page (files, faults, events), or the words of a command
     pub topic: Vec<String>,
 }
 
@@ -64,12 +70,12 @@ pub struct HelpArgs {
 pub struct ReportArgs {
     /// Recording, .mcap or .csv
     pub file: PathBuf,
-    /// Page to write; default: beside the recording
+    /// Write this page (default: next to the recording)
     #[arg(long, env = "JTC_REPORT_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Arm whose limits count, for recordings that do not hold them (CSV)
+    /// Use the limits of this arm if the recording has none (CSV)
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
 }

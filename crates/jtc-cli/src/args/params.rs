@@ -9,19 +9,24 @@ use super::LinkArgs;
 /// `jtc params …`
 #[derive(Debug, Subcommand)]
 pub enum ParamsCommand {
-    /// Send what the files hold: an arm file (TOML, URDF) or CSV files of friction and gains
-    #[command(
-        after_help = "Files: an arm as TOML or URDF; FricPolynomialCoeffs.csv (a row a joint); six FricTableJointN.csv;\n\
-                            six PidParamJointN.csv. Several may be named; a directory is searched for them. Files of single joints\n\
-                            count only when all six are named. Limits, gravity and rotor inertia of an arm file are in no frame:\n\
-                            where they differ from the controller's own, nothing is sent unless --accept-device-limits is given.\n\nExamples:\n  \
-                            jtc params push my-arm.toml\n  jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv"
-    )]
+    /// Send friction, gains and arm model from files
+    #[command(after_help = "The command accepts these files:\n  \
+            TOML or URDF               an arm\n  \
+            FricPolynomialCoeffs.csv   friction coefficients, one row per joint\n  \
+            FricTableJointN.csv        friction tables, six files\n  \
+            PidParamJointN.csv         gains, six files\n\n\
+            You can name several files. The command searches the directories that you name. Files of single \
+            joints count only if you name all six.\n\n\
+            No frame carries the limits, gravity and rotor inertia of an arm file. If they differ from the \
+            controller's own, nothing is sent unless you give --accept-device-limits.\n\n\
+            Examples:\n  \
+            jtc params push my-arm.toml\n  \
+            jtc params push arm.urdf FricPolynomialCoeffs.csv PidParamJoint*.csv")]
     Push {
         /// Files or directories
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// Which friction to send where files hold both
+        /// Choose the friction to send if the files have both
         #[arg(long, value_enum, default_value_t = FrictionKind::Polynomial)]
         friction: FrictionKind,
         #[command(flatten)]
@@ -29,19 +34,25 @@ pub enum ParamsCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Let the controller use its defaults
+    /// Make the controller use its default parameters
     #[command(after_help = "Examples:\n  jtc params use-defaults")]
     UseDefaults(LinkArgs),
-    /// What a file holds (default: the built-in arm), and what the controller still misses when one is connected
-    #[command(after_help = "Examples:\n  jtc params show\n  jtc params show my-arm.urdf")]
+    /// Show the parameters of a file or of the built-in arm
+    #[command(
+        after_help = "Without a file, the command shows the built-in arm. If a controller is connected, the command also \
+        shows the parameters that it still misses.\n\n\
+        Examples:\n  \
+        jtc params show\n  \
+        jtc params show my-arm.urdf"
+    )]
     Show {
         /// Files or directories
         #[arg(value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// Serial port of a controller to ask what it misses
+        /// Ask the controller at this port for missing parameters
         #[arg(long, env = "JTC_PORT", value_name = "PATH")]
         port: Option<String>,
-        /// Rate of the port, Bd
+        /// Set the rate of the port, Bd
         #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200)]
         baud: u32,
     },
@@ -50,16 +61,18 @@ pub enum ParamsCommand {
 /// Kinds of friction compensation.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum FrictionKind {
-    /// Coefficients c0..c5.
+    /// Send the coefficients c0..c5.
     Polynomial,
-    /// Torque over speed and temperature.
+    /// Send the table of torque over speed and temperature.
     Table,
 }
 
-/// What of an arm file a controller cannot be given.
+/// Option for values of an arm file that no frame carries.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct AcceptArgs {
-    /// Go on although the controller uses other limits, gravity or rotor inertia than the arm file gives
+    /// Continue although limits of the controller differ.
+    ///
+    /// The controller then uses its own limits, gravity and rotor inertia instead of those of the arm file
     #[arg(long)]
     pub accept_device_limits: bool,
 }

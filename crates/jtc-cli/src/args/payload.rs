@@ -8,14 +8,17 @@ use super::LinkArgs;
 /// `jtc payload …`
 #[derive(Debug, Subcommand)]
 pub enum PayloadCommand {
-    /// Give the payload: from now on the arm is held and moved with it
+    /// Set the payload
     #[command(
-        after_help = "The flange is the last frame of the arm file. The payload comes into the torque over half a second, in HoldPos,\n\
-                            Teaching and Pause without a step; a motion that is started meanwhile waits for it. It is not stored: after\n\
-                            the controller was switched off there is none.\n\nExamples:\n  \
-                            jtc payload set --mass 2 --com 0,0,0.08\n  \
-                            jtc payload set --mass 2 --com 0,0,0.08 --inertia 0.01,0.01,0.004\n  \
-                            jtc payload set --mass 2 --com 0.02,0,0.08 --inertia 0.01,0.01,0.004,0,-0.001,0"
+        after_help = "From now on the controller holds and moves the arm with this payload. The flange is the last frame \
+            of the arm file.\n\n\
+            The torque of the payload enters over half a second, without a step in HoldPos, Teaching and Pause. \
+            A motion that starts meanwhile waits for this. The payload is not stored: after a power cycle the \
+            controller has no payload.\n\n\
+            Examples:\n  \
+            jtc payload set --mass 2 --com 0,0,0.08\n  \
+            jtc payload set --mass 2 --com 0,0,0.08 --inertia 0.01,0.01,0.004\n  \
+            jtc payload set --mass 2 --com 0.02,0,0.08 --inertia 0.01,0.01,0.004,0,-0.001,0"
     )]
     Set {
         #[command(flatten)]
@@ -23,13 +26,13 @@ pub enum PayloadCommand {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// The arm carries nothing
+    /// Clear the payload
     #[command(after_help = "Examples:\n  jtc payload clear")]
     Clear {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// What the controller computes with
+    /// Show the payload that the controller computes with
     #[command(after_help = "Examples:\n  jtc payload show\n  jtc --json payload show | jq .mass_kg")]
     Show {
         #[command(flatten)]
@@ -40,13 +43,15 @@ pub enum PayloadCommand {
 /// A body at the flange.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct PayloadArgs {
-    /// Mass, kg
+    /// Set the mass, kg
     #[arg(long, value_name = "KG", allow_hyphen_values = true)]
     pub mass: f64,
-    /// Centre of mass in the flange frame, m
+    /// Set the centre of mass in the flange frame, m
     #[arg(long, value_name = "X,Y,Z", value_parser = com, allow_hyphen_values = true)]
     pub com: [f64; 3],
-    /// Inertia about the centre of mass along the axes of the flange, kg·m²: Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz; default: a point mass
+    /// Set the inertia about the centre of mass, kg·m².
+    ///
+    /// Its axes are those of the flange. The order is Ixx,Iyy,Izz or Ixx,Iyy,Izz,Ixy,Ixz,Iyz. Default: a point mass
     #[arg(long, value_name = "IXX,IYY,IZZ[,IXY,IXZ,IYZ]", value_parser = inertia, allow_hyphen_values = true)]
     pub inertia: Option<[f64; 6]>,
 }

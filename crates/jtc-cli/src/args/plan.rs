@@ -13,39 +13,58 @@ use super::{ExecuteArgs, LinkArgs, OverwriteArgs};
 pub struct PlanArgs {
     /// Waypoints, CSV or JSON
     pub file: PathBuf,
-    /// Trajectory to write, .csv
+    /// Write the trajectory to this .csv file
     #[arg(short, long, env = "JTC_PLAN_OUT", value_name = "FILE")]
     pub out: PathBuf,
-    /// How far from a waypoint its corner may be rounded, up to 0.5 rad (with --deg: degrees) of the joint that is furthest; 0: the arm stops at each
+    /// Round corners within this distance, rad (0 to 0.5).
+    ///
+    /// This is the distance from the waypoint of the joint that is furthest away, with --deg in degrees. With 0 the arm
+    /// stops at each waypoint
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
-    /// The flange keeps to a straight line on each leg of which the file does not say how the arm moves
+    /// Keep the flange on straight lines.
+    ///
+    /// This applies to each leg for which the file does not specify how the arm moves
     #[arg(long)]
     pub line: bool,
-    /// How far from a waypoint the corner between two lines or arcs may be rounded, up to 0.5 m; 0: the arm stops there
+    /// Round corners of lines and arcs, m (0 to 0.5).
+    ///
+    /// This is the distance from the waypoint. With 0 the arm stops there
     #[arg(long, value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend_m: f64,
-    /// Speed in percent of what the limits allow, 1 to 100
+    /// Set the speed in percent of the allowed speed (1 to 100)
     #[arg(long, value_name = "PCT", default_value_t = 100.0, allow_hyphen_values = true)]
     pub speed: f64,
     #[command(flatten)]
     pub margin: MarginArgs,
-    /// Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load
+    /// Let the acceleration change in 20 ms instead of 100 ms.
+    ///
+    /// The motion is faster, and harder on gears and load
     #[arg(long)]
     pub no_jerk_limit: bool,
-    /// Arm whose limits, masses and poses count, TOML or URDF; default: the built-in one
+    /// Use limits, masses and poses of this arm, TOML or URDF.
+    ///
+    /// Default: the built-in arm
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// The numbers of the file and --blend are degrees, for files that do not name their unit
+    /// Read the numbers of the file and --blend as degrees.
+    ///
+    /// This is for files that do not name their unit
     #[arg(long)]
     pub deg: bool,
-    /// What the arm carries at its flange: kg, or kg and its place in the flange frame in m
+    /// Plan with this payload at the flange, kg.
+    ///
+    /// X,Y,Z is its position in the flange frame, m
     #[arg(long, value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried, allow_hyphen_values = true)]
     pub payload: Option<jtc_core::Payload>,
-    /// Lowest bearing temperature at which it will be run, °C: cold bearings take more torque
+    /// Set the lowest bearing temperature of the runs, °C.
+    ///
+    /// Cold bearings need more torque
     #[arg(long, value_name = "C", default_value_t = 20.0, allow_hyphen_values = true)]
     pub temperature: f64,
-    /// Write a page with the motion, its limits and what binds when, .html
+    /// Write a report page to this .html file.
+    ///
+    /// The page shows the motion, its limits, and the limit that binds at each time
     #[arg(long, env = "JTC_PLAN_REPORT", value_name = "FILE")]
     pub report: Option<PathBuf>,
     #[command(flatten)]
@@ -56,7 +75,7 @@ pub struct PlanArgs {
 #[derive(Args, Debug)]
 #[command(group = clap::ArgGroup::new("target").required(true))]
 pub struct MoveArgs {
-    /// Joint positions, rad, or the name of a pose of the arm file
+    /// Move to joint positions, rad, or to a pose of the arm file
     #[arg(
         long,
         value_name = "Q1,…,Q6|NAME",
@@ -65,7 +84,9 @@ pub struct MoveArgs {
         group = "target"
     )]
     pub to: Option<Target>,
-    /// A pose of the flange in the base frame instead: m, and roll, pitch and yaw in rad
+    /// Move the flange to a pose in the base frame.
+    ///
+    /// X,Y,Z in m; roll, pitch and yaw in rad
     #[arg(
         long,
         value_name = "X,Y,Z,ROLL,PITCH,YAW",
@@ -74,18 +95,24 @@ pub struct MoveArgs {
         group = "target"
     )]
     pub to_flange: Option<[f64; 6]>,
-    /// The flange keeps to a straight line
+    /// Move the flange along a straight line
     #[arg(long)]
     pub line: bool,
-    /// The positions, or roll, pitch and yaw, are degrees; not for poses by name, whose unit is known
+    /// Read positions, or roll, pitch and yaw, as degrees.
+    ///
+    /// This is not for named poses, whose unit is known
     #[arg(long)]
     pub deg: bool,
-    /// Speed in percent of what the limits allow, 1 to 100; default: 10, and 25 in a simulator
+    /// Set the speed in percent of the allowed speed (1 to 100).
+    ///
+    /// Default: 10, and 25 in a simulator
     #[arg(long, value_name = "PCT", allow_hyphen_values = true)]
     pub speed: Option<f64>,
     #[command(flatten)]
     pub margin: MarginArgs,
-    /// Arm file with the poses, whose limits and masses count; default: the arm of the controller
+    /// Use poses, limits and masses of this arm file.
+    ///
+    /// Default: the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     #[command(flatten)]
@@ -95,7 +122,9 @@ pub struct MoveArgs {
 /// Torque that a plan leaves.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct MarginArgs {
-    /// Torque to leave for what the model does not know, percent of each limit, 0 to 50
+    /// Reserve torque, in percent of each limit (0 to 50).
+    ///
+    /// The reserve is for masses and friction that the model does not know
     #[arg(
         long = "margin",
         alias = "torque-margin",
@@ -107,7 +136,7 @@ pub struct MarginArgs {
     pub percent: f64,
 }
 
-/// Where a move leads.
+/// Target of a move.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// As typed, base to wrist.
@@ -150,34 +179,39 @@ fn numbers(text: &str) -> Result<Vec<f64>, String> {
 /// `jtc pose …`
 #[derive(Debug, Subcommand)]
 pub enum PoseCommand {
-    /// Save where the arm is into the arm file
+    /// Save the present position in the arm file
     #[command(
-        after_help = "The arm stands still meanwhile: while a trajectory is executed or a joint is jogged it is refused. The rest of the file stays as it is, comments included.\n\nExamples:\n  \
-                            jtc pose save home --arm my-arm.toml\n  jtc pose save above-table --arm my-arm.toml --overwrite"
+        after_help = "The arm must stand still. The command is refused while a trajectory is executed or a joint is \
+            jogged. The rest of the file stays unchanged, also its comments.\n\n\
+            Examples:\n  \
+            jtc pose save home --arm my-arm.toml\n  \
+            jtc pose save above-table --arm my-arm.toml --overwrite"
     )]
     Save {
-        /// A letter, then letters, digits, _, - and .
+        /// Name of the pose.
+        ///
+        /// A name is a letter, then letters, digits and the characters . _ -
         name: String,
         #[command(flatten)]
         arm: PoseArm,
         #[command(flatten)]
         link: LinkArgs,
-        /// Write over a pose of this name
+        /// Overwrite a pose of this name
         #[arg(long, alias = "force")]
         overwrite: bool,
     },
-    /// All poses of the arm file
+    /// List all poses of the arm file
     #[command(
         after_help = "Examples:\n  jtc pose list --arm my-arm.toml\n  jtc --json pose list --arm my-arm.toml | jq .poses_rad.home"
     )]
     List {
         #[command(flatten)]
         arm: PoseArm,
-        /// Positions in degrees
+        /// Show positions in degrees
         #[arg(long)]
         deg: bool,
     },
-    /// Take a pose out of the arm file
+    /// Remove a pose from the arm file
     #[command(after_help = "Examples:\n  jtc pose remove above-table --arm my-arm.toml")]
     Remove {
         /// Name of the pose
@@ -190,7 +224,9 @@ pub enum PoseCommand {
 /// The file that holds the poses.
 #[derive(Args, Debug)]
 pub struct PoseArm {
-    /// Arm file, TOML; `jtc example arm` writes one, `jtc arm pull` that of the controller
+    /// Use this arm file, TOML.
+    ///
+    /// `jtc example arm` writes an example, and `jtc arm pull` writes the arm of the controller
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: PathBuf,
 }

@@ -13,58 +13,81 @@ use super::LinkArgs;
 /// Options of `jtc serve`.
 #[derive(Args, Debug)]
 pub struct ServeArgs {
-    /// A simulated controller instead of a port
+    /// Use a simulated controller instead of a port
     #[arg(long, env = "JTC_SIM", value_parser = on_off, conflicts_with = "port")]
     pub sim: bool,
-    /// Arm, TOML or URDF: the one to simulate with --sim, which the controller has stored where the file is complete, and that of a
-    /// controller that cannot be asked for its own; default: the built-in one
+    /// Use this arm, TOML or URDF (default: the built-in arm).
+    ///
+    /// With --sim, the agent simulates this arm. The simulated controller has stored it if the file is complete.
+    /// Without --sim, this is the arm of a controller that cannot report its own
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Address to listen at; beyond this computer everyone needs a token
+    /// Listen at this address.
+    ///
+    /// Clients on other computers always need a token
     #[arg(long, env = "JTC_LISTEN", value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8780")]
     pub listen: SocketAddr,
-    /// Name by which others ask for this agent, beside its address; more than once, or with commas, for several
+    /// Accept this host name for the agent, besides its address.
+    ///
+    /// Repeat the option, or use commas, for several names
     #[arg(long = "name", env = "JTC_AGENT_NAMES", value_name = "HOST", value_delimiter = ',')]
     pub names: Vec<String>,
-    /// Origins whose pages may look
+    /// Allowed origins.
     #[arg(
         long = "allow-origin",
-        help = "Origin whose pages may look, as https://app.foxglove.dev, or file:// for desktop applications; more than once, or with \
-                commas, for several",
+        help = "Allow pages of this origin read-only access, as https://app.foxglove.dev, or file:// for desktop \
+            applications. Repeat the option, or use commas, for several origins",
         env = "JTC_ALLOW_ORIGINS",
         value_name = "ORIGIN",
         value_delimiter = ',',
         value_parser = jtc_agent::access::origin
     )]
     pub allow_origins: Vec<String>,
-    /// Print the link of the dashboard with the operator's token, on a terminal; otherwise it is printed once, when it is made
+    /// Print the dashboard link with the operator's token.
+    ///
+    /// The link is printed only on a terminal. Without this option it is printed once, when the token is made
     #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
-    /// File to which each command is appended: who, what, when, result
+    /// Append each command to this file.
+    ///
+    /// The file shows the client, the command, the time and the result
     #[arg(long, env = "JTC_COMMAND_LOG", value_name = "FILE")]
     pub command_log: Option<PathBuf>,
-    /// Room that the log takes at most: it is put aside as FILE.1 when it has half of it
+    /// Limit the size of the command log.
+    ///
+    /// At half of this size, the log is renamed to FILE.1
     #[arg(long, env = "JTC_COMMAND_LOG_LIMIT", value_name = "SIZE", default_value = "100MB", value_parser = log_size)]
     pub command_log_limit: u64,
-    /// Directory that keeps trajectories by number, as files like 7-pick.csv; without it they are kept as long as the agent runs
+    /// Keep trajectories in this directory.
+    ///
+    /// The files have their number in their name, as 7-pick.csv. Without this option, the agent keeps trajectories
+    /// while it runs
     #[arg(long, env = "JTC_TRAJECTORIES", value_name = "DIR")]
     pub trajectories: Option<PathBuf>,
-    /// Certificate chain, PEM: the agent speaks TLS
+    /// Use TLS with this certificate chain, PEM
     #[arg(long, env = "JTC_TLS_CERT", value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
-    /// Private key of that certificate, PEM; no other user may read it
+    /// Use this private key of the certificate, PEM.
+    ///
+    /// Other users must not be able to read the file
     #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
-    /// Directory for recordings: one of each motion, whoever commanded it
+    /// Record each motion of every client to this directory
     #[arg(long, env = "JTC_RECORD", value_name = "DIR")]
     pub record: Option<PathBuf>,
-    /// Room that recordings take at most: the oldest of this directory's agents are removed first
+    /// Limit the size of the recordings.
+    ///
+    /// The oldest recordings of this directory's agents are removed first
     #[arg(long, env = "JTC_RECORD_LIMIT", value_name = "SIZE", default_value = "2GB", value_parser = record_size)]
     pub record_limit: u64,
-    /// Address at which a PLC drives the arm by Modbus TCP, which knows no tokens; by default only from this computer
+    /// Let a PLC drive the arm by Modbus TCP at this address.
+    ///
+    /// Modbus does not have tokens. By default only this computer can connect
     #[arg(long, env = "JTC_MODBUS", value_name = "ADDRESS:PORT")]
     pub modbus: Option<SocketAddr>,
-    /// Address or network (192.168.0.0/24) that alone may connect by Modbus; more than once, or with commas, for several
+    /// Allow Modbus only from this address or network.
+    ///
+    /// A network is, for example, 192.168.0.0/24. Repeat the option, or use commas, for several
     #[arg(long, env = "JTC_MODBUS_ALLOW", value_name = "CIDR", value_delimiter = ',', requires = "modbus")]
     pub modbus_allow: Vec<Network>,
     #[command(flatten)]

@@ -9,23 +9,23 @@ use jtc_sim::{DriveConfig, Gear};
 
 use super::OverwriteArgs;
 
-/// How fast virtual time runs.
+/// Speed of virtual time.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum SimSpeed {
-    /// As a real arm.
+    /// Run at the speed of a real arm.
     Realtime,
-    /// As fast as this computer can.
+    /// Run as fast as this computer can.
     Max,
 }
 
-/// What carries a simulated arm while its drives do not.
+/// Support of a simulated arm while its drives do not hold it.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum SimSupport {
-    /// Nothing: the arm falls from the start until its drives are enabled, and after an error
+    /// No support: the arm falls from the start until its drives are enabled, and after an error
     None,
     /// A stand until all drives were enabled once; after that the arm falls, as with the known drives
     Stand,
-    /// Holding brakes, which close at once when a drive is not enabled
+    /// Holding brakes that close at once if a drive is not enabled
     Brakes,
 }
 
@@ -56,12 +56,12 @@ fn of_joints(text: &str, (low, high): (f64, f64), unit: &str) -> Result<[f64; JO
 /// Options of `jtc demo`.
 #[derive(Args, Debug)]
 pub struct DemoArgs {
-    /// Directory for recording, report and picture
+    /// Write recording, report and picture to this directory
     #[arg(long, env = "JTC_DEMO_DIR", value_name = "DIR", default_value = "demo")]
     pub out: PathBuf,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// How fast virtual time runs
+    /// Set the speed of virtual time
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Max)]
     pub speed: SimSpeed,
 }
@@ -69,47 +69,67 @@ pub struct DemoArgs {
 /// Options of `jtc sim`.
 #[derive(Args, Debug)]
 pub struct SimArgs {
-    /// Path that becomes a symbolic link to the pseudo-terminal; default: its own name is printed
+    /// Make this path a symbolic link to the pseudo-terminal.
+    ///
+    /// By default the command prints the name of the pseudo-terminal
     #[arg(long, env = "JTC_SERIAL", value_name = "PATH")]
     pub serial: Option<PathBuf>,
-    /// Arm to simulate, TOML or URDF, which the controller has stored where the file is complete; default: the built-in one
+    /// Simulate this arm, TOML or URDF (default: the built-in arm).
+    ///
+    /// The simulated controller has stored the arm if the file is complete
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// What the simulated arm carries at its flange, and the controller is not given: kg, or kg and its place in the flange frame in m
+    /// Put a payload at the flange that the controller does not know.
+    ///
+    /// The mass is in kg. X,Y,Z is its position in the flange frame, m
     #[arg(long, env = "JTC_SIM_PAYLOAD", value_name = "KG[,X,Y,Z]", value_parser = super::payload::carried)]
     pub payload: Option<jtc_core::Payload>,
-    /// What carries the simulated arm while its drives do not: brakes, a stand until all drives were enabled once, or nothing
+    /// Choose the support of the arm while its drives are off
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = SimSupport::Brakes)]
     pub support: SimSupport,
-    /// Stiffness of the gears between motor and link, N·m/rad: of all joints, or of each; default: rigid
+    /// Set the gear stiffness between motor and link, N·m/rad.
+    ///
+    /// Give one number for all joints, or one for each. Default: rigid
     #[arg(long, value_name = "K[,K2,…,K6]", value_parser = gears, allow_hyphen_values = true)]
     pub gear_stiffness: Option<[f64; JOINTS]>,
-    /// Speed at which the simulated drives trip, rad/s: of all joints, or of each; default: 1.2 times the velocity limit
+    /// Set the speed at which the drives trip, rad/s.
+    ///
+    /// Give one number for all joints, or one for each. Default: 1.2 times the velocity limit
     #[arg(long, value_name = "V[,V2,…,V6]", value_parser = over_speed, allow_hyphen_values = true)]
     pub over_speed: Option<[f64; JOINTS]>,
-    /// File that keeps a stored arm, as the flash of a board does: read at the start, written by `jtc arm push --store`
+    /// Keep a stored arm in this file, as the flash of a board does.
+    ///
+    /// The simulator reads the file at the start. `jtc arm push --store` writes it
     #[arg(long, env = "JTC_STORE_FILE", value_name = "FILE")]
     pub store: Option<PathBuf>,
-    /// Rate of the simulated line, Bd: it is as slow as a real one
+    /// Set the rate of the simulated line, Bd (300 to 15000000).
+    ///
+    /// The line is as slow as a real one
     #[arg(long, env = "JTC_BAUD", value_name = "N", default_value_t = 115_200,
           value_parser = clap::value_parser!(u32).range(300..=15_000_000))]
     pub baud: u32,
-    /// Bytes take no time on the line
+    /// Send bytes over the line without delay
     #[arg(long, env = "JTC_NO_THROTTLE", value_parser = on_off)]
     pub no_throttle: bool,
-    /// How fast virtual time runs
+    /// Set the speed of virtual time
     #[arg(long, env = "JTC_SPEED", value_enum, default_value_t = SimSpeed::Realtime)]
     pub speed: SimSpeed,
-    /// Seed of all that is drawn by chance: the same seed gives the same bytes
+    /// Set the seed of random numbers; equal seeds give equal bytes
     #[arg(long, env = "JTC_SEED", value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Faults to inject, TOML; `jtc explain faults` shows the form
+    /// Inject the faults of this TOML file.
+    ///
+    /// `jtc explain faults` shows the format
     #[arg(long, env = "JTC_FAULTS", value_name = "FILE")]
     pub faults: Option<PathBuf>,
-    /// Put the joint bus on a CAN URL too, as multicast:239.74.163.2:43113
+    /// Connect the joint bus also to this CAN URL.
+    ///
+    /// For example multicast:239.74.163.2:43113
     #[arg(long, env = "JTC_BUS", value_name = "URL")]
     pub bus: Option<String>,
-    /// Record every millisecond from power-up on, .mcap or .csv: commanded and measured positions, velocities, torques, states
+    /// Record every millisecond from power-up, .mcap or .csv.
+    ///
+    /// The recording has commanded and measured positions, velocities, torques and states
     #[arg(long, env = "JTC_SIM_RECORD", value_name = "FILE")]
     pub record: Option<PathBuf>,
     #[command(flatten)]

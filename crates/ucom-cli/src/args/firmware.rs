@@ -8,12 +8,12 @@ use cli_kit::variables::on_off;
 use super::boards::{Boards, flash_id};
 use super::{ForceArgs, ValueEnum};
 
-/// What an address of a record counts.
+/// Unit of the addresses of records.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum Addresses {
-    /// Bytes.
+    /// Count bytes.
     Byte,
-    /// Words of two bytes.
+    /// Count words of two bytes.
     Word,
 }
 
@@ -23,57 +23,81 @@ pub struct UpdateArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
-    /// Image: Intel HEX, S-record, or raw bytes in a .bin (anything else raw needs --raw)
+    /// Image to write.
+    ///
+    /// Formats: Intel HEX, S-record, or raw bytes in a .bin file. Other raw files need --raw
     #[arg(value_name = "IMAGE")]
     pub image: PathBuf,
-    /// Take files of any name as raw bytes; never records, and text only from a .bin
+    /// Read files of any name as raw bytes.
+    ///
+    /// Records are never read as raw bytes, and text only from a .bin file
     #[arg(long)]
     pub raw: bool,
-    /// What the addresses of Intel HEX and S-records count; default: words in S-records and bytes in Intel HEX, unless the records
-    /// follow each other in the other unit alone
+    /// Set the unit of the addresses in Intel HEX and S-records.
+    ///
+    /// Default: words in S-records and bytes in Intel HEX, unless the records follow each other only in the other unit
     #[arg(long, value_enum, value_name = "UNIT")]
     pub addresses: Option<Addresses>,
     /// Fill gaps between records with FF, the erased state of flash
     #[arg(long)]
     pub fill_gaps: bool,
-    /// The flash number that the board must have
+    /// Require this flash number of the board
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
-    /// Flash date to write, or its 16 bits as 0x3AC1; default: today, and a board that shows the program keeps its date
+    /// Write this flash date, or its 16 bits as 0x3AC1.
+    ///
+    /// Default: today. A board that shows the program keeps its date
     #[arg(long, value_name = "YYYY-MM-DD")]
     pub date: Option<String>,
-    /// Check everything, send nothing that changes a board
+    /// Check everything, but send nothing that changes a board
     #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
-    /// Start the application afterwards and see that it runs
+    /// Start the application afterwards, and check that it runs
     #[arg(long)]
     pub start: bool,
-    /// Write the board's flash number into the header, so that no other board takes the image
+    /// Write the board's flash number into the header.
+    ///
+    /// Then no other board accepts the image
     #[arg(long, conflicts_with = "group")]
     pub name_target: bool,
-    /// All these boards with one transfer, by broadcast, instead of one after the other
+    /// Program all boards by one broadcast transfer.
+    ///
+    /// Without this option the boards are programmed one after the other
     #[arg(long)]
     pub group: bool,
-    /// Exloader for RAM, with the profile's `prog.plan` exloader-app
+    /// Send this exloader for RAM.
+    ///
+    /// The profile must have `prog.plan` exloader-app
     #[arg(long, value_name = "FILE")]
     pub exloader: Option<PathBuf>,
-    /// Image of data memory, with `prog.plan` pmem-xmem
+    /// Write this image of data memory.
+    ///
+    /// The profile must have `prog.plan` pmem-xmem
     #[arg(long, value_name = "FILE")]
     pub data: Option<PathBuf>,
-    /// File of the second cycle, with `prog.plan` raw; default: IMAGE again
+    /// Send this file in the second cycle (default: IMAGE again).
+    ///
+    /// The profile must have `prog.plan` raw
     #[arg(long, value_name = "FILE")]
     pub second: Option<PathBuf>,
-    /// Program ID that the board must show at the end, where the image does not contain it
+    /// Require this Program ID at the end.
+    ///
+    /// This is for images that do not contain the Program ID
     #[arg(long, value_name = "ID", value_parser = program_id)]
     pub expect_program_id: Option<u16>,
-    /// Accept as done what cannot be verified: exit code 0 for `program-up-to-date`, and where the profile leaves nothing to
-    /// compare
+    /// Accept an update that cannot be verified.
+    ///
+    /// The exit code is then 0 for `program-up-to-date`, and if the profile leaves nothing to compare
     #[arg(long)]
     pub unverified: bool,
-    /// Write also where the board shows this program already; lifts no check
+    /// Write also if the board already shows this program.
+    ///
+    /// The option does not skip any check
     #[arg(long)]
     pub rewrite: bool,
-    /// Flash numbers of the boards, as `ucom init` wrote them; updates keep there what they wrote
+    /// Read the flash numbers from this inventory of `ucom init`.
+    ///
+    /// Updates record there what they wrote
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]
@@ -86,10 +110,12 @@ pub struct RepairArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub board: u8,
-    /// The flash number that the board must have; default: as the inventory has it
+    /// Require this flash number of the board.
+    ///
+    /// Default: the flash number in the inventory
     #[arg(long, value_name = "ID", value_parser = flash_id)]
     pub flash_id: Option<u16>,
-    /// Flash numbers of the boards, as `ucom init` wrote them
+    /// Read the flash numbers from this inventory of `ucom init`
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]

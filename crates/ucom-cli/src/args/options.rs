@@ -12,22 +12,30 @@ use super::{ForceArgs, OverwriteArgs, ValueEnum};
 /// Options of `ucom sim`.
 #[derive(Args, Debug)]
 pub struct SimArgs {
-    /// Number of boards, 0..31; default: those of the chain file
+    /// Simulate this number of boards (0 to 31).
+    ///
+    /// Default: the boards of the chain file
     #[arg(long, env = "UCOM_BOARDS", value_name = "N", value_parser = clap::value_parser!(u8).range(0..=31))]
     pub boards: Option<u8>,
-    /// Flash numbers along the chain, as 0x21,0x42
+    /// Set the flash numbers along the chain, as 0x21,0x42
     #[arg(long, env = "UCOM_FLASH_IDS", value_name = "LIST", value_delimiter = ',', value_parser = flash_id)]
     pub flash_ids: Vec<u16>,
-    /// Where clients of the socketcand protocol connect; port 0 takes a free one
+    /// Listen here for clients of the socketcand protocol.
+    ///
+    /// With port 0 the simulator takes a free port
     #[arg(long, env = "UCOM_LISTEN", value_name = "HOST:PORT", default_value = "127.0.0.1:29536")]
     pub listen: String,
-    /// Boards of the chain, TOML; default: a built-in head
+    /// Simulate the boards of this TOML file.
+    ///
+    /// Default: a built-in head
     #[arg(long, env = "UCOM_CHAIN", value_name = "FILE")]
     pub chain: Option<PathBuf>,
-    /// Faults to inject, TOML; `ucom help faults` shows the form
+    /// Inject the faults of this TOML file.
+    ///
+    /// `ucom help faults` shows the format
     #[arg(long, env = "UCOM_FAULTS", value_name = "FILE")]
     pub faults: Option<PathBuf>,
-    /// Seed of all that is drawn by chance
+    /// Set the seed of random numbers
     #[arg(long, env = "UCOM_SEED", value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }
@@ -35,17 +43,17 @@ pub struct SimArgs {
 /// Options of `ucom init`.
 #[derive(Args, Debug)]
 pub struct InitArgs {
-    /// Inventory to write, and to compare with when it is there
+    /// Write this inventory, and compare it if it exists
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Write the inventory anew, whatever stood in it before
+    /// Write a new inventory, and ignore the old contents
     #[arg(long)]
     pub renew: bool,
     #[command(flatten)]
     pub force: ForceArgs,
 }
 
-/// Which boards.
+/// Option that selects the boards.
 #[derive(Args, Debug)]
 pub struct BoardsArgs {
     /// Board number, list, range, or all
@@ -59,13 +67,15 @@ pub struct StatusArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Bits to set, as ASTART,OPINIT
+    /// Set these bits, as ASTART,OPINIT
     #[arg(long, value_name = "BITS", value_parser = bits)]
     pub set: Option<ucom::Status>,
-    /// Bits to clear
+    /// Clear these bits
     #[arg(long, value_name = "BITS", value_parser = bits)]
     pub clear: Option<ucom::Status>,
-    /// One PC_SETSTATUS as it is: mask and value as hexadecimal bytes, value bits outside the mask included
+    /// Send one PC_SETSTATUS unchanged.
+    ///
+    /// Mask and value are hexadecimal bytes. Value bits outside the mask are sent too
     #[arg(long, value_name = "MASK:VALUE", value_parser = raw_status, conflicts_with_all = ["set", "clear"])]
     pub raw: Option<(u8, u8)>,
     #[command(flatten)]
@@ -98,7 +108,7 @@ pub struct StopArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS")]
     pub boards: Boards,
-    /// Only end control; the application stays started
+    /// Stop only control; the application stays started
     #[arg(long)]
     pub control_only: bool,
 }
@@ -109,25 +119,29 @@ pub struct IoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Begin a signal table of all names, TOML; - is stdout
+    /// Write a template of a signal table to this TOML file.
+    ///
+    /// The template has all names. - is stdout
     #[arg(long, env = "UCOM_TEMPLATE", value_name = "FILE")]
     pub template: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Taken from older scripts: there is no check of the bus to overrule
+    /// Accepted for older scripts, without effect
     #[arg(long, hide = true)]
     pub force: bool,
 }
 
-/// Where descriptions are kept.
+/// Options of the cache of descriptions.
 #[derive(Args, Clone, Debug)]
 pub struct CacheArgs {
-    /// Ask the board even when its descriptions are known
+    /// Ask the board also if its descriptions are known
     #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
-    /// Directory of known descriptions; default: ucom in the user's cache directory
+    /// Keep known descriptions in this directory.
+    ///
+    /// Default: ucom in the user's cache directory
     #[arg(long, env = "UCOM_CACHE", value_name = "DIR")]
     pub cache: Option<PathBuf>,
 }
@@ -138,10 +152,14 @@ pub struct CiArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = one_board)]
     pub board: u8,
-    /// NAME=VALUE; a name as `ucom io` shows it, in any case, with or without its unit, or an index
+    /// Name, or index, and value.
+    ///
+    /// `ucom io` shows the names. Upper and lower case are equal, and you can omit the unit
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
-    /// Run the board under supervision for so many seconds, outputs active
+    /// Run the board under supervision for this time, s.
+    ///
+    /// The outputs are active: the board moves
     #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
@@ -153,22 +171,28 @@ pub struct CiArgs {
 /// Options of `ucom par`.
 #[derive(Args, Debug)]
 pub struct ParArgs {
-    /// Board number, list, range, or all; with --apply those of the file
+    /// Board number, list, range, or all.
+    ///
+    /// With --apply the boards are those of the file
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// NAME=VALUE; a name as `ucom io` shows it, in any case, with or without its unit, or an index
+    /// Name, or index, and value.
+    ///
+    /// `ucom io` shows the names. Upper and lower case are equal, and you can omit the unit
     #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
-    /// Write a parameter file, YAML: what was written last, and all other names as comments; - is stdout
+    /// Write a parameter file, YAML; - is stdout.
+    ///
+    /// The file has the values that were written last, and all other names as comments
     #[arg(long, env = "UCOM_SAVE", value_name = "FILE", conflicts_with = "apply")]
     pub save: Option<PathBuf>,
     /// Check a parameter file against the boards, then write its parameters
     #[arg(long, value_name = "FILE")]
     pub apply: Option<PathBuf>,
-    /// With --apply: check everything, write nothing
+    /// Check everything with --apply, but write nothing
     #[arg(long, env = "UCOM_DRY_RUN", value_parser = on_off)]
     pub dry_run: bool,
-    /// Names of the boards, as `ucom init` wrote them
+    /// Read the names of the boards from this inventory
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
     #[command(flatten)]
@@ -185,22 +209,22 @@ pub struct SoArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// End after so many snapshots
+    /// End after this number of snapshots
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    /// A CSV table: time_s, board, then a column for each output
+    /// Print CSV: time_s, board, then one column per output
     #[arg(long, env = "UCOM_CSV", value_parser = on_off)]
     pub csv: bool,
     #[command(flatten)]
     pub cache: CacheArgs,
 }
 
-/// What happens when a board's heartbeats stop.
+/// Action when the heartbeats of a board stop.
 #[derive(Clone, Copy, Debug, Eq, PartialEq, ValueEnum)]
 pub enum OnLost {
-    /// Only report it.
+    /// Only report the lost board.
     Report,
-    /// Stop that board's control.
+    /// Stop control of the lost board.
     StopBoard,
     /// Stop control of all boards.
     StopAll,
@@ -212,31 +236,35 @@ pub struct RunArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Enable the outputs: things move
+    /// Enable the outputs (boards move)
     #[arg(long)]
     pub active: bool,
-    /// Inputs to begin with, BOARD.NAME=VALUE
+    /// Set first inputs, as BOARD.NAME=VALUE
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub ci: Vec<Assignment>,
-    /// Parameters to begin with, BOARD.NAME=VALUE
+    /// Set parameters before the start, as BOARD.NAME=VALUE
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub par: Vec<Assignment>,
-    /// Parameters and first inputs from a file, YAML; `ucom help params` shows the form
+    /// Read parameters and first inputs from this YAML file.
+    ///
+    /// `ucom help params` shows the format
     #[arg(long, value_name = "FILE")]
     pub params: Option<PathBuf>,
-    /// Names of the boards, as `ucom init` wrote them
+    /// Read the names of the boards from this inventory
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// What to do when a board is lost; default: the profile's on_lost
+    /// Set the action for a lost board.
+    ///
+    /// Default: on_lost of the profile
     #[arg(long, value_enum, value_name = "POLICY")]
     pub on_lost: Option<OnLost>,
-    /// Have the boards send the texts of their applications
+    /// Make the boards send the texts of their applications
     #[arg(long)]
     pub debug: bool,
-    /// Have the boards send all their texts (global debug)
+    /// Make the boards send all their texts (global debug)
     #[arg(long)]
     pub global_debug: bool,
-    /// End after so many seconds
+    /// End after this time, s
     #[arg(long = "for", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
     #[command(flatten)]
@@ -248,10 +276,10 @@ pub struct RunArgs {
 /// Options of `ucom monitor`.
 #[derive(Args, Debug)]
 pub struct MonitorArgs {
-    /// End after so many views, one a second
+    /// End after this number of views, one per second
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    /// Send nothing at all, not even PC_INFO
+    /// Only listen: send no frames, not even PC_INFO
     #[arg(long, env = "UCOM_LISTEN_ONLY", value_parser = on_off)]
     pub listen_only: bool,
 }
@@ -259,15 +287,15 @@ pub struct MonitorArgs {
 /// Options of `ucom record`.
 #[derive(Args, Debug)]
 pub struct RecordArgs {
-    /// File to write, .log .fzi .mcap, or - for stdout
+    /// File to write: .log, .fzi, .mcap, or - for stdout
     pub file: PathBuf,
-    /// End after so many seconds
+    /// End after this time, s
     #[arg(long = "for", env = "UCOM_FOR", value_name = "S", value_parser = seconds)]
     pub duration: Option<Duration>,
-    /// End after so many frames
+    /// End after this number of frames
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
-    /// Write over output files that are there already
+    /// Overwrite existing output files
     #[arg(long, alias = "force")]
     pub overwrite: bool,
 }
@@ -275,12 +303,14 @@ pub struct RecordArgs {
 /// Options of `ucom replay`.
 #[derive(Args, Debug)]
 pub struct ReplayArgs {
-    /// Recording, .log .fzi .mcap
+    /// Recording: .log, .fzi or .mcap
     pub file: PathBuf,
-    /// Send frames too that reset, number, program, start or move boards
+    /// Send also frames that change boards.
+    ///
+    /// These frames reset, number, program, start or move boards
     #[arg(long)]
     pub intrusive: bool,
-    /// Times the original speed
+    /// Set the speed as a factor of the original speed
     #[arg(long, value_name = "X", default_value_t = 1.0)]
     pub speed: f64,
     #[command(flatten)]
@@ -290,10 +320,14 @@ pub struct ReplayArgs {
 /// Options of `ucom send`.
 #[derive(Args, Debug)]
 pub struct SendArgs {
-    /// Frames as candump writes them: ID#DATA, 240#, 1C1#0202, 12345678#11, 123#R
+    /// Frames as candump writes them, ID#DATA.
+    ///
+    /// For example 240#, 1C1#0202, 12345678#11, 123#R
     #[arg(value_name = "FRAME", required = true)]
     pub frames: Vec<String>,
-    /// Send frames too that reset, number, program, start or move boards
+    /// Send also frames that change boards.
+    ///
+    /// These frames reset, number, program, start or move boards
     #[arg(long)]
     pub intrusive: bool,
 }
@@ -301,13 +335,15 @@ pub struct SendArgs {
 /// Options of `ucom decode`.
 #[derive(Args, Debug)]
 pub struct DecodeArgs {
-    /// Recording, or - for a candump log or bare frames on stdin
+    /// Recording, or - for stdin.
+    ///
+    /// On stdin the command reads a candump log or bare frames
     #[arg(default_value = "-")]
     pub file: PathBuf,
-    /// Decode the bus instead
+    /// Decode the live bus instead
     #[arg(long)]
     pub live: bool,
-    /// End after so many frames
+    /// End after this number of frames
     #[arg(long, value_name = "N")]
     pub count: Option<u64>,
 }
@@ -315,16 +351,22 @@ pub struct DecodeArgs {
 /// Options of `ucom probe`.
 #[derive(Args, Debug)]
 pub struct ProbeArgs {
-    /// Profile to write; default: stdout
+    /// Write the profile to this file (default: stdout)
     #[arg(long, env = "UCOM_PROBE_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
-    /// Measure also what shows only while numbers are given: resets and numbers the chain
+    /// Reset and number the chain to measure more.
+    ///
+    /// Some properties show only while boards are numbered
     #[arg(long)]
     pub init: bool,
-    /// Start a control loop, outputs safe, to see which heartbeats count
+    /// Start a control loop to see which heartbeats count.
+    ///
+    /// The outputs stay safe
     #[arg(long)]
     pub alive: bool,
-    /// Image that is on a board, to find the checksum of Program IDs
+    /// Find the checksum of Program IDs with this image.
+    ///
+    /// The image must be the one on a board
     #[arg(long, env = "UCOM_IMAGE", value_name = "FILE")]
     pub image: Option<PathBuf>,
     #[command(flatten)]
@@ -339,25 +381,35 @@ pub struct ConformanceArgs {
     /// Board number, list, range, or all
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Also tests that reset and number the chain anew, and that set and clear status bits
+    /// Add tests that reset and number the chain.
+    ///
+    /// These tests also set and clear status bits
     #[arg(long)]
     pub init: bool,
-    /// Also tests that start applications and control loops; outputs stay safe; more than a minute a board
+    /// Add tests that start applications and control loops.
+    ///
+    /// Outputs stay safe. The tests take more than a minute per board
     #[arg(long)]
     pub run: bool,
-    /// Also tests that program the one board that is named with this image
+    /// Add tests that program the named board with this image.
+    ///
+    /// Name exactly one board
     #[arg(long, value_name = "IMAGE")]
     pub program: Option<PathBuf>,
-    /// With --program: the flash number that the board must have; default: as the inventory has it
+    /// Require this flash number of the board, with --program.
+    ///
+    /// Default: the flash number in the inventory
     #[arg(long, value_name = "ID", value_parser = super::boards::flash_id)]
     pub flash_id: Option<u16>,
-    /// Flash numbers of the boards, as `ucom init` wrote them
+    /// Read the flash numbers from this inventory of `ucom init`
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Only these tests, as D-T10,D-T11
+    /// Run only these tests, as D-T10,D-T11
     #[arg(long, value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Also when another PC is on the bus; boards that run are never tested with --init, --run or --program
+    /// Test also if another PC is on the bus.
+    ///
+    /// Running boards are never tested with --init, --run or --program
     #[arg(long)]
     pub force: bool,
 }
@@ -368,14 +420,14 @@ pub struct DbcArgs {
     /// Board number, list, range, all, or none
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// File to write; default: stdout
+    /// Write this file (default: stdout)
     #[arg(long, env = "UCOM_DBC_OUT", value_name = "FILE")]
     pub out: Option<PathBuf>,
     #[command(flatten)]
     pub cache: CacheArgs,
     #[command(flatten)]
     pub overwrite: OverwriteArgs,
-    /// Taken from older scripts: there is no check of the bus to overrule
+    /// Accepted for older scripts, without effect
     #[arg(long, hide = true)]
     pub force: bool,
 }
@@ -383,6 +435,8 @@ pub struct DbcArgs {
 /// Options of `ucom explain`.
 #[derive(Args, Debug)]
 pub struct ExplainArgs {
-    /// The word as a screen shows it, or the number of an error; without it: the list
+    /// Word as a screen shows it, or the number of an error.
+    ///
+    /// Without a word, the command lists all words
     pub word: Vec<String>,
 }

@@ -82,12 +82,12 @@ impl Verdict {
                 .into()
         } else if let Some(percent) = passes {
             let load = if has(ProblemKind::NoStop) || has(ProblemKind::Torque) {
-                ", or with a lighter payload"
+                ", or take a lighter payload"
             } else {
                 ""
             };
-            let command = format!("jtc traj run {file} --speed {percent}");
-            Next::from(format!("run it at {percent} % of its speed{load}: "))
+            let command = format!("jtc traj check {file} --speed {percent}");
+            Next::from(format!("lower the speed to {percent} %{load}: "))
                 .then(Next::typed(Action::TrajRunSlower, command))
         } else {
             format!("correct the file; `jtc traj info {file}` shows its figures").into()

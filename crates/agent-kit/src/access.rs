@@ -1,7 +1,8 @@
-//! Who is let in: tokens, and where a request may come from.
+//! Access control: tokens, and checks of the origin of a request.
 //!
-//! A page of another site that somebody has open in a browser can send requests to this computer's own address. It is known by its `Origin`;
-//! and one that has made a name of its own point here (DNS rebinding) by its `Host`. Both are refused, whatever token they have.
+//! A page of another site that is open in a browser can send requests to the address of this computer. Its `Origin`
+//! shows that. A page that has pointed its own name to this computer (DNS rebinding) is recognised by its `Host`. Both
+//! are refused, also with a valid token.
 mod paths;
 mod tokens;
 
@@ -16,77 +17,77 @@ use crate::cut::cut;
 pub use paths::{halts, looks, stops};
 pub use tokens::{Announced, TokenError, Tokens, default_token_file, random, token_file};
 
-/// What a client may do.
+/// Permissions of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
-    /// Look, stop and pause.
+    /// Read-only access, Stop and Pause.
     Viewer,
-    /// All of it, one at a time.
+    /// All requests; one operator holds the lease at a time.
     Operator,
 }
 
-/// Wrong tokens from one address in a minute that are answered as such, and from all.
+/// Wrong tokens per minute that are answered as such: from one address, and from all addresses together.
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
 
-/// Why a request is not let in.
+/// Reason why a request is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// It asks for another name than this agent has.
+    /// Request for a name that this agent does not have.
     #[error("this agent is not {0}: it is asked for by its address, or by a name given with --name")]
     Host(String),
-    /// It was made by a page of another site.
+    /// Request of a page of another site.
     #[error("a page of {0} may not use this agent")]
     Origin(String),
-    /// Its token is none of this agent's.
+    /// Token that does not belong to this agent.
     #[error("the token is none of this agent's")]
     WrongToken,
-    /// It needs a token.
+    /// Request without a token.
     #[error("a token is needed: `Authorization: Bearer …`")]
     NoToken,
-    /// An address stands in histories and logs: the operator's token is not to be there.
+    /// Operator's token in an address; it is refused because addresses are stored in histories and logs.
     #[error("the operator's token may not stand in an address")]
     InAddress,
-    /// Too many wrong tokens came from there.
+    /// Too many wrong tokens from this address.
     #[error("too many wrong tokens came from this address")]
     TooManyWrong,
 }
 
-/// What a request says of itself.
+/// Parts of a request that decide about access.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
-    /// Whose address it comes from.
+    /// Address that the request comes from.
     pub peer: IpAddr,
     /// `Host`.
     pub host: Option<&'a str>,
     /// `Origin`, which browsers send.
     pub origin: Option<&'a str>,
-    /// The token, if it has one.
+    /// Token of the request, if it has one.
     pub token: Option<&'a str>,
-    /// The token in its address, of clients that cannot send it otherwise: the viewer's.
+    /// Token in the address, for clients that cannot send it otherwise; only the viewer's token is accepted there.
     pub address_token: Option<&'a str>,
-    /// It can only look: what it asks for may be shown to pages of origins that are allowed.
+    /// `true` if the request cannot change anything: its answer may be shown to pages of allowed origins.
     pub looks: bool,
-    /// It is a Stop or a Pause ([`halts`]): on this computer these need no token.
+    /// `true` for a Stop or a Pause ([`halts`]), which need no token on this computer.
     pub halts: bool,
 }
 
-/// What a request that is let in may do.
+/// Permissions of an accepted request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Entry {
-    /// By its token.
+    /// Role, given by the token.
     pub role: Role,
-    /// It was made by a page of an origin that is allowed: it may look, and nothing else.
+    /// `true` if a page of an allowed origin made the request: it has read-only access.
     pub looks_only: bool,
 }
 
-/// An origin as browsers send it: scheme, host and port, or `file://`.
+/// Checks an origin as browsers send it: scheme, host and port, or `file://`.
 ///
 /// # Errors
 ///
-/// It is none, or stands for more than one; the error is for people.
+/// The text is not a valid origin, or is a wildcard for several; the error is a message for people.
 pub fn origin(text: &str) -> Result<String, String> {
     let text = text.trim().to_lowercase();
     if text == "file://" {
@@ -101,19 +102,19 @@ pub fn origin(text: &str) -> Result<String, String> {
     }
 }
 
-/// Who is let in.
+/// Access rules of an agent.
 pub struct Access {
     tokens: Tokens,
-    /// Names and addresses, with the port, that this agent is asked for by.
+    /// Names and addresses of this agent, each with the port.
     hosts: Vec<String>,
-    /// Origins whose pages may look.
+    /// Origins whose pages have read-only access.
     origins: Vec<String>,
-    /// When a wrong token came, and from whom.
+    /// Address and time of each wrong token.
     wrong: Mutex<Vec<(IpAddr, Instant)>>,
 }
 
 impl Access {
-    /// Of an agent that listens at `listen`, and has these names beside its address.
+    /// Returns the rules of an agent that listens at `listen` and has these names in addition to its address.
     pub fn new(tokens: Tokens, listen: SocketAddr, names: &[String]) -> Self {
         let port = listen.port();
         let mut hosts: Vec<String> = names
@@ -127,12 +128,12 @@ impl Access {
         Self { tokens, hosts, origins: Vec::new(), wrong: Mutex::new(Vec::new()) }
     }
 
-    /// Pages of these origins, as [`origin`] has them, may look.
+    /// Allows read-only access for pages of these origins, written as [`origin`] returns them.
     pub fn allowing(self, origins: &[String]) -> Self {
         Self { origins: origins.to_vec(), ..self }
     }
 
-    /// What this request may do.
+    /// Returns the permissions of this request.
     ///
     /// # Errors
     ///
@@ -140,14 +141,15 @@ impl Access {
     pub fn enter(&self, request: &Request<'_>) -> Result<Entry, Refusal> {
         let looks_only = self.is_foreign(request)?;
         let role = match self.role(request) {
-            // Without the token it would be served: an old one in a program's settings keeps nobody from stopping the arm.
+            // Without a token this request would be accepted, so an outdated token in a program's settings must not
+            // prevent a Stop.
             Err(_) if request.halts && request.peer.to_canonical().is_loopback() => Role::Viewer,
             role => role?,
         };
         Ok(Entry { role: if looks_only { Role::Viewer } else { role }, looks_only })
     }
 
-    /// The role by the token alone.
+    /// Returns the role that the token alone gives.
     fn role(&self, request: &Request<'_>) -> Result<Role, Refusal> {
         match (request.token, request.address_token) {
             (Some(token), _) => self.bearer(token, request.peer),
@@ -160,7 +162,7 @@ impl Access {
         }
     }
 
-    /// Whether a page of an allowed origin made it, by what it says of itself, without its token.
+    /// Returns `true` if a page of an allowed origin made the request. Checks the headers only, not the token.
     ///
     /// # Errors
     ///
@@ -177,7 +179,7 @@ impl Access {
         }
     }
 
-    /// Whether it asks for this agent by one of its names, and was not made by a page of another site.
+    /// Checks that the request names this agent, and that no page of another site made it.
     ///
     /// # Errors
     ///
@@ -193,7 +195,7 @@ impl Access {
         }
         let Some(origin) = origin else { return Ok(()) };
         let site = origin.to_lowercase();
-        // Its own page, not one of another agent on this computer.
+        // The agent's own page, not a page of another agent on this computer.
         match site.strip_prefix("http://").or_else(|| site.strip_prefix("https://")) {
             Some(own) if own == host => Ok(()),
             _ => Err(Refusal::Origin(cut(origin).into_owned())),
@@ -202,7 +204,8 @@ impl Access {
 
     fn bearer(&self, token: &str, peer: IpAddr) -> Result<Role, Refusal> {
         let is = |other: &str| bool::from(token.as_bytes().ct_eq(other.as_bytes()));
-        // Both are compared, and first: nobody's wrong tokens keep those who have a right one from stopping an arm.
+        // Both tokens are compared before wrong tokens are counted, so that wrong tokens of others never prevent a Stop
+        // by a client with the right one.
         match (is(&self.tokens.operator), is(&self.tokens.viewer)) {
             (true, _) => return Ok(Role::Operator),
             (_, true) => return Ok(Role::Viewer),
@@ -353,7 +356,7 @@ mod tests {
             assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::WrongToken));
         }
         assert_eq!(from(Some(&"o".repeat(42))), Err(Refusal::TooManyWrong));
-        // Nobody is kept out by that who has a right one, or needs none.
+        // Clients with a right token, or that need no token, are still accepted.
         assert_eq!(from(Some(&"o".repeat(43))), Ok(Role::Operator));
         assert_eq!(role(&access, "127.0.0.1", Some(HERE), None, None), Ok(Role::Viewer));
     }
@@ -374,7 +377,7 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // Also when too many wrong ones came.
+        // Also after too many wrong tokens.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");
@@ -399,7 +402,7 @@ mod tests {
                 assert!(text.len() < 320 && text.contains(&evil[..length.min(200)]), "{text}");
             }
         }
-        // An allowed origin is compared whole.
+        // An allowed origin is compared completely, not by its beginning.
         let long = format!("https://{}.example", "a".repeat(300));
         let access = access.allowing(std::slice::from_ref(&long));
         let peer = "127.0.0.1".parse().expect("an address");

@@ -1,4 +1,4 @@
-//! What the APIs of agents share: errors, what is read of a request, and who is in front of every handler.
+//! Parts that the APIs of agents share: errors, extractors for requests, and the identity of the caller.
 use axum::Json;
 use axum::extract::rejection::{JsonRejection, PathRejection, QueryRejection};
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
@@ -7,27 +7,27 @@ use utoipa::IntoResponses;
 
 pub use crate::problem::Problem;
 
-/// What every request may be refused with.
+/// Refusals that every request can receive.
 #[derive(IntoResponses)]
 pub enum Refusals {
-    /// What was asked cannot be read
+    /// The request cannot be read
     #[response(status = 400)]
     Unreadable(Problem),
-    /// The token is missing or none of this agent's
+    /// The token is missing or does not belong to this agent
     #[response(status = 401)]
     Token(Problem),
-    /// The request comes from a page of another site, asks for another name, or has neither token nor lease for what it asks
+    /// The request comes from a page of another site, uses another host name, or lacks the token or lease that it needs
     #[response(status = 403)]
     Elsewhere(Problem),
-    /// The request takes too long, or more than it may
+    /// The request takes longer than allowed
     #[response(status = 408)]
     Slow,
-    /// Too many wrong tokens came
+    /// Too many wrong tokens were sent
     #[response(status = 429)]
     Wrong(Problem),
 }
 
-/// A body of JSON.
+/// JSON body of a request.
 pub struct Body<T>(pub T);
 
 impl<T, S: Send + Sync> FromRequest<S> for Body<T>
@@ -44,7 +44,7 @@ where
     }
 }
 
-/// What stands behind the question mark.
+/// Query parameters of a request.
 pub struct Asked<T>(pub T);
 
 impl<T, S: Send + Sync> FromRequestParts<S> for Asked<T>
@@ -60,7 +60,7 @@ where
     }
 }
 
-/// A number in the path.
+/// Number in the path of a request.
 pub struct Number<T>(pub T);
 
 impl<T, S: Send + Sync> FromRequestParts<S> for Number<T>

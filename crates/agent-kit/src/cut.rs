@@ -1,4 +1,4 @@
-//! Texts of others, as they are logged and echoed: never longer than a line needs.
+//! Shortening of foreign text before it is logged or echoed.
 use std::borrow::Cow;
 
 use serde_json::Value;
@@ -8,12 +8,12 @@ const FOREIGN_MAX: usize = 200;
 /// Longest text of a line of the log of commands, characters.
 const LOGGED_MAX: usize = 1000;
 
-/// At most 200 characters of a text.
+/// Returns at most 200 characters of a text.
 pub(crate) fn cut(text: &str) -> Cow<'_, str> {
     cut_at(text, FOREIGN_MAX)
 }
 
-/// A message with foreign text in it: its beginning and its end, 200 characters each.
+/// Returns the first and the last 200 characters of a message that contains foreign text.
 pub(crate) fn cut_middle(text: &str) -> Cow<'_, str> {
     let length = text.chars().count();
     if length <= 2 * FOREIGN_MAX {
@@ -23,7 +23,7 @@ pub(crate) fn cut_middle(text: &str) -> Cow<'_, str> {
     format!("{}{end}", cut(text)).into()
 }
 
-/// Cuts each text of a line of the log.
+/// Shortens each text of a log line.
 pub(crate) fn cut_texts(value: &mut Value) {
     match value {
         Value::String(text) => {

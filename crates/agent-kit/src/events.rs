@@ -1,4 +1,4 @@
-//! What happens, as it happens: events by number, and a stream of them with what else an agent shows.
+//! Events as numbered lists, and a live stream of events together with the state of an agent.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,72 +15,74 @@ use crate::socket::{ended, pass};
 
 /// Longest that a request waits for an event, s.
 const WAIT_MAX_S: f64 = 8.0;
-/// Events in one answer.
+/// Largest number of events in one answer.
 const EVENTS_MAX: usize = 500;
-/// Requests that wait for an event, at once: more are answered soon. They leave room for the connections of others.
+/// Number of requests that can wait for an event at the same time. Further requests are answered after [`NO_PLACE_S`],
+/// so that connections remain for other clients.
 const WAITING_MAX: usize = 64;
-/// What soon is, s: who asks on at once does not keep the agent busy with that.
+/// Longest wait of a request beyond that number, s; it limits the load by clients that ask again immediately.
 const NO_PLACE_S: f64 = 0.25;
-/// Messages of a stream that are not events come so far apart at least.
+/// Shortest interval between messages of a stream that are not events.
 const PERIOD: Duration = Duration::from_millis(40);
 
-/// Which events.
+/// Selection of events.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct EventsRequest {
-    /// Those behind this number; 0: from the beginning.
+    /// Number of the last event that the client has; 0: from the first event.
     #[serde(default)]
     after: u64,
-    /// Those of this job alone.
+    /// Number of a job: only its events are returned.
     job: Option<u64>,
-    /// Where there is none yet: wait so long for one, s; 8 at most.
+    /// Longest wait for the first event if the list is empty, s; 0 to 8.
     #[serde(default)]
     #[param(minimum = 0, maximum = 8)]
     wait_s: f64,
 }
 
-/// Events, each an [`Entry`]. The description of an API is to list these, and what can happen, by name: it does not find them itself.
+/// Events, each an [`Entry`]. The description of an API must list these types and the event types by name, because they
+/// are not found automatically.
 #[derive(Clone, Debug, Serialize, ToSchema)]
 #[schema(description = "Events.")]
 pub struct EventsObject<E> {
-    /// Which agent this is, by a number that it was given at its start: another one counts its events anew.
+    /// Number that identifies this run of the agent; another run counts its events from 1.
     agent: String,
-    /// Oldest first.
+    /// Events, oldest first.
     events: Vec<E>,
-    /// The number to ask on from.
+    /// Number to use as `after` in the next request.
     last: u64,
-    /// Some that were asked for are not kept any more.
+    /// `true` if some requested events were dropped from the journal.
     missed: bool,
 }
 
-/// Which events a stream begins with.
+/// Start of a stream of events.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StreamRequest {
-    /// Was looked at when it was let in.
+    /// Token; it was checked before.
     #[serde(default, rename = "token")]
     _token: Option<serde::de::IgnoredAny>,
-    /// Those behind this number; missing: those from now on.
+    /// Number of the last event that the client has; missing: only new events.
     after: Option<u64>,
 }
 
-/// The message of a stream that every agent sends.
+/// Message of a stream that every agent sends.
 #[derive(Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage<E> {
-    /// What has happened; none is left out but those that are missed.
+    /// Events in order; only those reported as missed are left out.
     Events(EventsObject<Entry<E>>),
 }
 
-/// What an agent answers about its events.
+/// Event requests of an agent.
 pub struct Events {
     agent: Arc<str>,
     waiting: Semaphore,
 }
 
 impl Events {
-    /// Those of the agent with this number of its own.
+    /// Returns the event requests of the agent with this number of its run.
     pub fn new(agent: Arc<str>) -> Self {
         Self { agent, waiting: Semaphore::new(WAITING_MAX) }
     }
@@ -90,11 +92,11 @@ impl Events {
         EventsObject { agent: self.agent.to_string(), events, last, missed }
     }
 
-    /// What is asked for; where there is none yet, it is waited for, by so many requests at once as have a place.
+    /// Returns the requested events. If the list is empty, waits for the first one; the number of waiting requests is limited.
     ///
     /// # Errors
     ///
-    /// It is to be waited for longer than is possible.
+    /// The requested wait is longer than allowed.
     pub async fn ask<E: Happening>(
         &self,
         journal: &Journal<E>,
@@ -121,8 +123,9 @@ impl Events {
         }
     }
 
-    /// Sends events on a socket as they come, and what `show` returns: messages, and when to look for the next ones where `changes` announces
-    /// none before. Ends when the client has gone, does not read, or sends what it has no business to.
+    /// Sends events on a socket as they occur, and the messages that `show` returns. `show` also returns the time of
+    /// its next call, if `changes` announces no change before. Ends when the client disconnects, does not read, or
+    /// sends a message that is not expected.
     pub async fn stream<E: Happening + Serialize, M: Serialize>(
         &self,
         (journal, request): (&Journal<E>, StreamRequest),
@@ -149,7 +152,7 @@ impl Events {
                     return;
                 }
             }
-            // At most so often; and what comes from the client is nothing but its end.
+            // Limits the rate of messages. From the client, only its end is expected.
             let next = async {
                 period.tick().await;
                 tokio::select! {

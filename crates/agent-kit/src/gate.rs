@@ -1,4 +1,4 @@
-//! In front of every handler.
+//! Access check in front of every handler.
 use std::net::SocketAddr;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -19,12 +19,12 @@ use crate::lease::key_of;
 use crate::log::CommandLog;
 use crate::problem::Denial;
 
-/// What stands before the token among the protocols of a socket.
+/// Prefix of the token in the list of protocols of a socket.
 const BEARER: &str = "bearer.";
-/// Longest name of a client.
+/// Longest name of a client, characters.
 const NAME_MAX: usize = 64;
 
-/// Who is let in, and where it is written down who was not.
+/// Access rules, with the log of refused requests.
 #[derive(Clone)]
 pub struct Gate {
     access: Arc<Access>,
@@ -32,12 +32,13 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// One that lets in whom `access` does.
+    /// Returns a gate with the rules `access`.
     pub fn new(access: Access, log: Arc<Mutex<CommandLog>>) -> Self {
         Self { access: Arc::new(access), log }
     }
 
-    /// A request by one of the agent's own names, and not by a page of another site, whatever else it may do.
+    /// Checks that a request uses a name of this agent and was not made by a page of another site. Checks no
+    /// permissions.
     ///
     /// # Errors
     ///
@@ -52,46 +53,47 @@ impl Gate {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Writes a line to the log of commands about an address that can cause many: the first, then how many there were.
+    /// Writes a line to the log of commands about an address that can cause many lines: the first ones in full, later
+    /// ones as a count.
     pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         log.write_repeated(what, &from.ip().to_string(), facts);
     }
 
-    /// Lines that the log of commands lost.
+    /// Returns the number of lines that the log of commands lost.
     pub fn lost_lines(&self) -> u64 {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).lost_in_all()
     }
 }
 
-/// Who asks.
+/// Client that sends a request.
 #[derive(Clone, Debug)]
 pub struct Caller {
-    /// What it may do.
+    /// Role of the client.
     pub role: Role,
-    /// A page of an origin that is allowed to look, and to do nothing else.
+    /// `true` for a page of an origin with read-only access.
     pub looks_only: bool,
-    /// Where it is.
+    /// Network address of the client.
     pub peer: SocketAddr,
 }
 
-/// Who asks, and with the key of which lease, if it sends one.
+/// Client that sends a request, with the lease key that it sends, if any.
 #[derive(Clone, Debug)]
 pub struct Asker {
-    /// Who it is.
+    /// Client that sends the request.
     pub caller: Caller,
     key: Option<Box<str>>,
 }
 
 impl Asker {
-    /// The key that it sends.
+    /// Returns the lease key that the request contains.
     pub fn key(&self) -> Option<&str> {
         self.key.as_deref()
     }
 }
 
 impl From<Caller> for Asker {
-    /// Who sends no key.
+    /// Returns the caller without a lease key.
     fn from(caller: Caller) -> Self {
         Self { caller, key: None }
     }
@@ -106,17 +108,17 @@ impl<S: Send + Sync> FromRequestParts<S> for Asker {
     }
 }
 
-/// A name without what would disturb a line of text.
+/// Returns a name without control characters, at most 64 characters long.
 pub fn plain(name: &str) -> String {
     name.chars().filter(|c| !c.is_control()).take(NAME_MAX).collect()
 }
 
 impl Caller {
-    /// It may command, when it has the lease.
+    /// Checks that the client may command when it holds the lease.
     ///
     /// # Errors
     ///
-    /// It was let in to look and to stop.
+    /// The client has only read-only access and Stop.
     pub fn operator(&self) -> Result<(), Problem> {
         match self.role {
             Role::Operator => Ok(()),
@@ -129,14 +131,14 @@ impl Caller {
         }
     }
 
-    /// What people call a client that names itself so.
+    /// Returns the name to display for a client with this name; its address if the name is empty.
     pub fn named(&self, name: &str) -> String {
         let name = plain(name);
         if name.is_empty() { self.peer.to_string() } else { name }
     }
 }
 
-/// In front of every handler: who is it, and may it come in?
+/// Middleware in front of every handler: identifies the client and refuses requests that are not allowed.
 pub async fn let_in(
     State(gate): State<Gate>,
     ConnectInfo(peer): ConnectInfo<SocketAddr>,
@@ -157,7 +159,7 @@ pub async fn let_in(
         looks: looks(method, request.uri().path()),
         halts: halts(method, request.uri().path()),
     };
-    // A browser asks without a token whether its page may ask with one.
+    // A browser sends a preflight request without a token, to learn if its page may send one.
     let origin = headers.get(header::ORIGIN).cloned();
     if preflight && gate.access.is_foreign(&asked) == Ok(true) {
         return may_read(StatusCode::NO_CONTENT.into_response(), origin);
@@ -190,12 +192,13 @@ pub async fn let_in(
     }
 }
 
-/// What is asked for, without what may be behind the question mark.
+/// Returns method and path of a request without the query.
 fn line_of(request: &Request<Body>) -> String {
     format!("{} {}", cut(request.method().as_str()), cut(request.uri().path()))
 }
 
-/// In front of every handler behind [`let_in`]: who may not command is refused before anything of the body is read, however slowly it comes.
+/// Middleware after [`let_in`]: refuses clients that may not command before the body is read, because a body can arrive
+/// slowly.
 pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     let (method, path) = (request.method(), request.uri().path());
     let commands = !method.is_safe() && !halts(method.as_str(), path);
@@ -206,7 +209,8 @@ pub async fn may_command(request: Request<Body>, next: Next) -> Response {
     }
 }
 
-/// The token of `Authorization: Bearer TOKEN`; the scheme has no case (RFC 9110, 11.1). Empty, which is nobody's, for any other.
+/// Returns the token of `Authorization: Bearer TOKEN`; the scheme is not case-sensitive (RFC 9110, 11.1). Any other
+/// header gives the empty text, which is never a valid token.
 fn bearer_token(value: &str) -> &str {
     match value.split_once(' ') {
         Some((scheme, token)) if scheme.eq_ignore_ascii_case("bearer") => token.trim(),
@@ -214,7 +218,7 @@ fn bearer_token(value: &str) -> &str {
     }
 }
 
-/// A page of this origin may read it.
+/// Lets a page of this origin read the response.
 fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
     let headers = response.headers_mut();
     if let Some(origin) = origin {
@@ -226,13 +230,13 @@ fn may_read(mut response: Response, origin: Option<HeaderValue>) -> Response {
     response
 }
 
-/// A token behind the question mark.
+/// Token in a query.
 #[derive(serde::Deserialize)]
 struct InAddress {
     token: Option<String>,
 }
 
-/// The token in the address of a socket, for clients that cannot send headers.
+/// Returns the token in the address of a socket, for clients that cannot send headers.
 fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     let socket = headers.contains_key(header::SEC_WEBSOCKET_KEY);
     let looks = ["/", "/api/foxglove", "/api/stream"].contains(&uri.path());
@@ -240,14 +244,15 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     asked.and_then(|Query(asked)| asked.token)
 }
 
-/// The token that a page names beside the protocol of its socket: a browser sends no other header of its choice there, and no history has this one.
+/// Returns the token that a page names in the list of protocols of its socket. A browser lets a page set no other
+/// header there, and this header is stored in no history.
 fn protocol_token(headers: &HeaderMap) -> Option<&str> {
     let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
     protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // One that is no text is there, and is nobody's.
+    // A header that is not text counts as present, but is never valid.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

@@ -1,4 +1,4 @@
-//! Halts are counted: what was asked for before one does nothing behind it, however long it was on its way.
+//! Numbered Stops and Pauses: a request that was issued before one of them moves nothing, however late it arrives.
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use host_kit::Facts;
@@ -6,34 +6,35 @@ use utoipa::IntoParams;
 
 use crate::api::{Asked, Problem};
 
-/// What counts the halts that were asked for.
+/// Counter of requested Stops and Pauses.
 pub trait Halts {
-    /// Number of the last one; 0: there was none.
+    /// Returns the number of the last Stop or Pause; 0: none yet.
     fn last_halt(&self) -> u64;
 }
 
-/// What the client knew when it asked for what may move something.
+/// Last Stop or Pause that the client knew when it requested a motion.
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct KnownHalt {
-    /// `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
-    /// however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
-    /// behind a halt of others.
+    /// Value of `last_halt` in the status that the client used. If another Stop or Pause has been requested since then,
+    /// also by this client, the request moves nothing, however long it was on its way. Missing: the last one when the
+    /// head of this request arrived; the request is also refused within 3 s after a Stop or Pause of another
+    /// client.
     pub asked_after: Option<u64>,
 }
 
-/// The last halt behind which something was asked for: the one that the client names, else the last when its request arrived. That is taken
-/// before its body, which may be long on its way.
+/// Last Stop or Pause before a request: the number that the client names, else the last one when the head of the
+/// request arrived. The number is taken before the body, which may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 
 impl KnownHalt {
-    /// The halt behind which something was asked for, when `last` was the last one that was counted.
+    /// Returns the last Stop or Pause before the request; `last` is the last one that was counted.
     ///
     /// # Errors
     ///
-    /// The client names one that was never counted.
+    /// The client names a number that was never counted.
     pub fn among(self, last: u64) -> Result<AskedAfter, Problem> {
         match self.asked_after {
             Some(known) if known > last => {

@@ -1,39 +1,39 @@
-//! What happened, in its order: events with numbers, so that whoever lost the connection asks for those behind the last one it has.
+//! Journal of numbered events; a client that lost the connection requests the events after the last one it has.
 use std::collections::VecDeque;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use tokio::sync::watch;
 use utoipa::ToSchema;
 
-/// Events that are kept: some hours of work, or the last minutes of one that reports much.
+/// Number of events that are kept: some hours of work, or the last minutes of a device that reports often.
 const KEPT: usize = 4096;
 
-/// What can happen.
+/// Event of a journal.
 pub trait Happening: Clone {
-    /// The job that it is about.
+    /// Returns the job that the event belongs to.
     fn job(&self) -> Option<u64>;
 }
 
-/// An event.
+/// Event with its number and time.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 #[schema(as = EventObject)]
 pub struct Entry<E> {
-    /// Counts up from 1 as long as this agent runs.
+    /// Number of the event; counts up from 1 as long as this agent runs.
     pub number: u64,
-    /// When, s since 1970 by the agent's clock.
+    /// Time of the event by the agent's clock, s since 1970.
     pub unix_s: f64,
-    /// What has happened.
+    /// Event.
     pub event: E,
 }
 
 /// Events from a number on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Excerpt<E> {
-    /// Oldest first.
+    /// Events, oldest first.
     pub events: Vec<Entry<E>>,
-    /// Up to this one nothing else was asked for: the number to ask on from.
+    /// Number to continue from; up to this number there are no further events of the request.
     pub last: u64,
-    /// Some that were asked for are not kept any more.
+    /// `true` if some requested events were dropped from the journal.
     pub missed: bool,
 }
 
@@ -42,10 +42,10 @@ struct Kept<E> {
     last: u64,
 }
 
-/// Who sees each event when it is written.
+/// Callback that receives each event when it is written.
 type Follower<E> = Box<dyn Fn(&E) + Send + Sync>;
 
-/// The events of an agent.
+/// Events of an agent.
 pub struct Journal<E> {
     kept: Mutex<Kept<E>>,
     last: watch::Sender<u64>,
@@ -60,12 +60,13 @@ impl<E> Default for Journal<E> {
 }
 
 impl<E: Happening> Journal<E> {
-    /// Has each event from now on seen by `follower`, in the thread that writes it; the first one stays.
+    /// Sets the callback for each further event; it runs in the thread that writes the event. Only the first call has
+    /// an effect.
     pub fn follow(&self, follower: impl Fn(&E) + Send + Sync + 'static) {
         let _ = self.follower.set(Box::new(follower));
     }
 
-    /// Something has happened.
+    /// Writes an event.
     pub fn write(&self, event: E) {
         if let Some(follower) = self.follower.get() {
             follower(&event);
@@ -78,21 +79,21 @@ impl<E: Happening> Journal<E> {
             kept.events.pop_front();
         }
         kept.events.push_back(Entry { number, unix_s: unix.as_secs_f64(), event });
-        // In the order of the numbers.
+        // Under the lock, so that the numbers are announced in order.
         self.last.send_replace(number);
     }
 
-    /// Number of the last event; 0: there was none.
+    /// Returns the number of the last event; 0: none yet.
     pub fn last(&self) -> u64 {
         *self.last.borrow()
     }
 
-    /// Announces each new last number.
+    /// Returns a receiver that announces each new last number.
     pub fn changes(&self) -> watch::Receiver<u64> {
         self.last.subscribe()
     }
 
-    /// At most so many events behind the number `after`, of one job alone where one is given.
+    /// Returns at most `most` events after the number `after`, only those of `job` if it is given.
     pub fn after(&self, after: u64, job: Option<u64>, most: usize) -> Excerpt<E> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let oldest = kept.events.front().map_or(kept.last + 1, |event| event.number);
@@ -119,7 +120,7 @@ mod tests {
         }
     }
 
-    /// However the connection breaks, asking on from the last number gives every event once and in its order.
+    /// After any break of the connection, continuing from the last number gives every event once and in order.
     #[test]
     fn events_are_resumed_by_their_numbers() {
         let journal = Journal::default();

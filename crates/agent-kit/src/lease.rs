@@ -1,4 +1,4 @@
-//! Who commands, where clients have no connection of their own: each shows by its requests, with the key that it was given, that it is there.
+//! Lease for clients without a connection of their own: a request with the client's key shows that the client is alive.
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -8,27 +8,27 @@ use utoipa::{IntoParams, ToSchema};
 
 use crate::api::Problem;
 
-/// The header with the key of a lease.
+/// Header with the key of a lease.
 pub const KEY: &str = "lease-key";
-/// How long a lease may last without a request, s.
+/// Allowed duration of a lease without a request, s.
 const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
-/// The same where a client does not ask for it.
+/// Default duration of a lease without a request, s.
 const LASTS_DEFAULT_S: f64 = 10.0;
-/// Clients at once.
+/// Largest number of clients at the same time.
 const CLIENTS_MAX: usize = 32;
-/// A client that has asked for nothing for so long behind the end of its lease is forgotten.
+/// Time after the end of its lease until a silent client is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
-/// How long a lease lasts without a request of a client that does not ask for it, s.
+/// Returns the default duration of a lease without a request, s.
 pub fn default_lasts_s() -> f64 {
     LASTS_DEFAULT_S
 }
 
-/// How long a lease is to last without a request.
+/// Returns the duration of a lease without a request.
 ///
 /// # Errors
 ///
-/// It is to last longer than is possible, or less.
+/// The duration is out of range (1–60 s).
 pub fn lasts(lasts_s: f64) -> Result<Duration, Problem> {
     if LASTS_S.contains(&lasts_s) {
         return Ok(Duration::from_secs_f64(lasts_s));
@@ -39,7 +39,7 @@ pub fn lasts(lasts_s: f64) -> Result<Duration, Problem> {
         .kind(ErrorKind::Usage))
 }
 
-/// The key of a lease, in the description of a request.
+/// Key of a lease, for the description of a request.
 #[derive(IntoParams)]
 #[into_params(parameter_in = Header)]
 pub struct LeaseKey {
@@ -48,73 +48,73 @@ pub struct LeaseKey {
     _key: String,
 }
 
-/// How a lease is.
+/// State of a lease.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LeaseState {
-    /// This client commands.
+    /// `true` if this client holds the lease.
     pub held: bool,
-    /// Who asks for the lease.
+    /// Name of the client that waits for the lease.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wanted_by: Option<String>,
 }
 
-/// A client by number; numbers are not used again.
+/// Number of a client; numbers are not used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
-/// Who a client is, and how it holds a lease; `P` is what becomes of its work without it.
+/// Client, and its terms of a lease; `P` is the policy for its work after the lease has lapsed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client<P> {
-    /// Its number.
+    /// Number of the client.
     pub id: ClientId,
-    /// What people call it.
+    /// Name of the client for people.
     pub name: String,
-    /// How long a lease lasts without a request of it.
+    /// Duration of its lease without a request.
     pub lasts: Duration,
-    /// What becomes of its work when it has lapsed.
+    /// Policy for its work after the lease has lapsed.
     pub policy: P,
     seen: Duration,
 }
 
-/// Who commands.
+/// Lease, and its holder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lease {
-    /// Its name.
+    /// Name of the holder.
     pub holder: String,
-    /// Since when.
+    /// Time when the holder took the lease.
     pub since: Duration,
-    /// Until when, if it is not renewed.
+    /// Time when the lease lapses if it is not renewed.
     pub until: Duration,
-    /// Who has asked for it.
+    /// Name of the client that waits for the lease.
     pub wanted_by: Option<String>,
 }
 
-/// Why a client may not command.
+/// Reason why a client may not command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Denied {
-    /// Another client does.
+    /// Another client holds the lease.
     #[error("{holder} has commanded for {age_s} s: one client commands at a time")]
     Held {
-        /// Its name.
+        /// Name of the holder.
         holder: String,
-        /// For how long, s.
+        /// Time since the holder took the lease, s.
         age_s: u64,
     },
-    /// Another client has asked for the lease before.
+    /// Another client already waits for the lease.
     #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
     Awaited {
-        /// Who commands.
+        /// Name of the holder.
         holder: String,
-        /// Who waits.
+        /// Name of the waiting client.
         by: String,
     },
-    /// It sends no key.
+    /// The client sends no key.
     #[error("commands need a lease")]
     NoKey,
-    /// Its key is of no lease.
+    /// The key belongs to no lease.
     #[error("this key is of no lease, or of one that lapsed long ago")]
     Unknown,
-    /// Too many clients have come.
+    /// Too many clients are registered.
     #[error("too many clients have come for the lease")]
     Full,
 }
@@ -155,7 +155,7 @@ struct Held {
     wanted_by: Option<String>,
 }
 
-/// The clients of an agent, one of which commands. Time is that of the agent.
+/// Clients of an agent. At most one of them holds the lease. Times are times of the agent.
 pub struct Leases<P> {
     clients: BTreeMap<String, Client<P>>,
     held: Option<Held>,
@@ -168,18 +168,20 @@ impl<P> Default for Leases<P> {
     }
 }
 
-/// The key that a request carries.
+/// Returns the lease key of a request.
 pub fn key_of(headers: &HeaderMap) -> Option<&str> {
     headers.get(KEY).and_then(|key| key.to_str().ok())
 }
 
 impl<P: Clone> Leases<P> {
-    /// A client comes and takes the lease, or waits for it where it is to `ask` the one who has it. True: it commands. The first who waits keeps its
-    /// place until it gets the lease, is forgotten, or has not shown for as long as its own lease would last that it is there.
+    /// Registers a client, which takes the lease; with `ask` it waits if another client holds the lease. Returns its
+    /// number, and `true` if it holds the lease. The first waiting client keeps its place until it gets the lease, is
+    /// forgotten, or is silent for the duration of its own lease.
     ///
     /// # Errors
     ///
-    /// [`Denied`]: another one commands or waits, or too many have come; this one is not known then.
+    /// [`Denied`]: another client holds the lease or waits for it, or too many clients are registered. This client is
+    /// not registered then.
     pub fn admit(
         &mut self,
         key: &str,
@@ -198,7 +200,8 @@ impl<P: Clone> Leases<P> {
             other => other.is_none(),
         };
         if self.clients.len() >= CLIENTS_MAX {
-            // The one that has been silent longest makes room: a program that is begun again and again keeps nobody out.
+            // The client that has been silent longest is removed, so that a program that restarts again and again
+            // blocks no other client.
             let holder = self.held.as_ref().map(|held| held.key.clone());
             let others = self.clients.iter().filter(|(key, _)| Some(*key) != holder.as_ref());
             let oldest = others.min_by_key(|(_, client)| client.seen).map(|(key, _)| key.clone());
@@ -216,7 +219,7 @@ impl<P: Clone> Leases<P> {
         Ok((id, held))
     }
 
-    /// The client with this key; it shows by that that it is there.
+    /// Returns the client with this key, and notes that it is alive.
     ///
     /// # Errors
     ///
@@ -227,7 +230,7 @@ impl<P: Clone> Leases<P> {
         Ok(client.clone())
     }
 
-    /// The client with this key commands; its lease is renewed, and taken where nobody has it.
+    /// Returns the client with this key. Renews its lease, or takes the lease if it is free.
     ///
     /// # Errors
     ///
@@ -242,7 +245,7 @@ impl<P: Clone> Leases<P> {
         Ok(client)
     }
 
-    /// Lets the lease go, to the client that has asked for it if one has; the client is forgotten.
+    /// Releases the lease, which passes to the waiting client if there is one; the client is forgotten.
     pub fn release(&mut self, key: &str, now: Duration) {
         self.clients.remove(key);
         if let Some(held) = self.held.take_if(|held| held.key == key) {
@@ -250,10 +253,10 @@ impl<P: Clone> Leases<P> {
         }
     }
 
-    /// Ends the lease that has lapsed, which the client that has asked for it gets if one has, and forgets clients that do not come back.
-    /// Whose lease it was.
+    /// Ends a lease that has lapsed and returns its former holder. The lease passes to the waiting client if there is
+    /// one. Also forgets clients that no longer send requests.
     pub fn lapse(&mut self, now: Duration) -> Option<Client<P>> {
-        // Whose lease it is, or was until now, is known for certain: its policy has to be followed.
+        // The holder is never forgotten before its lease has lapsed: its policy must be applied.
         let holder = self.held.as_ref().map(|held| held.key.clone());
         self.clients.retain(|key, client| {
             Some(key) == holder.as_ref() || now.saturating_sub(client.seen) < client.lasts + FORGOTTEN
@@ -263,13 +266,13 @@ impl<P: Clone> Leases<P> {
         self.clients.get(&held.key).cloned()
     }
 
-    /// Whether this client commands.
+    /// Returns `true` if this client holds the lease.
     pub fn holds(&self, client: ClientId, now: Duration) -> bool {
         let held = self.held.as_ref().filter(|held| now < held.until);
         held.and_then(|held| self.clients.get(&held.key)).is_some_and(|holder| holder.id == client)
     }
 
-    /// Who waits for the lease, and is there.
+    /// Returns the client that waits for the lease, if it is alive.
     fn first(&self, now: Duration) -> Option<&Client<P>> {
         let first = self.clients.get(self.held.as_ref()?.wanted_by.as_ref()?)?;
         Some(first).filter(|first| now.saturating_sub(first.seen) < first.lasts)
@@ -278,14 +281,14 @@ impl<P: Clone> Leases<P> {
     fn pass_on(&mut self, wanted_by: Option<String>, now: Duration) {
         if let Some(next) = wanted_by.filter(|next| self.clients.contains_key(next)) {
             self.hold(&next, now);
-            // It is not forgotten sooner than one who takes the lease now.
+            // The new holder is kept as long as a client that takes the lease now.
             if let Some(client) = self.clients.get_mut(&next) {
                 client.seen = now;
             }
         }
     }
 
-    /// Who commands.
+    /// Returns the lease and its holder.
     pub fn lease(&self) -> Option<Lease> {
         let held = self.held.as_ref()?;
         let name = |key: &String| self.clients.get(key).map(|client| client.name.clone());
@@ -339,12 +342,12 @@ mod tests {
         assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(14))));
         assert!(!leases.holds(ClientId(1), s(5)) && !leases.holds(ClientId(2), s(14)));
         assert!(leases.holds(ClientId(2), s(13)));
-        // A command renews it; then it lapses, once.
+        // A command renews the lease; then it lapses, once.
         assert!(leases.command(Some("bob"), s(13)).is_ok());
         assert_eq!(leases.lapse(s(22)), None);
         assert_eq!(leases.lapse(s(23)).map(|client| client.name), Some("bob".into()));
         assert_eq!(leases.lapse(s(24)), None);
-        // Who comes back before long has it again.
+        // A client that returns soon enough takes the lease again.
         assert!(leases.command(Some("bob"), s(30)).is_ok());
         assert!(leases.lapse(s(40)).is_some() && leases.lapse(s(200)).is_none());
         assert_eq!(leases.command(Some("bob"), s(200)).err(), Some(Denied::Unknown));
@@ -359,7 +362,7 @@ mod tests {
         assert_eq!(leases.lease().map(|lease| (lease.holder, lease.until)), Some(("bob".into(), s(7))));
         assert!(leases.admit("c", ("carl", s(5), ()), false, s(3)).is_err());
         assert!(leases.command(Some("b"), s(3)).is_ok() && leases.command(Some("a"), s(3)).is_err());
-        // Nobody waits any more; and one who waited and is forgotten gets nothing.
+        // No client waits any more; a waiting client that is forgotten gets nothing.
         assert!(leases.lapse(s(8)).is_some() && leases.lease().is_none());
         leases.admit("d", ("dora", s(60), ()), false, s(8)).expect("nobody has it");
         leases.admit("e", ("emil", s(1), ()), true, s(8)).expect("he may wait");
@@ -367,7 +370,7 @@ mod tests {
         assert!(leases.lapse(s(68)).is_some() && leases.lease().is_none());
     }
 
-    /// However long before its end it was asked for, and however late that end is looked at: whose lease it was is known, once.
+    /// The holder of a lapsed lease is returned exactly once, for any time of the request and of the check.
     #[test]
     fn who_was_given_the_lease_is_not_forgotten_while_it_has_it() {
         for let_go in 1..=70 {
@@ -383,7 +386,7 @@ mod tests {
                 assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
                 let lapsed = leases.lapse(s(looked)).map(|client| client.name);
                 assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
-                // He may come back as everyone else.
+                // The client may return like every other client.
                 assert!(looked > let_go + 5 || leases.command(Some("b"), s(looked)).is_ok() == had);
             }
         }
@@ -399,7 +402,7 @@ mod tests {
         assert_eq!(ask(&mut leases, "bob", 1), Ok(false));
         let awaited = Err(Denied::Awaited { holder: "anna".into(), by: "bob".into() });
         assert_eq!(ask(&mut leases, "carl", 2), awaited);
-        // He shows that he waits, as anna that she commands.
+        // Bob's request shows that he still waits, and anna's that she still commands.
         assert!(leases.command(Some("bob"), s(4)).is_err() && leases.command(Some("anna"), s(4)).is_ok());
         assert_eq!(ask(&mut leases, "carl", 8), awaited);
         assert!(leases.command(Some("anna"), s(8)).is_ok());
@@ -426,7 +429,7 @@ mod tests {
     fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
         for n in 0..3 * CLIENTS_MAX {
-            // Each when the one before waits no more.
+            // Each client asks after the one before has stopped waiting.
             let now = s(2 * n as u64);
             let lasts = s(if n == 0 { 60 } else { 1 });
             leases.admit(&n.to_string(), ("x", lasts, ()), true, now).expect("there is room");

@@ -1,4 +1,4 @@
-//! The log of commands: who, what, when, result; appended to and never rewritten.
+//! Log of commands (who, what, when, result); lines are only appended, never rewritten.
 mod repeats;
 mod rotate;
 
@@ -15,41 +15,42 @@ use crate::cut::cut_texts;
 use repeats::Repeats;
 use rotate::{Rotated, Target};
 
-/// Bytes that the log takes at most, where nothing else was asked for: the file and the one before it.
+/// Default limit of the log, bytes: the current file and the previous one together.
 pub const LIMIT: u64 = 100_000_000;
 
-/// Lines that may wait for a slow disk.
+/// Largest number of lines that wait for a slow disk.
 const WAITING_MAX: usize = 4096;
-/// How long the end of a program waits until its last lines are written: a disk that hangs must not keep it.
+/// Longest wait for the last lines when a program ends: a disk that hangs must not block the end.
 const LAST_LINES: Duration = Duration::from_secs(3);
 
-/// A file with one JSON object a line, written by a thread of its own: a Stop waits for no disk.
+/// File with one JSON object per line, written by a thread of its own, so that a Stop never waits for the disk.
 pub struct CommandLog {
     lines: Option<SyncSender<Value>>,
-    /// Ends when all lines are written.
+    /// Channel that closes when all lines are written.
     written: Receiver<()>,
-    /// Lines that wait for the disk.
+    /// Number of lines that wait for the disk.
     waiting: Arc<AtomicUsize>,
-    /// Lines that found no place since the last that did.
+    /// Number of lines that found no place since the last line that did.
     lost: u64,
     lost_in_all: u64,
-    /// Lines that the disk did not take.
+    /// Number of lines that the disk did not take.
     unwritten: Arc<AtomicU64>,
     repeats: Repeats,
 }
 
-/// What is written whatever else is: what moved something, who stopped it. The rest leaves half of the room free.
+/// Kinds of lines that are written even if other lines are dropped: what moved something, and who stopped it. Other
+/// lines leave half of the queue free.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
 
 impl CommandLog {
-    /// Goes on with this file, or begins it; none: nothing is kept. When it has half of `limit` bytes it is put aside as `FILE.1`, in place of
-    /// the one before. `failed` is called, on the writer's thread, with the first error of writing, and again after lines could be written in
-    /// between.
+    /// Opens or creates this file; `None`: no line is kept. When the file has half of `limit` bytes it is renamed to
+    /// `FILE.1`, which replaces the previous one. `failed` is called on the writer's thread with the first write error,
+    /// and again for each later failure after a successful write.
     ///
     /// # Errors
     ///
-    /// It cannot be opened.
+    /// The file cannot be opened.
     pub fn open(
         path: Option<&Path>,
         limit: u64,
@@ -82,7 +83,7 @@ impl CommandLog {
         Self { lines: Some(lines), written, waiting, lost: 0, lost_in_all: 0, unwritten, repeats }
     }
 
-    /// Writes a line: what happened, and what is to be known of it. Never waits.
+    /// Writes a line: the name of the event and its facts. Never waits.
     pub fn write(&mut self, what: &str, facts: Value) {
         for (what, facts) in self.repeats.due(Instant::now()) {
             self.line(what, facts);
@@ -90,8 +91,8 @@ impl CommandLog {
         self.line(what, facts);
     }
 
-    /// Writes a line about a `sender` that can cause many without a token: the first ten of it, then one a minute that says how many there
-    /// were (`times`), with the facts of the last.
+    /// Writes a line about a `sender` that can cause many without a token: the first ten lines in full, then one line a
+    /// minute with the number of repetitions (`times`) and the facts of the last.
     pub fn write_repeated(&mut self, what: &'static str, sender: &str, facts: Value) {
         if self.lines.is_none() {
             return;
@@ -128,7 +129,7 @@ impl CommandLog {
 }
 
 impl CommandLog {
-    /// Lines that found no place, or that the disk did not take.
+    /// Returns the number of lines that found no place or that the disk did not take.
     pub fn lost_in_all(&self) -> u64 {
         self.lost_in_all + self.unwritten.load(Ordering::Relaxed)
     }
@@ -140,7 +141,8 @@ impl Drop for CommandLog {
             self.line(what, facts);
         }
         self.lines = None;
-        // Nothing is ever sent: it ends with the thread that writes, also where that panicked, or is left behind.
+        // The channel carries no message; it closes when the writer's thread ends, also after a panic. The wait is
+        // limited.
         let _ = self.written.recv_timeout(LAST_LINES);
     }
 }
@@ -161,7 +163,7 @@ fn write(
             let before = line.get("lines_lost_before").and_then(Value::as_u64).unwrap_or(0);
             line.insert("lines_lost_before".into(), (before + lost).into());
         }
-        // A line that broke off is ended first: only that one is lost.
+        // An incomplete line is ended first, so that only this line is lost.
         let mut text = format!("{}{line}\n", if cut { "\n" } else { "" });
         let room = file.make_room(text.len());
         if cut && matches!(room, Ok(true)) {
@@ -188,7 +190,7 @@ fn write(
     }
 }
 
-/// How many bytes were taken, and whether all were.
+/// Writes the bytes. Returns the number of bytes taken, and an error if some were not.
 fn write_whole(file: &mut impl io::Write, bytes: &[u8]) -> (usize, io::Result<()>) {
     let mut taken = 0;
     while let Some(rest @ [_, ..]) = bytes.get(taken..) {
@@ -208,7 +210,7 @@ mod tests {
 
     use super::*;
 
-    /// A disk with room for so many bytes, and what it has taken.
+    /// Disk with room for a number of bytes, and the bytes that it has taken.
     #[derive(Clone, Default)]
     struct Disk(Arc<Mutex<(usize, Vec<u8>)>>);
 
@@ -235,13 +237,13 @@ mod tests {
 
     impl Target for Disk {}
 
-    /// A disk that hangs keeps the end of a program for a moment, not for ever.
+    /// A disk that hangs delays the end of a program only briefly.
     #[test]
     fn a_disk_that_hangs_keeps_nobody() {
         struct Hung(Receiver<()>);
         impl io::Write for Hung {
             fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-                // Until the test is over.
+                // Blocks until the test is over.
                 self.0.recv().unwrap_or_default();
                 Ok(bytes.len())
             }
@@ -254,13 +256,13 @@ mod tests {
         let (hangs, until) = sync_channel(0);
         let mut log = CommandLog::on(Hung(until), |_| {});
         log.write("sent", json!({}));
-        // It comes back at all.
+        // The call returns at all.
         drop(log);
         drop::<SyncSender<()>>(hangs);
     }
 
-    /// However full the disk is when: it is reported once for each time, lines are whole but for the one that broke off, and the next one
-    /// names how many are missing.
+    /// For any time at which the disk is full: each failure is reported once, lines are complete except for an
+    /// interrupted one, and the next line states the number of missing lines.
     #[test]
     fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
         for room in 0..120 {
@@ -277,7 +279,8 @@ mod tests {
             };
             (0..5).for_each(|n| log.write("sent", json!({ "n": n })));
             done(&log);
-            // The last line may be at the disk still: three more are refused for certain, or taken after it.
+            // The disk may still process the last line: three more lines are then either certainly refused or written
+            // after it.
             disk.with(|(left, _)| *left = usize::MAX);
             (5..8).for_each(|n| log.write("sent", json!({ "n": n })));
             log.lines = None;
@@ -285,7 +288,7 @@ mod tests {
             let text = disk.with(|(_, taken)| String::from_utf8(taken.clone()).expect("text"));
             let whole: Vec<Value> = text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             let lost = log.lost_in_all();
-            // One of which the end of the line alone was not taken is counted, and there.
+            // A line that lacks only its line end is counted as lost although its text is there.
             assert!((8..=9).contains(&(whole.len() as u64 + lost)), "{room}: {text}");
             assert!(text.lines().count() <= whole.len() + 1, "{room}: one line breaks off: {text}");
             assert_eq!(whole.last().map(|line| line["n"].clone()), Some(7.into()));
@@ -295,8 +298,8 @@ mod tests {
         }
     }
 
-    /// Whatever its limit, and however often the program is begun anew: file and file before together keep it, each line is whole and there
-    /// once, and none is missing between the first that is kept and the last.
+    /// For any limit and any number of restarts: the current and the previous file together stay within the limit, each
+    /// line is complete and appears once, and no line is missing between the first and the last kept line.
     #[test]
     fn the_log_keeps_its_limit_and_its_last_lines() {
         let dir = tempfile::tempdir().expect("a directory");
@@ -327,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Where the file cannot be put aside, that is reported, the lines are counted as lost, and the limit is kept.
+    /// If the file cannot be renamed, this is reported, the lines are counted as lost, and the limit is kept.
     #[test]
     fn a_log_that_cannot_be_put_aside_stays_within_its_limit() {
         let dir = tempfile::tempdir().expect("a directory");
@@ -357,7 +360,7 @@ mod tests {
         assert!(!Path::new("/dev/null.1").exists());
     }
 
-    /// A refused request costs a line of bounded length, and soon no line at all; each is counted.
+    /// A refused request costs a line of limited length, and later no line at all; each request is counted.
     #[test]
     fn lines_of_those_who_are_not_let_in_are_short_and_few() {
         let dir = tempfile::tempdir().expect("a directory");

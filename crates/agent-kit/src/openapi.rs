@@ -1,4 +1,4 @@
-//! Parts of the descriptions of APIs, OpenAPI 3.1.
+//! Parts of API descriptions in OpenAPI 3.1.
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
@@ -10,15 +10,15 @@ use utoipa::{IntoResponses, Modify};
 
 use crate::api::Problem;
 
-/// Returns the description as JSON. Each response that several operations have stands in it once.
+/// Returns the description as JSON. A response that several operations share is written once.
 pub fn text(description: &OpenApi) -> String {
     let mut description = description.clone();
     share_responses(&mut description);
-    // Its keys are strings: this cannot fail.
+    // All keys are strings, so this cannot fail.
     description.to_pretty_json().unwrap_or_default()
 }
 
-/// Moves responses that several operations have to the components, under the name of their status: `NotFound`, `NotFound2`.
+/// Moves responses that several operations share to the components, named after their status: `NotFound`, `NotFound2`.
 fn share_responses(description: &mut OpenApi) {
     let mut counts: Vec<(String, RefOr<Response>, u32)> = Vec::new();
     for_each_response(description, |status, response| {
@@ -28,7 +28,7 @@ fn share_responses(description: &mut OpenApi) {
         }
     });
     counts.retain(|(.., count)| *count > 1);
-    // The most frequent one of a status has the name without a number.
+    // The most frequent response of a status has the name without a number.
     counts.sort_by_key(|(status, _, count)| (status.clone(), Reverse(*count)));
     let mut names: Vec<String> = Vec::new();
     for (status, ..) in &counts {
@@ -69,7 +69,7 @@ pub fn served<S: Clone + Send + Sync + 'static>(description: &OpenApi) -> Method
     get(async move || ([(header::CONTENT_TYPE, "application/json")], description))
 }
 
-/// A token, which those on the same computer need for commands alone.
+/// Token; clients on the same computer need it for commands only.
 pub struct Bearer;
 
 impl Modify for Bearer {
@@ -79,31 +79,32 @@ impl Modify for Bearer {
     }
 }
 
-/// What a command of any agent may be refused with.
+/// Refusals that a command of any agent can receive.
 #[derive(IntoResponses)]
 #[expect(dead_code, reason = "describes responses")]
 enum Denials {
     /// Refused
     #[response(status = 409)]
     Denied(Problem),
-    /// More than may be sent at once
+    /// The request is larger than allowed
     #[response(status = 413)]
     TooLarge(Problem),
-    /// The body is no JSON
+    /// The body is not JSON
     #[response(status = 415)]
     NoJson(Problem),
-    /// What was asked for is none
+    /// The request contains an invalid value
     #[response(status = 422)]
     Invalid(Problem),
-    /// Something went wrong on the way
+    /// An error occurred during the request
     #[response(status = 500)]
     Fault(Problem),
-    /// What is commanded is not there
+    /// The commanded device is not there
     #[response(status = 503)]
     Lost(Problem),
 }
 
-/// What a command may be refused with beside what every request may; in the words of an agent, why it is `denied`, and what can be `lost`.
+/// Returns the refusals that a command can receive in addition to those of every request. `denied` and `lost` are the
+/// agent's descriptions of these two cases.
 pub fn denials(denied: &str, lost: &str) -> BTreeMap<String, RefOr<Response>> {
     let mut responses = Denials::responses();
     for (status, words) in [("409", denied), ("503", lost)] {

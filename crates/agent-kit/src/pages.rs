@@ -1,7 +1,8 @@
-//! The pages of the dashboard, which are part of the program: a browser needs nothing else.
+//! Pages of the dashboard, which are part of the program: a browser needs no other files.
 //!
-//! A page holds nothing that is worth a token. It is shown to every browser that asks the agent by one of its names, and not for another site's
-//! page; it asks for a token itself where one is needed, and what it then asks of the agent passes the gate like all else.
+//! A page contains no secrets. The agent serves a page to every browser that requests it by one of the agent's names,
+//! but not to pages of other sites. The page itself asks for a token if one is needed, and its later requests pass the
+//! gate like all others.
 use std::io::Write as _;
 use std::sync::Arc;
 
@@ -16,51 +17,51 @@ use rust_embed::{EmbeddedFile, RustEmbed};
 
 use crate::gate::Gate;
 
-/// What `npm run build` has made in `web/`.
+/// Files that `npm run build` has made in `web/`.
 #[derive(RustEmbed)]
 #[folder = "../../web/dist"]
 #[allow_missing = true]
 struct Built;
 
-/// What a page may do: its own scripts and files, this agent, and nothing else. No page of another site may show it in a frame.
+/// Permissions of a page: its own scripts and files, and this agent. No page of another site may show it in a frame.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; style-src 'self' 'unsafe-inline'; \
                       connect-src 'self' ws: wss:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-/// Where the builder puts files whose names are made from their contents.
+/// Directory of files whose names are made from their contents.
 const LASTING: &str = "assets/";
-/// Endings of what is compressed already.
+/// File endings of formats that are already compressed.
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
-/// Whose pages may use a file.
+/// Header that names the sites whose pages may use a file.
 const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
-/// A file of the pages, ready to be sent.
+/// File of the pages, ready to be sent.
 struct File {
     name: String,
     kind: &'static str,
-    /// Of its contents.
+    /// Entity tag, made from the contents.
     tag: HeaderValue,
     bytes: Bytes,
-    /// The same, compressed.
+    /// Contents compressed with gzip, if that is shorter.
     gzip: Option<Bytes>,
 }
 
-/// The pages of an agent.
+/// Pages of an agent.
 #[derive(Clone)]
 pub struct Pages {
     gate: Gate,
-    /// What is shown at `/`.
+    /// Name of the file that is served at `/`.
     first: &'static str,
     files: Arc<[File]>,
 }
 
 impl Pages {
-    /// Those behind this gate; `first` is what is shown at `/`, as `index.html`.
+    /// Returns the pages for this gate; `first` is the file that is served at `/`, like `index.html`.
     pub fn new(gate: Gate, first: &'static str) -> Self {
         let files = Built::iter().filter_map(|name| Built::get(&name).map(|file| File::of(&name, file)));
         Self { gate, first, files: files.collect() }
     }
 
-    /// The file that a path stands for.
+    /// Returns the file for a path.
     fn find(&self, path: &str) -> Option<&File> {
         let name = match path.strip_prefix('/')? {
             "" => self.first,
@@ -80,7 +81,7 @@ impl File {
         Self { name: name.to_owned(), kind: kind(ending), tag, bytes: file.data.into_owned().into(), gzip }
     }
 
-    /// As an answer to a request with these headers.
+    /// Returns the answer to a request with these headers.
     fn answer(&self, request: &HeaderMap) -> Response {
         let lasts =
             if self.name.starts_with(LASTING) { "public, max-age=31536000, immutable" } else { "no-cache" };
@@ -112,10 +113,10 @@ impl File {
     }
 }
 
-/// In front of the gate: what is a page is shown, and all else goes on.
+/// Middleware in front of the gate: serves the pages and passes on all other requests.
 pub async fn show(State(pages): State<Pages>, request: Request, next: Next) -> Response {
     let looks = [Method::GET, Method::HEAD].contains(request.method());
-    // Who wants a socket at `/` wants no page.
+    // A request for a socket at `/` does not want the page.
     let socket = request.headers().contains_key(header::SEC_WEBSOCKET_KEY);
     match pages.find(request.uri().path()).filter(|_| looks && !socket) {
         Some(file) => match pages.gate.is_own(request.headers()) {
@@ -133,7 +134,7 @@ fn takes_gzip(headers: &HeaderMap) -> bool {
     })
 }
 
-/// `None` where it would not be shorter.
+/// Returns `None` if the compressed form is not shorter.
 fn gzip(bytes: &[u8]) -> Option<Bytes> {
     let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(bytes).ok()?;
@@ -207,7 +208,7 @@ mod tests {
             let (status, encoding, _) = answer("a.js", &[(header::ACCEPT_ENCODING, encodings)]);
             assert_eq!((status, encoding.as_str()), (200, sent), "{encodings}");
         }
-        // Its name is made of what is in it: it never changes.
+        // Its name contains the hash of its contents, so the file never changes.
         assert!(
             answer("assets/a.js", &[]).2.contains("immutable") && answer("index.html", &[]).2 == "no-cache"
         );

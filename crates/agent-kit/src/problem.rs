@@ -1,4 +1,4 @@
-//! Why something was not done: one object, whatever it was.
+//! Errors of an API as one type of object.
 use std::borrow::Cow;
 use std::ops::Deref;
 
@@ -13,7 +13,7 @@ use utoipa::{PartialSchema, ToSchema};
 
 use crate::cut::cut_middle;
 
-/// Why something was not done, as an agent answers it.
+/// Error as an agent answers it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Problem {
     failure: Failure,
@@ -21,51 +21,51 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Something that was refused, with what helps.
+    /// Returns a refusal with its next step.
     pub fn new(code: &'static str, message: impl Into<String>, next: impl Into<Next>) -> Self {
         let failure = Failure::new(ErrorKind::Refused, code, message.into()).next(next);
         Self { failure, status: StatusCode::CONFLICT }
     }
 
-    /// An error of a library, with all that it knows.
+    /// Returns a problem with all facts of a library's error.
     pub fn of(error: &impl Diagnose) -> Self {
         Failure::of(error).into()
     }
 
-    /// What was sent cannot be read; the message may have parts of it.
+    /// Returns a problem for a request that cannot be read; the message may contain parts of the request.
     pub fn rejected(status: StatusCode, message: impl AsRef<str>) -> Self {
         let message = cut_middle(message.as_ref());
         Self { status, ..Self::new("request", message, "GET /openapi.json describes each request") }
     }
 
-    /// There is nothing of this number.
+    /// Returns a problem for an object with this number that does not exist.
     pub fn nothing(what: &str, number: impl std::fmt::Display, list: &str) -> Self {
         let next = format!("GET {list} lists what there is");
         let problem = Self::new("not-found", format!("there is no {what} {number}"), next);
         Self { status: StatusCode::NOT_FOUND, ..problem }
     }
 
-    /// Sets the kind, and the status that belongs to it.
+    /// Sets the kind, and the HTTP status that belongs to it.
     pub fn kind(self, kind: ErrorKind) -> Self {
         Failure { kind, ..self.failure }.into()
     }
 
-    /// In these words.
+    /// Sets the message.
     pub fn message(self, message: impl Into<String>) -> Self {
         Self { failure: Failure { message: message.into(), ..self.failure }, ..self }
     }
 
-    /// With this that helps.
+    /// Sets the next step.
     pub fn next(self, next: impl Into<Next>) -> Self {
         Self { failure: self.failure.next(next), ..self }
     }
 
-    /// With these facts.
+    /// Sets the facts.
     pub fn with(self, facts: Facts) -> Self {
         Self { failure: self.failure.with(facts), ..self }
     }
 
-    /// Sets the status 403: the client may never do that.
+    /// Sets the status 403: the client has no permission for this request.
     pub fn forbidden(self) -> Self {
         Self { status: StatusCode::FORBIDDEN, ..self }
     }
@@ -96,23 +96,23 @@ impl Serialize for Problem {
     }
 }
 
-/// Why something was not done.
+/// Reason why a request was refused or failed.
 #[derive(Serialize, ToSchema)]
 struct ErrorObject<'a> {
-    /// Short name, for programs.
+    /// Short name of the error, for programs.
     code: &'a str,
-    /// Sentence for people: request, place, value and limit.
+    /// Message for people: request, place, value and limit.
     message: &'a str,
-    /// Board of a chain.
+    /// Number of a board of a chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     board: Option<u8>,
-    /// Joint of an arm, 1 to 6 from the base.
+    /// Number of a joint of an arm, 1 to 6 from the base.
     #[serde(skip_serializing_if = "Option::is_none")]
     joint: Option<u8>,
-    /// Point of the trajectory, from 0; in motion the 1 ms point.
+    /// Index of a point of the trajectory, from 0; in motion the 1 ms point.
     #[serde(skip_serializing_if = "Option::is_none")]
     point: Option<u32>,
-    /// Value that was found, in the unit of the message.
+    /// Measured or requested value, in the unit of the message.
     #[serde(skip_serializing_if = "Option::is_none")]
     value: Option<f64>,
     /// Limit of the value.
@@ -128,7 +128,7 @@ struct ErrorObject<'a> {
 
 impl<'a> From<&'a Failure> for ErrorObject<'a> {
     fn from(failure: &'a Failure) -> Self {
-        // JSON has no word for what is no number.
+        // JSON cannot represent values that are not finite.
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
         let Facts { board, joint, point, value, limit, cause, .. } = *failure.facts;
         Self {
@@ -140,7 +140,7 @@ impl<'a> From<&'a Failure> for ErrorObject<'a> {
             value: finite(value),
             limit: finite(limit),
             cause,
-            // Marks of code in the texts for terminals.
+            // Without backticks, which mark code in terminal texts.
             next: failure.next.plain(FrontEnd::Agent),
         }
     }
@@ -155,7 +155,7 @@ impl IntoResponse for Problem {
     }
 }
 
-/// A response is a [`Problem`]: for whoever writes down what was not done.
+/// Marks a response that is a [`Problem`], so that refused commands can be logged.
 #[derive(Clone, Debug)]
 pub(crate) struct Denial {
     pub code: &'static str,
@@ -174,7 +174,7 @@ impl ToSchema for Problem {
     }
 }
 
-/// The status of a response about an error of this kind.
+/// Returns the HTTP status for an error of this kind.
 fn status(kind: ErrorKind) -> StatusCode {
     match kind {
         ErrorKind::Usage => StatusCode::UNPROCESSABLE_ENTITY,

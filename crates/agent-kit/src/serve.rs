@@ -1,4 +1,4 @@
-//! Serving an agent until it is to end.
+//! Serving of an agent until it ends.
 mod in_time;
 mod places;
 
@@ -29,21 +29,22 @@ use crate::api::Problem;
 use in_time::{InTime, Taken};
 use places::{Place, Places};
 
-/// How often is looked whether it is to end.
+/// Interval at which the end condition is checked.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest that the head of a request may take, and that a connection waits for the next one.
+/// Longest time for the head of a request, and longest wait of a connection for its next request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
 /// Longest head of a request, bytes.
 const HEAD_MAX: usize = 16 << 10;
-/// Longest that the body of a request may take while few places are left. While there are enough, the whole request has a time.
+/// Longest time for the body of a request while few places are left. Otherwise only the time of the whole request is
+/// limited.
 const BODY_TIME_OF_FEW: Duration = Duration::from_secs(1);
 
-/// Serves `router` at `listener`, with TLS where it is given, until `ended` is true. Blocks.
+/// Serves `router` at `listener`, with TLS if it is configured, until `ended` returns `true`. Blocks.
 ///
 /// # Errors
 ///
-/// The system has no threads, or the listener fails.
+/// The system cannot start threads, or the listener fails.
 pub fn serve(
     router: Router,
     listener: TcpListener,
@@ -64,28 +65,28 @@ pub fn serve(
             () = end => Ok(()),
         }
     });
-    // Sockets that are still open end with it.
+    // This also closes sockets that are still open.
     runtime.shutdown_timeout(Duration::from_millis(200));
     served
 }
 
-/// Takes connections for ever.
+/// Accepts connections without end.
 async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<TlsAcceptor>) {
     let (here, elsewhere) = (Places::here(), Places::elsewhere());
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // No more files, for the time being.
+            // The limit of open files is reached for now.
             tokio::time::sleep(LOOK).await;
             continue;
         };
         let places = if peer.ip().to_canonical().is_loopback() { &here } else { &elsewhere };
         let (router, tls) = (router.clone().layer(Extension(ConnectInfo(peer))), tls.clone());
         let connection = async move |place: Place| {
-            // A status of 175 bytes is not to wait for more.
+            // A status of 175 bytes must be sent at once, without waiting for more data.
             let _ = stream.set_nodelay(true);
             match tls {
                 None => serve_connection(router, stream, place).await,
-                // Whoever does not shake hands, or not in time, gets no word.
+                // A client without a TLS handshake in time gets no answer.
                 Some(tls) => {
                     let handshake = tokio::time::timeout(head_time(place.few), tls.accept(stream));
                     if let Ok(Ok(stream)) = handshake.await {
@@ -133,11 +134,11 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // Whoever is gone needs no answer. Sockets have places of their own.
+    // A client that has disconnected needs no answer. Sockets have their own places.
     drop((served, place));
 }
 
-/// What is answered where the places that are left are kept for others.
+/// Returns the answer when the remaining places are reserved for Stop and Pause.
 fn full() -> Response {
     let next = "ask again in a second; Stop and Pause are taken meanwhile";
     Problem::new("full", "all connections of this agent are taken", next)

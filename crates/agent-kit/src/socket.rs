@@ -1,4 +1,4 @@
-//! Sockets: how many at once, and what those send and receive that only look.
+//! Limits for sockets: number, and traffic of clients with read-only access.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,19 +10,19 @@ use tokio::sync::Semaphore;
 
 use crate::access::Role;
 
-/// Sockets at once of those who may look, and of those who may command: the first cannot keep the others out.
+/// Largest number of sockets of viewers and of operators; viewers cannot block operators.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
-/// The protocol that a page names for its socket, beside `bearer.` and its token.
+/// Protocol that a page names for its socket, in addition to `bearer.` and its token.
 pub const PROTOCOL: &str = "openjtc";
-/// Longest message of a client that only looks, bytes.
+/// Longest message of a client with read-only access, bytes.
 pub const MESSAGE_MAX: usize = 1024;
-/// Pings of a client between two messages to it.
+/// Largest number of pings of a client between two messages to it.
 const NOISE_MAX: u32 = 100;
-/// How long a client may leave a message untaken.
+/// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
 
-/// The places for sockets.
+/// Places for sockets.
 #[derive(Clone)]
 pub struct Sockets {
     viewers: Arc<Semaphore>,
@@ -37,7 +37,7 @@ impl Default for Sockets {
 }
 
 impl Sockets {
-    /// Serves the socket that is asked for in such a role, where there is a place for it.
+    /// Serves a socket in this role if a place is free.
     pub fn serve<F: Future<Output = ()> + Send + 'static>(
         &self,
         role: Role,
@@ -58,7 +58,7 @@ impl Sockets {
     }
 }
 
-/// Waits until the client has gone, or sends what it has no business to.
+/// Waits until the client disconnects, or sends a message that is not expected.
 pub(crate) async fn ended(socket: &mut WebSocket) {
     let mut noise = 0;
     while let Some(Ok(Message::Ping(_) | Message::Pong(_))) = socket.recv().await {
@@ -69,9 +69,9 @@ pub(crate) async fn ended(socket: &mut WebSocket) {
     }
 }
 
-/// Sends a message as JSON. False when the client does not take it.
+/// Sends a message as JSON. Returns `false` if the client does not take it.
 pub(crate) async fn pass(socket: &mut WebSocket, message: &impl Serialize) -> bool {
-    // Made of strings and numbers.
+    // The message contains only strings and numbers, so this cannot fail.
     let text = serde_json::to_string(message).unwrap_or_default();
     matches!(tokio::time::timeout(SEND_TIME, socket.send(Message::Text(text.into()))).await, Ok(Ok(())))
 }

@@ -1,4 +1,4 @@
-//! TLS by certificate files.
+//! TLS with certificate files.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -7,26 +7,26 @@ use rustls::ServerConfig;
 use rustls::pki_types::pem::PemObject as _;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer};
 
-/// Why an agent cannot speak TLS.
+/// Reason why TLS cannot be configured.
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
-    /// A file is no certificate, or no private key.
+    /// File that is not a valid certificate or private key.
     #[error("{path}: {what}", path = path.display())]
     File {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem in the file.
         what: String,
     },
-    /// Other users can read the private key.
+    /// Private key that other users can read.
     #[error("{path}: mode {mode:04o}: every user of this computer can read this private key", path = path.display())]
     Open {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its mode.
+        /// Mode of the file.
         mode: u32,
     },
-    /// Certificate and key do not belong together.
+    /// Certificate and private key that do not match.
     #[error("certificate and private key: {0}")]
     Pair(rustls::Error),
 }
@@ -44,7 +44,8 @@ impl host_kit::Diagnose for TlsError {
     }
 }
 
-/// TLS 1.2 and 1.3 with this certificate chain, its own certificate first, and its private key, both as PEM.
+/// Returns a configuration for TLS 1.2 and 1.3 with this certificate chain, the agent's own certificate first, and its
+/// private key, both as PEM.
 ///
 /// # Errors
 ///

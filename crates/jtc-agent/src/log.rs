@@ -1,4 +1,4 @@
-//! What the log of commands has of a line.
+//! Entries of a line in the log of commands.
 use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
@@ -8,13 +8,13 @@ pub use agent_kit::log::{CommandLog, LIMIT};
 use crate::line::LineEvent;
 use crate::owner::Observer;
 
-/// Writes what happens on a line to a log of commands.
+/// Returns an observer that writes the events of a line to a log of commands.
 pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     Box::new(move |_, event| {
         let Some((what, facts)) = logged(event) else { return };
         let mut log = log.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
-            // Also of those who only look.
+            // Also frames of clients with read-only access.
             LineEvent::Denied { client, .. } => {
                 log.write_repeated(what, &format!("client {}", client.0), facts)
             }
@@ -24,7 +24,7 @@ pub fn observer(log: Arc<Mutex<CommandLog>>) -> Observer {
     })
 }
 
-/// An event of the line as a line of the log: what happened, and what is to be known of it. `None`: others show it.
+/// Returns the log entry of an event: its name and facts. `None`: the event is logged elsewhere.
 fn logged(event: &LineEvent) -> Option<(&'static str, Value)> {
     Some(match event {
         LineEvent::Sent { client, frame_type, .. } => {

@@ -1,4 +1,4 @@
-//! The owner of a port: one thread that reads and writes it for all clients.
+//! Owner of a port: one thread that reads and writes it for all clients.
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -12,29 +12,30 @@ use tokio::sync::watch;
 use crate::line::{ClientId, Delivery, Denied, Introduction, LineEvent, SharedLine, may_change_the_arm};
 use crate::upload::Upload;
 
-/// Longest that the owner waits for the device before it looks at what clients want: a Stop waits no longer for its turn.
+/// Longest wait for the controller before the requests of clients are checked; a Stop waits no longer than this for its
+/// turn.
 const TURN: Duration = Duration::from_millis(2);
 
-/// Longest that the end waits for what is on its way.
+/// Longest wait at the end for data in flight.
 const LAST_TURNS: Duration = Duration::from_secs(1);
 
-/// Called with what has happened, on the owner's thread: it is to return soon.
+/// Callback for each event, on the owner's thread; it must return soon.
 pub type Observer = Box<dyn FnMut(Duration, &LineEvent) + Send>;
 
 struct State {
     line: SharedLine,
-    /// The port is gone: why.
+    /// Reason why the port was lost.
     lost: Option<String>,
 }
 
 struct Shared {
     state: Mutex<State>,
-    /// Something was delivered: for those who block, and for those who do not.
+    /// Signals deliveries to blocking callers, as the channel does to asynchronous ones.
     delivered: Condvar,
     changed: watch::Sender<()>,
-    /// What the controller was given to follow.
+    /// Trajectory that was sent to the controller.
     upload: Mutex<Upload>,
-    /// Frames that may have changed the arm.
+    /// Number of frames that may have changed the arm.
     arm_changes: AtomicU64,
     ended: AtomicBool,
     start: Instant,
@@ -44,7 +45,7 @@ struct Shared {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, State> {
-        // A panic of another thread leaves no half-done state behind that matters more than a Stop.
+        // If another thread panicked, an incomplete state matters less than a Stop.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -58,7 +59,7 @@ impl Shared {
     }
 }
 
-/// The port is gone when this is, also where its thread has panicked.
+/// Marks the port as lost on drop, also after a panic of its thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {
@@ -68,54 +69,54 @@ impl Drop for Gone<'_> {
     }
 }
 
-/// What clients and the API have of a line that a thread owns.
+/// Access of clients and the API to the line, which a thread owns.
 #[derive(Clone)]
 pub struct Line(Arc<Shared>);
 
 impl Line {
-    /// Time of the line: since its owner began.
+    /// Returns the time of the line, counted from the start of its owner.
     pub fn now(&self) -> Duration {
         self.0.now()
     }
 
-    /// Something with the line, now.
+    /// Calls a function with the line and its present time.
     pub fn with<T>(&self, act: impl FnOnce(&mut SharedLine, Duration) -> T) -> T {
         act(&mut self.0.lock().line, self.0.now())
     }
 
-    /// Rate of the line, Bd, if it has one.
+    /// Returns the rate of the line, Bd, if it has one.
     pub fn baud(&self) -> Option<u32> {
         self.0.baud
     }
 
-    /// Something may have been delivered.
+    /// Returns a receiver that announces possible deliveries.
     pub fn changes(&self) -> watch::Receiver<()> {
         self.0.changed.subscribe()
     }
 
-    /// Number of the last Stop or Pause.
+    /// Returns the number of the last Stop or Pause.
     pub fn last_halt(&self) -> u64 {
         self.0.lock().line.last_halt()
     }
 
-    /// Waits until something is delivered, at most so long.
+    /// Waits for a delivery, at most for `timeout`.
     pub fn wait(&self, timeout: Duration) {
-        // Whoever waits looks for itself, whatever woke it.
+        // The caller checks the reason of the wake-up itself.
         drop(self.0.delivered.wait_timeout(self.0.lock(), timeout));
     }
 
-    /// Those who wait for something look whether it is there.
+    /// Wakes all waiting callers.
     pub fn wake(&self) {
         self.0.wake();
     }
 
-    /// Why the port is gone; `None` while it is there.
+    /// Returns the reason why the port was lost; `None` while it is available.
     pub fn lost(&self) -> Option<String> {
         self.0.lock().lost.clone()
     }
 
-    /// The values of a status, with the commanded ones where it executes a trajectory that was seen to be given to the controller: they
-    /// stand in no status. Measurements are so many ticks old (J-62).
+    /// Returns the values of a status. Includes the commanded values, which no status contains, if the executed
+    /// trajectory was seen on the line. `delay_ticks` is the age of the measurements in ticks (J-62).
     pub fn sample(&self, status: &Status, delay_ticks: u8) -> Sample {
         let given = self.0.upload.lock().unwrap_or_else(PoisonError::into_inner).trajectory(false);
         match given {
@@ -124,42 +125,42 @@ impl Line {
         }
     }
 
-    /// Joint positions that are commanded, rad, where the arm follows a trajectory that was seen to be given to the controller.
+    /// Returns the commanded joint positions, rad, if the executed trajectory was seen on the line.
     pub fn commanded(&self, status: &Status) -> Option<[f64; JOINTS]> {
         let positions = self.sample(status, 0).joints.map(|joint| joint.set_position);
         positions.iter().all(|position| position.is_finite()).then_some(positions)
     }
 
-    /// Frames that may have changed the arm of the controller.
+    /// Returns the number of frames that may have changed the controller's arm.
     pub fn arm_changes(&self) -> u64 {
         self.0.arm_changes.load(Ordering::Relaxed)
     }
 
-    /// Name of the client that commands now.
+    /// Returns the name of the lease holder.
     pub fn commander(&self) -> Option<String> {
         self.with(|line, _| line.introduction(line.lease()?.holder).map(|client| client.name.clone()))
     }
 
-    /// A client comes; it goes when what is returned is dropped.
+    /// Adds a client, which is removed when the returned guard is dropped.
     pub fn join(&self, introduction: Introduction) -> Joined {
         let client = self.with(|line, _| line.join(introduction));
         Joined { line: self.clone(), client }
     }
 
-    /// A client's port: whatever speaks over a serial port speaks over it.
+    /// Returns a client's port, for programs that expect a serial port.
     pub fn connect(&self, introduction: Introduction) -> ClientPort {
         ClientPort { joined: self.join(introduction), read: Vec::new(), denied: None }
     }
 }
 
-/// A client, as long as it is there.
+/// Guard that keeps a client on the line and removes it on drop.
 pub struct Joined {
     line: Line,
     client: ClientId,
 }
 
 impl Joined {
-    /// Its number.
+    /// Returns the number of the client.
     pub fn client(&self) -> ClientId {
         self.client
     }
@@ -171,14 +172,14 @@ impl Drop for Joined {
     }
 }
 
-/// The thread that owns the port.
+/// Thread that owns the port.
 pub struct Owner {
     line: Line,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Owner {
-    /// Takes a port. `observer` sees everything that happens on the line.
+    /// Takes a port. `observer` receives every event on the line.
     pub fn new(port: impl Port + Send + 'static, observer: Observer) -> Self {
         let shared = Arc::new(Shared {
             state: Mutex::new(State { line: SharedLine::new(port.baud()), lost: None }),
@@ -196,12 +197,12 @@ impl Owner {
         Self { line: Line(shared), thread: Some(thread) }
     }
 
-    /// The line.
+    /// Returns the line.
     pub fn line(&self) -> Line {
         self.line.clone()
     }
 
-    /// Lets the port go, when what is on its way is written.
+    /// Releases the port after the data in flight is written.
     pub fn end(mut self) {
         self.join();
     }
@@ -221,7 +222,7 @@ impl Drop for Owner {
     }
 }
 
-/// Reads and writes until the port is gone or nobody wants it any more.
+/// Reads and writes until the port is lost, or the owner was ended and no data is in flight.
 fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     let mut gone = Gone(shared, "the agent has a fault".to_owned());
     let mut last_turns = None;
@@ -241,7 +242,7 @@ fn own_port(shared: &Shared, mut port: impl Port, mut observer: Observer) {
     }
 }
 
-/// What is to be written, what there is to read, and who is to know.
+/// Writes the waiting bytes, reads the received ones, and calls the observer.
 fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Result<(), PortError> {
     let (now, bytes, due) = {
         let mut state = shared.lock();
@@ -275,7 +276,7 @@ fn turn(shared: &Shared, port: &mut impl Port, observer: &mut Observer) -> Resul
     Ok(())
 }
 
-/// A client's end of the line.
+/// Connection of a client to the line.
 pub struct ClientPort {
     joined: Joined,
     /// Bytes that were delivered and not read yet.
@@ -284,12 +285,12 @@ pub struct ClientPort {
 }
 
 impl ClientPort {
-    /// Whose it is.
+    /// Returns the number of the client.
     pub fn client(&self) -> ClientId {
         self.joined.client
     }
 
-    /// The line that it is of.
+    /// Returns the line of this connection.
     pub fn line(&self) -> &Line {
         &self.joined.line
     }
@@ -298,11 +299,11 @@ impl ClientPort {
         &self.joined.line.0
     }
 
-    /// What was delivered, waiting for it at most so long.
+    /// Returns the deliveries; waits for them at most for `timeout`.
     ///
     /// # Errors
     ///
-    /// [`PortError::Gone`] when the port is, or when this client was put out.
+    /// [`PortError::Gone`] if the port was lost or this client was disconnected.
     pub fn deliveries(&mut self, timeout: Duration) -> Result<Vec<Delivery>, PortError> {
         let end = Instant::now() + timeout;
         let mut state = self.shared().lock();

@@ -1,4 +1,4 @@
-//! The trajectory that a controller was given, put together from the frames that went to it.
+//! Trajectory of the controller, rebuilt from the frames that were sent to it.
 use std::sync::Arc;
 
 use jtc_host::{Point, Trajectory};
@@ -6,18 +6,18 @@ use jtc_wire::{Command, DataStatus, FrameRef, FrameStatus, FrameType, Response};
 
 use crate::line::LineEvent;
 
-/// Points that a controller takes (J-30): more are no trajectory.
+/// Largest number of points that a controller accepts (J-30).
 const POINTS_MAX: usize = 12_000;
 
-/// Segments in their order.
+/// Received segments, in their order.
 #[derive(Clone, Default)]
 struct Assembly {
     number: u16,
     step_ms: u16,
     segments: u16,
-    /// How many of them are there.
+    /// Number of received segments.
     taken: u16,
-    /// Points before the last of these, for one that is sent again.
+    /// Number of points before the last segment, in case it is sent again.
     before_last: usize,
     points: Vec<Point>,
 }
@@ -26,13 +26,13 @@ struct Assembly {
 #[derive(Default)]
 pub struct Upload {
     current: Option<Assembly>,
-    /// One that has begun, and whose first segment may be refused still: then the one before it stays.
+    /// New upload whose first segment may still be refused; then the one before it stays.
     next: Option<Assembly>,
     whole: Option<Arc<Trajectory>>,
 }
 
 impl Upload {
-    /// Whether an event belongs to an upload.
+    /// Returns `true` if an event belongs to an upload.
     pub fn is_of(event: &LineEvent) -> bool {
         match event {
             LineEvent::Sent { frame_type, .. } => *frame_type == FrameType::Trajectory,
@@ -41,7 +41,7 @@ impl Upload {
         }
     }
 
-    /// Something has happened on the line.
+    /// Takes an event of the line.
     pub fn see(&mut self, event: &LineEvent) {
         match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => self.sent(bytes),
@@ -54,14 +54,15 @@ impl Upload {
         }
     }
 
-    /// Whether a Trajectory frame was accepted, where this is the answer to one that arrived whole.
+    /// Returns `true` if a Trajectory frame was accepted; `None` if this is not the answer to an undamaged Trajectory
+    /// frame.
     pub fn answer(response: &Response) -> Option<bool> {
         let whole =
             response.frame_type == FrameType::Trajectory as u8 && response.status == FrameStatus::NoError;
         whole.then_some(response.data == DataStatus::NoError)
     }
 
-    /// A Trajectory frame has gone to the controller.
+    /// Takes a Trajectory frame that was sent to the controller.
     pub fn sent(&mut self, frame: &[u8]) {
         let Some(Ok(Command::Trajectory(segment))) = FrameRef::new_checked(frame).map(Command::parse) else {
             return;
@@ -80,7 +81,7 @@ impl Upload {
             return;
         }
         if segment.segment.checked_add(1) == Some(assembly.taken) {
-            // Its record did not come: it was sent again.
+            // Its record was lost, so the segment was sent again.
             assembly.points.truncate(assembly.before_last);
         } else if segment.segment == assembly.taken && assembly.taken < assembly.segments {
             assembly.taken += 1;
@@ -94,7 +95,8 @@ impl Upload {
         self.whole = None;
     }
 
-    /// The controller has answered a Trajectory frame. Records come in the order of the frames: the first behind a first segment is of that.
+    /// Takes the answer to a Trajectory frame. Records come in the order of the frames, so the first record after a
+    /// first segment belongs to it.
     pub fn answered(&mut self, accepted: bool) {
         if let Some(next) = self.next.take() {
             self.whole = None;
@@ -104,15 +106,16 @@ impl Upload {
         }
     }
 
-    /// What was sent is not known any more.
+    /// Forgets all uploads.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// What the controller has, where all of it was seen. `executes`: it runs it, which it does with nothing but a whole one.
+    /// Returns the controller's trajectory, if all its segments were seen. `executes`: the controller runs it, which is
+    /// possible only if it is complete.
     pub fn trajectory(&mut self, executes: bool) -> Option<Arc<Trajectory>> {
         if executes {
-            // Its record did not come.
+            // The record of the first segment was lost.
             self.answered(true);
         }
         let current = self.current.as_ref().filter(|c| c.taken == c.segments && c.points.len() >= 2)?;
@@ -127,7 +130,7 @@ mod tests {
 
     use super::*;
 
-    /// Segments of two points each, whose positions begin at `from`.
+    /// Returns segments of two points each, whose positions begin at `from`.
     fn frames(number: u16, from: i16, segments: u16) -> Vec<Vec<u8>> {
         let segment = |i: u16| {
             let point = |k: i16| RawPoint { position: [from + 2 * i as i16 + k; 6], ..RawPoint::default() };
@@ -156,7 +159,7 @@ mod tests {
             upload.answered(true);
         }
         assert_eq!(positions(&mut upload).unwrap(), [100, 101, 102, 103, 104, 105]);
-        // Not the whole of the next one: it cannot be executed, and is no trajectory.
+        // An incomplete next trajectory cannot be executed, and is not returned.
         upload.sent(&frames(8, 500, 2)[0]);
         upload.answered(true);
         assert_eq!(positions(&mut upload), None);
@@ -175,7 +178,7 @@ mod tests {
         }
         upload.answered(true);
         upload.answered(true);
-        // In flight together; the first is refused, and so are those behind it.
+        // Frames in flight together: the first is refused, and so are those after it.
         for frame in &new {
             upload.sent(frame);
         }

@@ -20,21 +20,21 @@ use tungstenite::{Connector, Message, WebSocket, client_tls_with_config};
 
 /// Longest time for a connection and its first message.
 const CONNECTING: Duration = Duration::from_secs(5);
-/// Longest that an agent may leave a message untaken.
+/// Longest time for which an agent may leave a message unread.
 const STALL: Duration = Duration::from_secs(5);
-/// What does not stand for itself in a value in an address: all but the unreserved characters (RFC 3986, 2.3).
+/// Characters that must be escaped in a value in an address: all but the unreserved characters (RFC 3986, 2.3).
 const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
-/// How a client presents itself.
+/// Identity and options of a client.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// What people are to call it; empty: its address.
+    /// Name shown to users; empty: its address.
     pub name: String,
-    /// Token; `None`: what can be had without one.
+    /// Token; `None`: only the access without a token.
     pub token: Option<String>,
-    /// What becomes of its motion without it: `continue`, which is also the default, `pause` or `stop`.
+    /// Policy for its motion after a disconnect: `continue`, which is also the default, `pause` or `stop`.
     pub policy: Option<&'static str>,
-    /// Certificates, as PEM, that an agent at `https://` is trusted by; `None`: those of the system.
+    /// Certificates, as PEM, for the trust in an agent at `https://`; `None`: those of the system.
     pub certificates: Option<PathBuf>,
 }
 
@@ -45,7 +45,7 @@ pub struct Hello {
     pub port: String,
     /// Rate of its line, Bd, if it has one.
     pub baud: Option<u32>,
-    /// No arm moves.
+    /// `true` if the arm is simulated.
     pub simulated: bool,
 }
 
@@ -65,7 +65,7 @@ enum Notice {
     Other,
 }
 
-/// A line that an agent owns, as a port.
+/// Line of an agent, as a port.
 pub struct AgentPort {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     url: String,
@@ -74,7 +74,7 @@ pub struct AgentPort {
     /// Bytes that were received and not read yet.
     received: Vec<u8>,
     denied: Option<String>,
-    /// The last Stop or Pause that this end knows of, by number, where there was one.
+    /// Number of the last Stop or Pause that this client knows of, if there was one.
     halted: Option<u64>,
     /// Stops and Pauses of other clients.
     halts: Halts,
@@ -85,7 +85,7 @@ impl AgentPort {
     ///
     /// # Errors
     ///
-    /// [`PortError::NoAgent`] where none answers there, [`PortError::NotLetIn`] where it does not let this client in.
+    /// [`PortError::NoAgent`] if no agent answers there, [`PortError::NotLetIn`] if the agent refuses this client.
     pub fn open(url: &str, options: &Options) -> Result<Self, PortError> {
         let no_agent = |what: String| PortError::NoAgent { url: url.to_owned(), what };
         let (secure, rest) = match (url.strip_prefix("https://"), url.strip_prefix("http://")) {
@@ -159,12 +159,12 @@ impl AgentPort {
         Ok(port)
     }
 
-    /// What the agent has said of itself.
+    /// Returns the agent's description of itself.
     pub fn hello(&self) -> &Hello {
         &self.hello
     }
 
-    /// One message, if one comes in this time; false when none does.
+    /// Receives one message, if one arrives within the timeout; `false` otherwise.
     fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
         let set = tls::socket(self.socket.get_mut()).and_then(|stream| {
             if timeout.is_zero() {
@@ -181,7 +181,7 @@ impl AgentPort {
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
                 Ok(Notice::Halted { number, of_others }) => {
                     self.halted = Some(number);
-                    // Without a count one is enough: it voids what was requested before.
+                    // Without a count, one more is enough: it voids earlier requests.
                     let one_more = Halts { all: self.halts.all + 1, stops: self.halts.stops + 1 };
                     self.halts = of_others.unwrap_or(one_more);
                 }
@@ -219,7 +219,7 @@ fn has_port(authority: &str) -> bool {
     authority.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok())
 }
 
-/// The first of the host's addresses that takes a connection.
+/// Connects to the first of the host's addresses that accepts.
 fn connect(authority: &str) -> io::Result<TcpStream> {
     let mut last = io::Error::new(io::ErrorKind::NotFound, "this name has no address");
     for address in authority.to_socket_addrs()? {
@@ -240,11 +240,11 @@ impl Port for AgentPort {
                 return Ok(0);
             }
         }
-        // What has come meanwhile, too: whoever asks for what is new is not to get what is old.
+        // Also reads the messages that arrived meanwhile: a caller that asks for new data must not get old data.
         while self.received.len() < buffer.len() {
             match self.receive(Duration::ZERO) {
                 Ok(true) => {}
-                // The end is reported when all that came before it is read.
+                // The end is reported after all earlier messages are read.
                 Ok(false) | Err(_) => break,
             }
         }
@@ -270,7 +270,7 @@ impl Port for AgentPort {
     }
 
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
-        // Otherwise nothing is sent, and the agent goes on refusing motions.
+        // Otherwise no request is sent, and the agent continues to refuse motions.
         if halts == self.halts.all { self.ask_to_move() } else { Ok(()) }
     }
 
@@ -293,7 +293,7 @@ impl Port for AgentPort {
 
 impl Drop for AgentPort {
     fn drop(&mut self) {
-        // It notices the end of the connection, too.
+        // The agent also detects the end of the connection.
         let _ = self.socket.close(None);
         let _ = self.socket.flush();
     }

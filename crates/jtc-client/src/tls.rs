@@ -1,4 +1,4 @@
-//! TLS of a client: whose certificates are trusted.
+//! TLS of a client: trusted certificates.
 use std::io;
 use std::net::TcpStream;
 use std::path::Path;
@@ -10,11 +10,11 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Trusts the certificates of this file, or those of the system.
+/// Creates a connector that trusts the certificates of this file, or those of the system.
 ///
 /// # Errors
 ///
-/// The file holds none, or the system has none.
+/// The file contains no certificate, or the system has none.
 pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
     let mut roots = RootCertStore::empty();
     let certificates: Vec<CertificateDer<'static>> = match file {
@@ -24,7 +24,7 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
         }
         None => rustls_native_certs::load_native_certs().certs,
     };
-    // Of the many that a system has some may be none.
+    // A system has many certificates, and some may be invalid.
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());
@@ -39,12 +39,12 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
     Ok(Connector::Rustls(Arc::new(config)))
 }
 
-/// The socket under it.
+/// Returns the underlying socket.
 pub fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut TcpStream> {
     match stream {
         MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
         MaybeTlsStream::Plain(stream) => Ok(stream),
-        // Nothing else is made here.
+        // No other kind of stream is created here.
         _ => Err(io::ErrorKind::Unsupported.into()),
     }
 }

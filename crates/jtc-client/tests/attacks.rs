@@ -1,4 +1,4 @@
-//! What somebody could try who is not to be let in, as docs/security.md lists it.
+//! Possible attacks without access rights, as docs/security.md lists them.
 use crate::common;
 
 use common::Served;
@@ -70,7 +70,7 @@ fn a_token_in_an_address_is_the_viewers_for_sockets_that_look_and_is_written_now
         assert_eq!(served.ask(&format!("GET {path}?token={operator}"), &upgrade).0, 403, "{path}");
         let (status, _) = served.ask(&format!("GET {path}?token=0123456789abcdefghij"), &upgrade);
         assert_eq!(status, 401, "{path}");
-        // It is let in, and then misses what makes a socket of it.
+        // The request is let in, but lacks the headers of a WebSocket.
         assert!(
             ![401, 403].contains(&served.ask(&format!("GET {path}?token={viewer}"), &upgrade).0),
             "{path}"

@@ -1,4 +1,4 @@
-//! What a page shows that looks at an agent: the arm as numbers, trajectories to draw, what is commanded, what codes mean, reports.
+//! Data for the dashboard: the arm as numbers, trajectories to draw, commands, meanings of codes, reports.
 use crate::common;
 
 use std::sync::Arc;
@@ -36,7 +36,7 @@ fn numbers<const N: usize>(value: &Value) -> [f64; N] {
     serde_json::from_value::<Vec<f64>>(value.clone()).expect("numbers").try_into().expect("so many")
 }
 
-/// A line that counts the bytes which go to the controller.
+/// Port that counts the bytes to the controller.
 struct Counted(LivePort, Arc<AtomicU64>);
 
 impl Port for Counted {
@@ -58,7 +58,7 @@ impl Port for Counted {
     }
 }
 
-/// The arm of the controller once it was asked.
+/// Returns the arm of the controller after it was read.
 fn model(served: &Served) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -115,7 +115,7 @@ fn the_arm_is_shown_as_numbers_without_a_question_for_each_who_looks() {
     let asked = sent.load(Ordering::Relaxed) - before;
     assert!(asked < 1000, "{asked} bytes for a hundred who look within some seconds");
 
-    // Another one is shown at once, before it would be asked for anyway.
+    // A new arm is shown at once, before the next regular request.
     let anna = Program::new(&served, "anna", 60.0, "continue");
     let slow = json!({ "settings": [{ "name": "velocity_max_rad_s", "joint": 2, "value": 0.25 }] });
     assert_eq!(anna.ask("PUT /api/settings", Some(slow)).0, 204);
@@ -194,7 +194,8 @@ fn codes_are_explained_by_name_number_and_words() {
     );
 }
 
-/// A run that fails in its midst: its errors have pages, what was commanded is shown, and its report leads with what broke.
+/// A run that fails midway: its errors have pages, the commanded values are shown, and its report begins with the first
+/// failure.
 #[test]
 fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_goes_well() {
     let arm = Arm::avena();
@@ -247,7 +248,7 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
             && broken.contains("joint 3: torque over limit")
     );
 
-    // It goes on, and well.
+    // The next run succeeds.
     anna.recover();
     let (after, _) = event(&served, 0, "ended");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true, "speed_percent": 50 }));
@@ -273,10 +274,10 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
         "{}",
         good.len()
     );
-    // The path has ended before the arm has settled, and it is held at the end of the path until then.
+    // The path ends before the arm has settled, and the arm is held at the end of the path until then.
     until("nothing is commanded", || controller()["commanded_rad"].is_null());
 
-    // One that is stopped has one, too; what was before is kept.
+    // A stopped motion has a report, too; earlier reports are kept.
     let job = anna.begin("POST /api/moves", json!({ "to_rad": ZERO, "speed_percent": 20 }));
     event(&served, event(&served, 0, "executing").0, "finished");
     until("Operate", || controller()["state"] == "Operate");

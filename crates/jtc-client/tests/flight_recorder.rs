@@ -1,4 +1,4 @@
-//! The flight recorder by HTTP: what it does, its log as a file, and beginning anew.
+//! The flight recorder by HTTP: its state, its log as a file, and a new log.
 use crate::common;
 
 use common::Served;
@@ -23,7 +23,8 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let job = anna.begin("POST /api/moves", json!({ "to_rad": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0] }));
     assert_eq!(anna.over(job)["stage"], "finished");
     assert!(blocks(&served) > before, "it records");
-    // Two at once: one of them reads it, and the other is refused or reads it when that is over. Others are served meanwhile.
+    // Two requests at once: one reads the log, and the other is refused or reads it afterwards. Other requests are
+    // served meanwhile.
     let (viewer, operator) = (&served.tokens.viewer, &served.tokens.operator);
     let files = std::thread::scope(|scope| {
         let both = [(); 2].map(|()| scope.spawn(|| served.bytes_as(Some(operator), "GET /api/log")));
@@ -40,7 +41,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let (_, head, file) = files.iter().find(|(status, ..)| *status == 200).expect("one of them");
     assert!(head.to_ascii_lowercase().contains("content-type: application/octet-stream"), "{head}");
 
-    // What `jtc log fetch` writes: a recording for every program, with a log that gives every tick again.
+    // Output of `jtc log fetch`: a recording for every program, with a log that reproduces every tick.
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
     std::fs::write(&path, file).expect("a file");
@@ -51,7 +52,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     let said: Vec<&str> = account.story.events.iter().map(|event| event.text.as_str()).collect();
     assert!(said.iter().any(|text| text.contains("HoldPos")), "{said:?}");
 
-    // The last half second as numbers, each tick of it: what the recording has.
+    // The last half second as numbers, every tick, as in the recording.
     let (status, values) = served.api_as(Some(operator), "GET /api/log/values?last_s=0.5", None, None);
     assert_eq!(status, 200, "{values}");
     let column = |of: &Value| -> Vec<f64> {
@@ -67,7 +68,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
         let columns = ["position_rad", "commanded_rad", "error_rad", "velocity_rad_s", "torque_nm"]
             .map(|key| column(&joint[key]));
         assert!(columns.iter().all(|column| column.len() == times.len()));
-        // It rests since.
+        // The arm rests since then.
         let [position, commanded, error, velocity, torque] = columns.map(|column| column[column.len() - 1]);
         assert!(
             (position - then.position).abs() < 1e-3 && (commanded - then.set_position).abs() < 1e-6,
@@ -83,7 +84,7 @@ fn the_log_is_a_recording_that_can_be_replayed_and_is_cleared_by_the_one_who_com
     );
     assert_eq!(served.api_as(Some(viewer), "GET /api/log/values", None, None).0, 403);
 
-    // Nobody else reads or clears it.
+    // Other clients cannot read or clear it.
     assert_eq!(served.api_as(Some(viewer), "GET /api/log", None, None).0, 403);
     let mut looks = served.session("bob", Some(viewer));
     assert!(looks.log_status().is_ok() && looks.fetch_log(|_, _| {}).is_err());

@@ -1,4 +1,4 @@
-//! Jogging over a connection that is slow: what comes late moves nothing.
+//! Jogging over a slow connection: late requests move no joint.
 use crate::common;
 
 use std::time::Duration;
@@ -8,21 +8,21 @@ use common::program::Program;
 use serde_json::{Value, json};
 use test_kit::patience::{Patience, until};
 
-/// The arm is held, and can be jogged: joints whose load has just been caught cannot yet.
+/// Waits until the arm is held and can be jogged: joints that have just taken their load cannot be jogged yet.
 fn ready(anna: &Program<'_>) {
     anna.recover();
     let still = json!({ "rates_rad_s": vec![0.0; 6] });
     until("an arm that can be jogged", || anna.ask("POST /api/jog", Some(still.clone())).0 == 204);
 }
 
-/// What a person sees who looks now.
+/// Returns the current time and position, as shown to a user.
 fn seen(served: &Served) -> (u64, f64) {
     let (_, status) = served.api("GET /api/status", None, None);
     let position = status["controller"]["joints"][5]["position_rad"].as_f64().expect("it is measured");
     (status["at_ms"].as_u64().expect("a time"), position)
 }
 
-/// Asks for a jog of the last joint by what was seen then.
+/// Requests a jog of the last joint with the status time of that moment.
 fn jog(anna: &Program<'_>, as_of_ms: u64, rate: f64) -> (u16, Value) {
     let body = json!({ "rates_rad_s": [0.0, 0.0, 0.0, 0.0, 0.0, rate] });
     anna.ask(&format!("POST /api/jog?as_of_ms={as_of_ms}"), Some(body))
@@ -46,7 +46,7 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
     let (now_ms, after) = seen(&served);
     assert!((after - before).abs() < 1e-3, "{before} {after}");
     assert!(now_ms >= old_ms + 1_200, "{old_ms} {now_ms}");
-    // What is seen just now moves it.
+    // A jog with the current time moves the joint.
     let mut patience = Patience::begin();
     loop {
         let (now_ms, position) = seen(&served);
@@ -57,12 +57,12 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         assert_eq!(status, 204, "{error}");
         patience.pause(format_args!("a jog away from {before}: {position}"));
     }
-    // The end of it is taken however late it comes, also with what no agent has shown.
+    // The end of a jog is accepted at any delay, also with a time that no agent has sent.
     for as_of_ms in [old_ms, u64::MAX] {
         let (status, error) = jog(&anna, as_of_ms, 0.0);
         assert_eq!(status, 204, "{error}");
     }
-    // Without it nothing is known of what was seen.
+    // Without a time the agent does not know how old the request's status was.
     let body = json!({ "rates_rad_s": vec![0.0; 6] });
     assert_eq!(anna.ask("POST /api/jog?as_of_ms=-1", Some(body.clone())).0, 400);
     assert_eq!(anna.ask("POST /api/jog", Some(body)).0, 204);
@@ -80,7 +80,7 @@ fn a_status_that_no_agent_has_shown_yet_is_none() {
     assert!((seen(&served).1 - before).abs() < 1e-3);
 }
 
-/// Messages that are late say so, however steadily they come.
+/// Late messages are reported as late, even if they arrive steadily.
 #[test]
 fn each_status_of_a_stream_has_the_time_when_it_was_made() {
     let served = Served::start(921_600);

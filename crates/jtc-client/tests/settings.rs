@@ -1,4 +1,5 @@
-//! Settings and what else is given to a controller by HTTP: taken, refused to others and in the wrong state, and never by half.
+//! Settings and other parameters of a controller by HTTP: accepted, refused to other clients and in the wrong state,
+//! and never applied partly.
 use crate::common;
 
 use common::Served;
@@ -35,7 +36,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
     let lines = logged(&served, "host_timeout_ms = 1500, velocity_max_rad_s of joint 2 = 0.75");
     assert!(lines.len() == 1 && lines[0]["why_not"].is_null(), "{lines:?}");
 
-    // Each beside one that is good, which is not taken either.
+    // Each wrong setting is sent with a valid one, which is refused too.
     for (wrong, facts) in [
         (json!({ "name": "host_timeout", "value": 1 }), [Value::Null, json!(1.0), Value::Null]),
         (json!({ "name": "host_timeout_ms", "value": 60001 }), [Value::Null, json!(60001.0), json!(60000.0)]),
@@ -46,7 +47,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
         (json!({ "name": "torque_max_nm", "joint": 6, "value": -1 }), [json!(6), json!(-1.0), json!(0.01)]),
         (json!({ "name": "stop_ms", "value": 400 }), [Value::Null, json!(400.0), Value::Null]),
         (json!({ "name": "payload_mass_kg", "value": 1 }), [const { Value::Null }; 3]),
-        // Good alone, and none beside its highest position.
+        // Valid alone, but not below its highest position.
         (json!({ "name": "position_min_rad", "joint": 4, "value": 3 }), [json!(4), json!(3.0), json!(2.97)]),
     ] {
         let (status, error) = change(json!([{ "name": "stop_ms", "value": 300 }, wrong]));
@@ -62,7 +63,7 @@ fn settings_are_read_and_changed_all_together_or_not_at_all() {
         assert!(matches!(change(none).0, 400 | 422));
     }
 
-    // Under torque the controller refuses them, and keeps what it has; some change all the same.
+    // Under torque the controller refuses them, and keeps its parameters; some settings can still be changed.
     anna.recover();
     let (status, error) = change(json!([{ "name": "stop_ms", "value": 300 }]));
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("torque")), "{error}");

@@ -1,4 +1,4 @@
-//! TLS: who trusts the agent's certificate gets in, and nobody else speaks with it.
+//! TLS: a client that trusts the agent's certificate is let in, and no other client can talk to it.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -42,7 +42,7 @@ fn a_session_works_over_tls_where_the_certificate_is_trusted() {
     }
     session.gripper(true).expect("it commands");
 
-    // The certificate of somebody else, that of nobody, and no TLS at all.
+    // Another agent's certificate, no certificate, and no TLS at all.
     let (other, _) = certificate(&dir, "other", 0o600);
     for certificates in [Some(other), None] {
         let refused = AgentPort::open(&url, &options(certificates)).err().expect("it is not trusted");

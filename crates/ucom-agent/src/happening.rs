@@ -1,138 +1,138 @@
-//! What can happen to a chain and its jobs.
+//! Events of a chain and its jobs.
 use agent_kit::api::Problem;
 use utoipa::ToSchema;
 
-/// What becomes of running boards when the client that commanded them shows no more that it is there.
+/// Policy for running boards when the client that commanded them falls silent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
-    /// They go on with the inputs that they have.
+    /// The boards continue with their present inputs.
     Continue,
-    /// They are stopped: nobody gives them new inputs.
+    /// The boards are stopped, because no client sends new inputs.
     #[default]
     Stop,
 }
 
-/// What has happened.
+/// Event of the chain or a job.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Happening {
-    /// Another client commands, or nobody does.
+    /// Change of the lease holder.
     Lease {
-        /// Its name; missing: nobody commands.
+        /// Name of the holder; missing: no client holds the lease.
         #[serde(skip_serializing_if = "Option::is_none")]
         holder: Option<String>,
     },
-    /// Somebody stopped all boards: the frames are on the bus.
+    /// Stop of all boards: its frames are on the bus.
     Halt {
-        /// Who it was.
+        /// Name of the client that requested it.
         by: String,
-        /// So many Stops, within a tenth of a second, of which this was the last; missing: one.
+        /// Number of Stops within a tenth of a second that end with this one; missing: a single Stop.
         #[serde(skip_serializing_if = "Option::is_none")]
         times: Option<u64>,
     },
-    /// After a Stop each board was asked.
+    /// Answers of the boards after a Stop.
     Stopped {
-        /// Boards that have confirmed it.
+        /// Numbers of boards that have confirmed it.
         boards: Vec<u8>,
-        /// Boards that may still run, each with the reason: also those that ran and from which nothing is received any more.
+        /// Boards that may still run, each with the reason; includes boards that ran and are silent now.
         not_stopped: Vec<String>,
     },
-    /// Heartbeats of a board have changed.
+    /// Change of a board's heartbeats.
     Heartbeat {
-        /// Its number; missing: a board that is not known.
+        /// Number of the board; missing: a board that is not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         board: Option<u8>,
-        /// `late`, `lost`, `back`, or `rebooted`: it has no number any more.
+        /// Change: `late`, `lost`, `back`, or `rebooted`, after which the board has no number.
         change: String,
     },
-    /// A board has left its control loop, or is in it again.
+    /// Change of a board's control loop.
     Loop {
-        /// Its number.
+        /// Number of the board.
         board: u8,
-        /// `left-loop`, `stopped-by-policy` or `in-loop`.
+        /// Change: `left-loop`, `stopped-by-policy` or `in-loop`.
         change: String,
     },
-    /// What is known of a board has changed.
+    /// Change of a board's state.
     State {
-        /// Its number.
+        /// Number of the board.
         board: u8,
-        /// `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
+        /// State: `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
         state: String,
     },
-    /// A board reports an error.
+    /// Error that a board reports.
     BoardError {
-        /// Its number; 0: one without a number.
+        /// Number of the board; 0: a board without a number.
         board: u8,
         /// Number of the error.
         code: u8,
-        /// Its name.
+        /// Name of the error.
         name: String,
-        /// What it means.
+        /// Meaning of the error.
         meaning: String,
     },
-    /// A board sends a text.
+    /// Text that a board sends.
     Text {
-        /// Its number.
+        /// Number of the board.
         board: u8,
-        /// The text.
+        /// Text of the message.
         text: String,
     },
-    /// Something to know about the bus.
+    /// Note about the bus.
     Note {
-        /// In words.
+        /// Text of the note.
         text: String,
     },
-    /// The bus is gone.
+    /// Loss of the bus.
     Lost {
-        /// Why.
+        /// Reason.
         why: String,
     },
-    /// A job began.
+    /// Start of a job.
     Begun {
-        /// Its number.
+        /// Number of the job.
         job: u64,
-        /// What it does.
+        /// Description of the job.
         what: String,
-        /// Who asked for it.
+        /// Name of the client that requested it.
         client: String,
     },
-    /// Something to know about a job.
+    /// Note about a job.
     JobNote {
-        /// Its number.
+        /// Number of the job.
         job: u64,
-        /// In words.
+        /// Text of the note.
         text: String,
     },
-    /// An update goes on; at most five times a second within a cycle.
+    /// Progress of an update; at most five times a second within a cycle.
     Progress {
-        /// The job.
+        /// Number of the job.
         job: u64,
-        /// Boards that get the image now.
+        /// Numbers of boards that receive the image now.
         boards: Vec<u8>,
-        /// Which attempt.
+        /// Number of the attempt.
         attempt: u32,
-        /// 1: checked, 2: written.
+        /// Cycle; 1: checked, 2: written.
         cycle: u32,
-        /// Bytes of both cycles that were taken.
+        /// Number of accepted bytes of both cycles.
         bytes: u64,
-        /// Of so many.
+        /// Number of bytes of both cycles.
         total: u64,
     },
-    /// A job is over.
+    /// End of a job.
     Ended {
-        /// Its number.
+        /// Number of the job.
         job: u64,
-        /// `finished`, `cancelled` or `failed`.
+        /// Outcome: `finished`, `cancelled` or `failed`.
         outcome: String,
-        /// Why it failed.
+        /// Reason of a failure.
         #[serde(skip_serializing_if = "Option::is_none")]
         error: Option<Problem>,
     },
 }
 
 impl Happening {
-    /// What it is called in the log of commands: who commanded and stopped, and what came of that.
+    /// Returns the name of the event in the log of commands, which contains lease changes, Stops and their results.
     pub(crate) fn logged(&self) -> Option<&'static str> {
         match self {
             Self::Lease { .. } => Some("lease"),
@@ -157,5 +157,5 @@ impl agent_kit::journal::Happening for Happening {
     }
 }
 
-/// Events of a chain by number.
+/// Numbered events of a chain.
 pub type Journal = agent_kit::journal::Journal<Happening>;

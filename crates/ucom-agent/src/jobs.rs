@@ -1,4 +1,4 @@
-//! Things that take longer than a request: how they are, and how they ended.
+//! Jobs, which take longer than a request: their stages and results.
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -8,21 +8,21 @@ use ucom::Admin;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{BoardSeen, LoadForecast};
 
-/// Jobs that are remembered.
+/// Number of jobs that are kept.
 const KEPT: usize = 256;
 
-/// How a job is.
+/// Stage of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stage {
     Running,
     Finished,
-    /// Somebody cancelled it, or stopped the boards.
+    /// Cancelled by a client, or by a Stop.
     Cancelled,
     Failed,
 }
 
 impl Stage {
-    /// In a word.
+    /// Returns a word for the stage.
     pub fn name(self) -> &'static str {
         match self {
             Self::Running => "running",
@@ -33,20 +33,20 @@ impl Stage {
     }
 }
 
-/// What a job brought about.
+/// Result of a job.
 #[derive(Clone, Debug)]
 pub(crate) enum Done {
-    /// Who is there, and what is worth a word.
+    /// Boards of the chain, and unusual observations.
     Chain(Vec<BoardSeen>, Vec<String>),
-    /// What is wrong.
+    /// Findings of a doctor.
     Findings(Vec<Finding>),
-    /// What became of each board.
+    /// Result for each board.
     Update(UpdateReport),
-    /// Which boards run, with which flags, and what they make of the bus.
+    /// Running boards with their flags, and the predicted bus load.
     Running(Vec<(u8, Admin)>, LoadForecast),
 }
 
-/// A job, while it goes on and afterwards.
+/// Job, while it runs and afterwards.
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
     pub number: u64,
@@ -63,7 +63,7 @@ struct Kept {
     last: u64,
 }
 
-/// The jobs of an agent.
+/// Jobs of an agent.
 #[derive(Default)]
 pub(crate) struct Jobs(Mutex<Kept>);
 
@@ -72,7 +72,7 @@ impl Jobs {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A new one, which runs.
+    /// Adds a running job.
     pub fn add(&self, what: &str, client: &str) -> Job {
         let mut kept = self.lock();
         kept.last += 1;
@@ -85,7 +85,7 @@ impl Jobs {
         job
     }
 
-    /// One is over. False: it was before.
+    /// Ends a job. Returns `false` if it had ended before.
     pub fn end(&self, number: u64, stage: Stage, done: Option<Done>, error: Option<Problem>) -> bool {
         let mut kept = self.lock();
         let running = |job: &&mut Job| job.number == number && job.stage == Stage::Running;
@@ -94,12 +94,12 @@ impl Jobs {
         true
     }
 
-    /// One by its number.
+    /// Returns a job by its number.
     pub fn get(&self, number: u64) -> Option<Job> {
         self.lock().jobs.iter().find(|job| job.number == number).cloned()
     }
 
-    /// Those that are remembered, oldest first.
+    /// Returns the kept jobs, oldest first.
     pub fn list(&self) -> Vec<Job> {
         self.lock().jobs.iter().cloned().collect()
     }

@@ -1,4 +1,4 @@
-//! What the owner of the bus shows to everyone: the boards as last seen.
+//! Snapshot of the bus for all clients: the boards as last seen.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,34 +9,34 @@ use ucom_host::master::io::{ParValue, Snapshot};
 use ucom_host::master::{Boards, Statistics};
 use ucom_host::session::Known;
 
-/// What is known of the values of a board.
+/// Known values of a board.
 #[derive(Clone)]
 pub(crate) struct Values {
     /// Names, types, scales and units.
     pub known: Arc<Known>,
-    /// Outputs as they came last.
+    /// Last received outputs.
     pub outputs: Option<Snapshot>,
-    /// Inputs as last set, or read.
+    /// Inputs as last set or read.
     pub inputs: Vec<Option<u16>>,
-    /// Parameters as this agent believes them to be.
+    /// Parameters as last written by this agent.
     pub parameters: Vec<ParValue>,
 }
 
-/// The bus and its boards at one time.
+/// Bus and boards at one time.
 #[derive(Clone)]
 pub(crate) struct Picture {
-    /// When, by the clock of the session, µs, and by that of the agent.
+    /// Time of the snapshot by the session's clock, µs; the next field is the time by the agent's clock.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,
     pub boards: Boards,
     pub statistics: Statistics,
     pub controller: Option<Controller>,
-    /// Heartbeats go out.
+    /// `true` if the agent sends heartbeats.
     pub is_master: bool,
-    /// When another PC was last seen on the bus, µs.
+    /// Time when another PC was last seen on the bus, µs.
     pub competing_us: Option<u64>,
-    /// Numbers that two boards have, in words.
+    /// Numbers that two boards share, in words.
     pub shared: Vec<String>,
     pub values: BTreeMap<u8, Values>,
 }
@@ -57,7 +57,7 @@ impl Picture {
         }
     }
 
-    /// The time of the session now, µs.
+    /// Returns the present time of the session, µs.
     pub(crate) fn clock_us(&self) -> u64 {
         self.now_us + self.at.elapsed().as_micros() as u64
     }

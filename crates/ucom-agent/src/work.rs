@@ -1,4 +1,4 @@
-//! What is asked of the owner of the bus, one thing after the other.
+//! Queue of requests to the owner of the bus, which runs one at a time.
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,59 +7,60 @@ use agent_kit::lease::ClientId;
 
 use crate::owner::Hands;
 
-/// Commands that may wait for their turn, and questions of those who look: these keep no command waiting.
+/// Largest numbers of waiting commands, and of waiting questions without the lease; questions do not block commands.
 const WAITING_MAX: usize = 32;
 const QUESTIONS_MAX: usize = 8;
 
-/// What kind of thing it is.
+/// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Nothing moves by it.
+    /// Question, which moves nothing.
     Question,
-    /// A Stop that comes before it ends it.
+    /// Command; a Stop ends it.
     Command,
-    /// A Stop does not end it once it has begun: a board whose flash is half written could not do anything afterwards.
+    /// Update; once begun it is not ended by a Stop, because a board with half-written flash could not work afterwards.
     Update,
-    /// Sees to it that each board has stopped.
+    /// Check that each board has stopped.
     Stop,
 }
 
-/// Does something with the bus, or takes the reason why it is not done.
+/// Function on the bus; if it is refused, it receives the reason.
 pub(crate) type Act = Box<dyn FnOnce(Result<&mut Hands, Problem>) + Send>;
 
-/// What a client asks for that commands. Until its turn a Stop may come, or the lease go to somebody else.
+/// Request of the lease holder. Before its turn a Stop may come, or the lease may pass to another client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Asked {
     pub client: ClientId,
-    /// The last Stop that it was asked for after.
+    /// Number of the last Stop before the request.
     pub halt: u64,
-    /// Something may move by it. What can only end something is done also for a client that has gone.
+    /// `true` if the request may move boards. Requests that can only end a motion are executed even if their client has
+    /// disconnected.
     pub moves: bool,
 }
 
-/// A thing to do.
+/// Queued request.
 pub(crate) struct Work {
     pub kind: Kind,
-    /// The job that it is.
+    /// Number of its job.
     pub job: Option<u64>,
-    /// Missing: a question of somebody who looks, or a Stop.
+    /// Request of the lease holder; missing: a question without the lease, or a Stop.
     pub asked: Option<Asked>,
     pub act: Act,
 }
 
 impl Work {
-    /// Somebody who only looks asks for it.
+    /// Returns `true` for a question without the lease.
     fn looks(&self) -> bool {
         self.asked.is_none() && self.kind == Kind::Question
     }
 }
 
-/// What goes on.
+/// Current request.
 struct Current {
     kind: Kind,
     job: Option<u64>,
     asked: Option<Asked>,
-    /// It is to end.
+    /// `true` if it must end.
     cancelled: bool,
 }
 
@@ -67,27 +68,27 @@ struct Current {
 struct Waiting {
     works: VecDeque<Work>,
     current: Option<Current>,
-    /// The owner takes nothing any more.
+    /// `true` after the owner has closed the queue.
     closed: bool,
 }
 
-/// A job that is cancelled.
+/// Cancelled job.
 pub(crate) enum Cancelled {
-    /// It undoes what it has begun.
+    /// Running job, which undoes its steps.
     Current,
-    /// It will not be begun.
+    /// Waiting job, which will not begin.
     Waiting(Work),
 }
 
-/// What waits for the owner.
+/// Queue of the owner.
 #[derive(Default)]
 pub(crate) struct Queue(Mutex<Waiting>);
 
-/// A place in the queue, which nobody else takes meanwhile.
+/// Place in the queue, reserved by its lock.
 pub(crate) struct Place<'a>(MutexGuard<'a, Waiting>);
 
 impl Place<'_> {
-    /// Takes it.
+    /// Puts a request in the place.
     pub fn fill(mut self, work: Work) {
         let works = &mut self.0.works;
         let behind = works.iter().position(|other| other.looks() && !work.looks()).unwrap_or(works.len());
@@ -100,8 +101,8 @@ impl Queue {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A place behind all others of its kind: for a question of somebody who `looks` behind all. While a job goes on nothing else is
-    /// taken.
+    /// Returns a place after all others of its kind; questions without the lease (`looks`) come after all others. While
+    /// a job runs or waits, no other request is accepted.
     pub fn place(&self, looks: bool) -> Result<Place<'_>, Problem> {
         let waiting = self.lock();
         if waiting.closed {
@@ -122,7 +123,7 @@ impl Queue {
         Ok(Place(waiting))
     }
 
-    /// A Stop takes the first place; one that waits is enough.
+    /// Puts the check after a Stop in the first place, unless one waits there already.
     pub fn stop(&self, act: Act) {
         let mut waiting = self.lock();
         if !waiting.closed && waiting.works.front().is_none_or(|first| first.kind != Kind::Stop) {
@@ -130,7 +131,7 @@ impl Queue {
         }
     }
 
-    /// The next one, which is the current one from now on.
+    /// Takes the next request, which becomes the current one.
     pub fn take(&self) -> Option<Work> {
         let mut waiting = self.lock();
         let work = waiting.works.pop_front();
@@ -141,24 +142,24 @@ impl Queue {
         work
     }
 
-    /// The current one has ended.
+    /// Marks the current request as ended.
     pub fn done(&self) {
         self.lock().current = None;
     }
 
-    /// The current one is to end.
+    /// Returns `true` if the current request must end.
     pub fn is_cancelled(&self) -> bool {
         self.lock().current.as_ref().is_some_and(|current| current.cancelled)
     }
 
-    /// A Stop ends what goes on, but for what it does not end.
+    /// Cancels the current request because of a Stop, unless it is an update.
     pub fn cancel_by_stop(&self) {
         if let Some(current) = &mut self.lock().current {
             current.cancelled |= matches!(current.kind, Kind::Command | Kind::Question);
         }
     }
 
-    /// Something goes on or waits that this client asked for, and that moves.
+    /// Returns `true` while a request of this client that may move boards is running or waiting.
     pub fn moves_for(&self, client: ClientId) -> bool {
         let waiting = self.lock();
         let current = waiting.current.iter().filter_map(|current| current.asked);
@@ -166,7 +167,7 @@ impl Queue {
         all.any(|asked| asked.moves && asked.client == client)
     }
 
-    /// Cancels a job; `None`: it neither goes on nor waits.
+    /// Cancels a job; `None`: it neither runs nor waits.
     pub fn cancel_job(&self, number: u64) -> Option<Cancelled> {
         let mut waiting = self.lock();
         if let Some(current) = waiting.current.as_mut().filter(|current| current.job == Some(number)) {
@@ -177,7 +178,7 @@ impl Queue {
         waiting.works.remove(place).map(Cancelled::Waiting)
     }
 
-    /// The owner goes: what waits is not done.
+    /// Closes the queue: waiting requests are refused.
     pub fn close(&self) {
         let works = {
             let mut waiting = self.lock();

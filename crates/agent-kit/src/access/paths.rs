@@ -1,23 +1,23 @@
-//! What a request is, by its method and path alone: known before anything else of it.
+//! Classes of requests that depend on method and path alone, so they are known before any other part of the request.
 
-/// Paths that pages of allowed origins may ask for. With the method GET none of them changes anything.
+/// Paths that pages of allowed origins may request. With the method GET they change nothing.
 const LOOKS: [&str; 5] = ["/", "/api/foxglove", "/api/stream", "/api/status", "/metrics"];
 
-/// A request with this method for this path can only look.
+/// Returns `true` if a request with this method and path has read-only access.
 pub fn looks(method: &str, path: &str) -> bool {
     ["GET", "HEAD"].contains(&method) && LOOKS.contains(&path)
 }
 
-/// Paths of the Stop and the Pause, which need no lease, and on this computer no token.
+/// Paths of Stop and Pause, which need no lease, and on this computer no token.
 const HALTS: [&str; 2] = ["/api/stop", "/api/pause"];
 
-/// A request with this method for this path is a Stop or a Pause.
+/// Returns `true` if a request with this method and path is a Stop or a Pause.
 pub fn halts(method: &str, path: &str) -> bool {
     method == "POST" && HALTS.contains(&path)
 }
 
-/// A request with this method for this path is served when all other connections are taken: a Stop, a Pause, a command that ends the work of
-/// a board or a job, or the socket by which `jtc traj stop` sends its Stop.
+/// Returns `true` if a request with this method and path is served even when all other connections are in use: a Stop,
+/// a Pause, a command that ends the work of a board or a job, or the socket that `jtc traj stop` uses for its Stop.
 pub fn stops(method: &str, path: &str) -> bool {
     let number = |part: &str| part.parse::<u64>().is_ok();
     let board = path.strip_prefix("/api/boards/").and_then(|rest| rest.split_once('/'));

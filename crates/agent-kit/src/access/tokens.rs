@@ -1,4 +1,4 @@
-//! The tokens of an agent, and the file that only its owner can read.
+//! The tokens of an agent, and the token file that only its owner can read.
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -6,44 +6,44 @@ use std::path::{Path, PathBuf};
 use base64::Engine as _;
 use base64::engine::general_purpose::URL_SAFE_NO_PAD;
 
-/// The tokens of an agent, as its token file has them.
+/// Tokens of an agent, as stored in its token file.
 #[derive(Clone, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tokens {
-    /// Lets its bearer command.
+    /// Token that gives the role operator.
     pub operator: String,
-    /// Lets its bearer look and stop.
+    /// Token for read-only access and Stop.
     pub viewer: String,
 }
 
-/// Why there are no tokens.
+/// Reason why the tokens cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenError {
-    /// It cannot be read or written.
+    /// Token file that cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why not.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// Others can read it.
+    /// Token file that other users can read.
     #[error("{path}: mode {mode:04o}: other users can read this token file", path = path.display())]
     Open {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its mode.
+        /// Mode of the file.
         mode: u32,
     },
-    /// It has other contents.
+    /// File that is not a token file.
     #[error("{path}: no token file: {what}", path = path.display())]
     Contents {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong.
+        /// Problem in the contents.
         what: String,
     },
-    /// The system has no random numbers.
+    /// Operating system without random numbers.
     #[error("no random numbers from this system: {0}")]
     Random(getrandom::Error),
 }
@@ -64,7 +64,7 @@ impl host_kit::Diagnose for TokenError {
     }
 }
 
-/// 32 random bytes as text.
+/// Returns 32 random bytes as text.
 ///
 /// # Errors
 ///
@@ -76,11 +76,11 @@ pub fn random() -> Result<String, TokenError> {
 }
 
 impl Tokens {
-    /// Those of a file.
+    /// Loads the tokens from a file.
     ///
     /// # Errors
     ///
-    /// The file can be read by others, is none, or cannot be read.
+    /// Other users can read the file, it is not a token file, or it cannot be read.
     pub fn load(path: &Path) -> Result<Self, TokenError> {
         let contents = |what: String| TokenError::Contents { path: path.to_owned(), what };
         let text =
@@ -95,11 +95,12 @@ impl Tokens {
         Ok(tokens)
     }
 
-    /// Those of the file, or new ones in a new file that only its owner can read. True: they are new.
+    /// Loads the tokens from a file, or writes new tokens to a new file that only its owner can read. Returns `true`
+    /// with the tokens if they are new.
     ///
     /// # Errors
     ///
-    /// The file can be read by others, is none, or cannot be read or written.
+    /// Other users can read the file, it is not a token file, or it cannot be read or written.
     pub fn load_or_make(path: &Path) -> Result<(Self, bool), TokenError> {
         match Self::load(path) {
             Err(TokenError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {}
@@ -122,9 +123,10 @@ impl Tokens {
 }
 
 impl Tokens {
-    /// What people are told about the agent at `url` when it begins: the operator's token and the link of the dashboard with it on a terminal alone,
-    /// for what is written elsewhere (the journal of the system, a file) is kept and read by others. What stands behind `#` is not sent to any
-    /// server, and the page takes it out of the address at once.
+    /// Returns the lines that announce the agent at `url` when it starts. The operator's token and the dashboard link
+    /// that contains it appear only on a terminal, because other outputs (the system journal, a file) are stored and
+    /// can be read by other users. Browsers do not send the part after `#` to any server, and the page removes it from
+    /// the address at once.
     pub fn announce(&self, url: &str, file: &Path, announced: Announced) -> Vec<String> {
         let Announced { are_new, link, on_terminal } = announced;
         let (operator, file) = (&self.operator, file.display());
@@ -144,29 +146,29 @@ impl Tokens {
     }
 }
 
-/// To whom tokens are announced, and why.
+/// Conditions under which the tokens are announced.
 #[derive(Clone, Copy, Debug)]
 pub struct Announced {
-    /// They were made just now.
+    /// `true` if the tokens were made in this start.
     pub are_new: bool,
-    /// The link with the token is asked for.
+    /// `true` if the user requested the link with the token.
     pub link: bool,
-    /// A person reads it, and nothing keeps it.
+    /// `true` if the output is a terminal: a person reads it and it is not stored.
     pub on_terminal: bool,
 }
 
-/// The token file of this user, where none is named.
+/// Returns the default token file of this user.
 pub fn default_token_file() -> Option<PathBuf> {
     token_file("tokens.toml")
 }
 
-/// The file of this name where this user's token files are.
+/// Returns the path of the file of this name in the directory of this user's token files.
 pub fn token_file(name: &str) -> Option<PathBuf> {
     let state = host_kit::user_folder("XDG_STATE_HOME", ".local/state")?;
     Some(state.join("openjtc").join(name))
 }
 
-/// A new file that only its owner can read.
+/// Creates a file that only its owner can read.
 fn private(path: &Path) -> io::Result<fs::File> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);

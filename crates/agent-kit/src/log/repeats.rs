@@ -1,37 +1,37 @@
-//! Lines that somebody without a token can cause without end: the first ones are written, the others counted.
+//! Lines that clients without a token can cause without limit: the first ones are written, further ones are counted.
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-/// Lines that are written of each kind and sender before they are counted.
+/// Number of lines per kind and sender that are written before repetitions are only counted.
 const FIRST: u32 = 10;
-/// Then one line with a count is written so often; a sender that was quiet for so long begins anew.
+/// Interval between lines with a count. After this time without a line, a sender starts again with full lines.
 const PERIOD: Duration = Duration::from_secs(60);
-/// Senders that are told apart; all others count as one.
+/// Number of senders that are counted separately; all others are counted together.
 const SENDERS_MAX: usize = 256;
-/// What the others are called.
+/// Name for all other senders.
 const OTHERS: &str = "others";
 
-/// Lines of a kind and a sender.
+/// Count of lines of one kind and sender.
 struct Count {
     since: Instant,
     written: u32,
-    /// Those that were not written, and the facts of the last.
+    /// Number of lines that were not written, and the facts of the last one.
     more: u64,
     facts: Value,
 }
 
-/// Who repeats what how often.
+/// Counts of repeated lines by kind and sender.
 #[derive(Default)]
 pub(super) struct Repeats {
     counts: BTreeMap<(&'static str, String), Count>,
-    /// Before then no count is to be written.
+    /// Earliest time at which a line with a count is due.
     next: Option<Instant>,
 }
 
 impl Repeats {
-    /// The facts, where a line is to be written for them.
+    /// Returns the facts if a line must be written for them.
     pub(super) fn admit(
         &mut self,
         what: &'static str,
@@ -55,7 +55,7 @@ impl Repeats {
         None
     }
 
-    /// The lines with counts that are due: the facts of the last of each, with `times`.
+    /// Returns the lines with counts that are due: the facts of the last repetition, with `times`.
     pub(super) fn due(&mut self, now: Instant) -> Vec<(&'static str, Value)> {
         if self.next.is_none_or(|next| now < next) {
             return Vec::new();
@@ -75,7 +75,7 @@ impl Repeats {
         lines
     }
 
-    /// The lines with counts that are not written yet.
+    /// Returns the lines with counts that are not written yet.
     pub(super) fn rest(&mut self) -> Vec<(&'static str, Value)> {
         let counts = std::mem::take(&mut self.counts).into_iter();
         counts.filter_map(|((what, _), mut count)| Some((what, count.line()?))).collect()
@@ -83,7 +83,7 @@ impl Repeats {
 }
 
 impl Count {
-    /// The line about those that were not written, where there are any.
+    /// Returns the line about lines that were not written, if there are any.
     fn line(&mut self) -> Option<Value> {
         let times = std::mem::take(&mut self.more);
         let mut facts = self.facts.take();
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// Whoever repeats what how fast: the lines are few, and their numbers are all that came.
+    /// For any rate of repetitions there are few lines, and their counts add up to all repetitions.
     #[test]
     fn every_repeat_is_written_or_counted_and_the_lines_are_few() {
         for (senders, rounds, step_ms) in [

@@ -1,12 +1,12 @@
-//! The file of the log of commands, which is put aside when it is long.
+//! File of the log of commands, which is renamed when it is full.
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Where lines are written.
+/// Target of log lines.
 pub(super) trait Target: Write {
-    /// Makes room for a line of so many bytes. True: it begins another file.
+    /// Makes room for a line of this number of bytes. Returns `true` if the line begins a new file.
     ///
     /// # Errors
     ///
@@ -16,22 +16,22 @@ pub(super) trait Target: Write {
     }
 }
 
-/// A file, and the one before it: both together take no more than a limit.
+/// Current and previous file, which together stay within a limit.
 pub(super) struct Rotated {
     file: File,
-    /// Name of the file and of the one before; none: it is no ordinary file, and is never put aside.
+    /// Names of the current and the previous file; `None`: it is not an ordinary file and is never renamed.
     names: Option<(PathBuf, PathBuf)>,
     length: u64,
     limit: u64,
 }
 
 impl Rotated {
-    /// Goes on with this file, or begins it.
+    /// Opens or creates this file.
     pub(super) fn open(path: &Path, limit: u64) -> io::Result<Self> {
         let file = append(path)?;
         let metadata = file.metadata()?;
         let names = if metadata.is_file() {
-            // Where the name is a link, what it leads to is put aside.
+            // If the name is a link, the target of the link is renamed.
             let path = path.canonicalize()?;
             let before = before(&path);
             Some((path, before))
@@ -48,14 +48,15 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        // A file that this limit did not make, of an earlier version or of another program, is not replaced.
+        // A file that is larger than this limit allows comes from an earlier version or another program; it is not
+        // replaced.
         if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
             std::fs::rename(before, kept)?;
         }
         match std::fs::rename(path, before) {
-            // Somebody has moved or removed it: the next line begins another one.
+            // The file was moved or removed from outside: the next line begins a new one.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             renamed => renamed.map_err(|error| {
                 let (path, before) = (path.display(), before.display());
@@ -87,7 +88,7 @@ fn append(path: &Path) -> io::Result<File> {
     OpenOptions::new().append(true).create(true).open(path)
 }
 
-/// Name of the file before this one: `commands.jsonl.1`.
+/// Returns the name of the previous file: `commands.jsonl.1`.
 fn before(path: &Path) -> PathBuf {
     let mut name = OsString::from(path);
     name.push(".1");

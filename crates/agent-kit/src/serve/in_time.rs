@@ -1,4 +1,4 @@
-//! Connections and bodies that have to come on in time: who sends or takes too slowly does not keep its place.
+//! Time limits for connections and bodies: a client that sends or reads too slowly loses its place.
 use std::io::{self, IoSlice};
 use std::pin::Pin;
 use std::sync::Arc;
@@ -11,19 +11,19 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// How long a connection may take nothing of what waits for it, and how many bytes it has to take for each further second. Bytes that were taken
-/// quickly give no more time than this.
+/// Longest time in which a connection may take none of the waiting bytes, and number of bytes that it must take for
+/// each further second. Quickly read bytes do not extend this time.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
-/// A body that has to be whole by a moment.
+/// Body that must be complete within a time.
 pub(super) struct InTime {
     body: Incoming,
     end: Option<(Pin<Box<Sleep>>, Duration)>,
 }
 
 impl InTime {
-    /// `within` counts from now; none: somebody else sees to it.
+    /// Returns the body with the limit `within` from now; `None`: the time is limited elsewhere.
     pub(super) fn new(body: Incoming, within: Option<Duration>) -> Self {
         let end = |within| (Box::pin(sleep_until(Instant::now() + within)), within);
         Self { body, end: within.map(end) }
@@ -58,10 +58,10 @@ impl Body for InTime {
     }
 }
 
-/// A connection that takes what is sent to it, or is closed.
+/// Connection that is closed if the other end does not read.
 pub(super) struct Taken<S> {
     stream: S,
-    /// It has become a socket, which has times of its own.
+    /// `true` after the connection has become a socket, which has its own time limits.
     released: Arc<AtomicBool>,
     since: Option<Instant>,
     waited: Duration,
@@ -75,12 +75,12 @@ impl<S> Taken<S> {
         Self { stream, released, since: None, waited: Duration::ZERO, bytes: 0, timer }
     }
 
-    /// Time in all that the bytes taken so far allow for taking nothing.
+    /// Returns the total waiting time that the bytes taken so far allow.
     fn patience(&self) -> Duration {
         TAKES_NOTHING + Duration::from_secs_f64(self.bytes as f64 / TAKES_PER_S)
     }
 
-    /// Something was written, or waits for the other end to take what was written before.
+    /// Handles the result of a write: bytes were written, or the write waits for the other end to read.
     fn see<T>(
         &mut self,
         context: &mut Context<'_>,
@@ -159,7 +159,8 @@ mod tests {
 
     use super::*;
 
-    /// Bytes of an answer of so many that are taken by a reader that takes `piece` bytes each `pause`; and whether that were all.
+    /// Returns the number of bytes taken by a reader that reads `piece` bytes every `pause`, and `true` if the whole
+    /// answer was taken.
     fn taken(bytes: usize, piece: usize, pause: Duration) -> (usize, bool) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
         runtime.expect("a runtime").block_on(async {
@@ -197,11 +198,11 @@ mod tests {
             let (got, all) = taken(bytes, piece, pause);
             assert_eq!((got == bytes, all), (whole, whole), "{bytes} bytes, {piece} each {pause:?}: {got}");
         }
-        // Nothing at all is taken.
+        // The reader takes no bytes at all.
         assert!(!taken(100_000, 1, Duration::from_secs(3600)).1);
     }
 
-    /// A reader that was quick is closed as soon as one that was not.
+    /// A reader that was quick before is closed as soon as one that was not.
     #[test]
     fn bytes_that_were_taken_quickly_give_no_time_to_take_nothing() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();
@@ -221,7 +222,7 @@ mod tests {
         });
     }
 
-    /// A socket may be silent as long as it likes.
+    /// A socket may be silent without limit.
     #[test]
     fn a_connection_that_has_become_a_socket_is_not_closed() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();

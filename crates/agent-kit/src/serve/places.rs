@@ -1,4 +1,4 @@
-//! Places for connections: so many for all requests, and some that are kept for those that stop something.
+//! Places for connections: a number for all requests, and further places reserved for Stop and Pause.
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -7,19 +7,21 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
-/// Connections at once from this computer, and as many from others: these cannot keep those out.
+/// Largest number of connections from this computer, and again from other computers, so that others cannot block local
+/// clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
-/// When fewer places than that are left, a connection is for one request, that comes at once.
+/// Threshold of free places below which a connection serves a single request, which must come at once.
 const FEW: usize = CONNECTIONS_MAX / 2;
-/// Connections beyond these from this computer, and from others, for Stop and Pause alone. When they are taken as well, the oldest that has not
-/// asked for anything is closed for the new one: those that are opened and ask for nothing keep no Stop out, however many they are. All
-/// together leave some of the 1024 files that a program may open.
+/// Further connections for Stop and Pause alone, from this computer and from others. When these are in use as well, the
+/// oldest connection without a Stop is closed for a new one, so that idle connections never block a Stop, however many
+/// there are. All connections together stay below the 1024 files that a program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
-/// What a connection of this computer has at least to ask for something, before it is closed for a new one: the new one waits so long.
+/// Time that a local connection has at least to send its request before it is closed for a new one; the new one waits
+/// for this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
-/// The places for connections of one side.
+/// Places for connections of one side.
 pub(super) struct Places {
     common: Arc<Semaphore>,
     kept: Mutex<Kept>,
@@ -27,7 +29,7 @@ pub(super) struct Places {
     asks_within: Duration,
 }
 
-/// Connections on the places that are kept, oldest first.
+/// Connections on reserved places, oldest first.
 #[derive(Default)]
 struct Kept {
     open: VecDeque<Open>,
@@ -38,14 +40,14 @@ struct Open {
     number: u64,
     since: Instant,
     abort: AbortHandle,
-    /// It has asked for a Stop: it is served to its end.
+    /// `true` if the connection has requested a Stop: it is served to its end.
     stops: bool,
 }
 
-/// The place of a connection; free again when this is dropped.
+/// Place of a connection; it is freed on drop.
 pub(super) struct Place {
     places: Arc<Places>,
-    /// Few places were left when it came.
+    /// `true` if few places were left when the connection came.
     pub(super) few: bool,
     kind: Kind,
 }
@@ -56,12 +58,12 @@ enum Kind {
 }
 
 impl Places {
-    /// Those of this computer.
+    /// Returns the places for connections of this computer.
     pub(super) fn here() -> Arc<Self> {
         Self::new(KEPT_HERE, ASKS_WITHIN)
     }
 
-    /// Those of others: nobody here waits for them.
+    /// Returns the places for connections of other computers; no local connection waits for them.
     pub(super) fn elsewhere() -> Arc<Self> {
         Self::new(KEPT_ELSEWHERE, Duration::ZERO)
     }
@@ -71,7 +73,8 @@ impl Places {
         Arc::new(Self { common, kept: Mutex::default(), kept_max, asks_within })
     }
 
-    /// Runs a connection on a place. It is dropped, which closes it, when all places are taken by connections that stop something.
+    /// Runs a connection on a place. The connection is dropped, which closes it, if all places serve connections that
+    /// stop something.
     pub(super) async fn run<F: Future<Output = ()> + Send + 'static>(
         self: &Arc<Self>,
         connection: impl FnOnce(Place) -> F,
@@ -82,7 +85,7 @@ impl Places {
             tokio::spawn(connection(place));
             return;
         }
-        // The threads that serve have the time to read what came before.
+        // This gives the serving threads time to read earlier requests.
         let oldest = self.oldest().map(|open| open + self.asks_within);
         if let Some(due) = oldest.filter(|due| *due > Instant::now()) {
             tokio::time::sleep_until(due).await;
@@ -97,12 +100,12 @@ impl Places {
         kept.last += 1;
         let number = kept.last;
         let place = Place { places: self.clone(), few: true, kind: Kind::Kept { number } };
-        // It cannot end before it is among them: they are locked.
+        // The lock is held, so the connection cannot end before it is in the list.
         let abort = tokio::spawn(connection(place)).abort_handle();
         kept.open.push_back(Open { number, since: Instant::now(), abort, stops: false });
     }
 
-    /// When the connection came that is closed for a new one, if one has to be.
+    /// Returns the arrival time of the connection that would be closed for a new one, if one must be closed.
     fn oldest(&self) -> Option<Instant> {
         let kept = self.kept();
         let full = kept.open.len() >= self.kept_max;
@@ -119,12 +122,12 @@ impl Places {
 }
 
 impl Place {
-    /// Few places are left now.
+    /// Returns `true` if few places are left now.
     pub(super) fn are_few(&self) -> bool {
         self.few || self.places.are_few()
     }
 
-    /// The connection has asked for something, which `stops` or not. True: it is served.
+    /// Registers a request of the connection; `stops` is `true` for a Stop. Returns `true` if the request is served.
     pub(super) fn serves(&self, stops: bool) -> bool {
         let Kind::Kept { number } = self.kind else { return true };
         if stops {
@@ -152,7 +155,7 @@ mod tests {
 
     use super::*;
 
-    /// Whatever came before and does not end: the newest connection has a place, unless all that are kept are stopping something.
+    /// A new connection gets a place after any number of open ones, unless all reserved places serve Stops.
     #[test]
     fn the_newest_connection_has_a_place() {
         let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
@@ -163,7 +166,7 @@ mod tests {
             let came = came.clone();
             runtime.block_on(places.run(move |place| async move {
                 let served = place.serves(stops);
-                // The test may have failed meanwhile.
+                // The test may have failed in the meantime.
                 let _ = came.send((number, place.few, served));
                 pending::<()>().await;
                 drop(place);
@@ -172,7 +175,7 @@ mod tests {
             comes.try_recv().ok()
         };
         for number in 0..CONNECTIONS_MAX {
-            // Its own place is taken before the others are counted.
+            // The own place is taken before the others are counted.
             assert_eq!(open(number, false), Some((number, number + 1 > CONNECTIONS_MAX - FEW, true)));
         }
         for number in 0..10 * KEPT_ELSEWHERE {

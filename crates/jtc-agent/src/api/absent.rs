@@ -1,4 +1,4 @@
-//! Joints that are not there, for work on a bench.
+//! Absent joints, for work on a bench.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
@@ -15,23 +15,23 @@ use super::Agent;
 use super::error::Denials;
 use crate::owner::ClientPort;
 
-/// The joints that are not there.
+/// Joints that are set absent.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsentObject {
-    /// Each at most once; empty: all joints are there.
+    /// Joints, each at most once; empty: all joints are there.
     #[schema(max_items = 6)]
     pub absent: Vec<AbsentJoint>,
 }
 
-/// A joint that is not there.
+/// Absent joint.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AbsentJoint {
-    /// Which, 1 to 6 from the base.
+    /// Number of the joint, 1 to 6 from the base.
     #[schema(minimum = 1, maximum = 6)]
     pub joint: u8,
-    /// Where the model has it, rad.
+    /// Position of the joint in the model, rad.
     #[schema(minimum = -6.2832, maximum = 6.2832)]
     pub position_rad: f64,
 }
@@ -46,7 +46,7 @@ impl From<[Option<f64>; JOINTS]> for AbsentObject {
 }
 
 impl AbsentObject {
-    /// Where each joint is that is not there.
+    /// Returns the position of each absent joint.
     fn positions(&self) -> Result<[Option<f64>; JOINTS], Problem> {
         let (low, high) =
             settings::setting(settings::ABSENT_POSITION).map_or((0.0, 0.0), |row| (row.low, row.high));
@@ -85,7 +85,7 @@ impl AbsentObject {
     }
 }
 
-/// The joints that are set absent, and where the model has them.
+/// Returns the joints that are set absent, and their positions in the model.
 #[utoipa::path(
     get,
     path = "/api/absent",
@@ -96,7 +96,9 @@ pub(super) async fn absent(State(agent): State<Agent>) -> Result<Json<AbsentObje
     Ok(Json(agent.ask(Session::absent).await?.into()))
 }
 
-/// Sets these joints absent, and no others. Without torque only; while one is absent no motion is executed.
+/// Sets these joints absent, and all others present.
+///
+/// The controller accepts this only without torque. While a joint is absent no motion is executed.
 #[utoipa::path(
     put,
     path = "/api/absent",

@@ -1,4 +1,4 @@
-//! The arm of the controller as one thing: read as an arm file, and given whole.
+//! The complete arm of the controller: read as an arm file, and written as a whole.
 use agent_kit::api::{Problem, Refusals};
 use agent_kit::gate::{Asker, plain};
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -20,55 +20,56 @@ use super::runs::JobObject;
 use crate::jobs::{Given, Task, give};
 use crate::owner::ClientPort;
 
-/// The arm that the controller has in use.
+/// Arm in use by the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ArmObject {
-    /// Its name.
+    /// Name of the arm.
     pub name: String,
-    /// Hash of all that decides how the arm moves.
+    /// Hash of all parameters that decide how the arm moves.
     pub hash: String,
-    /// As an arm file, TOML: what `jtc arm pull` writes.
+    /// Arm file in TOML, as `jtc arm pull` writes it.
     pub text: String,
 }
 
-/// An arm for the controller.
+/// Arm to send to the controller.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArmRequest {
-    /// The text of an arm file (TOML), or of a robot description (URDF) in which nothing but the arm moves.
+    /// Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints.
     pub text: String,
-    /// Keep it over a loss of power: the arm has no torque then, and the controller is in Init behind it.
+    /// `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
+    /// afterwards.
     #[serde(default)]
     pub store: bool,
 }
 
-/// What the controller was given.
+/// Parameters that were sent to the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct GivenObject {
-    /// So many settings have changed.
+    /// Number of settings that have changed.
     pub settings: usize,
-    /// The controller has the arm's name.
+    /// `true` if the controller has the name of the arm.
     pub named: bool,
-    /// Friction, gains and model, as far as they were confirmed.
+    /// Friction, gains and model, as far as the controller confirmed them.
     pub parts: Vec<PartObject>,
-    /// Hash of the arm, where all of it was read back and nothing differs.
+    /// Hash of the arm, if all parameters were read back without a difference.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
-    /// Its number in the memory that lasts.
+    /// Number of the arm in the non-volatile memory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stored_number: Option<u32>,
 }
 
-/// A part that the controller confirmed.
+/// Parameter frame that the controller confirmed.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PartObject {
-    /// Which.
+    /// Name of the parameter.
     pub parameter: String,
-    /// Bytes of its frame.
+    /// Length of its frame, bytes.
     pub bytes: usize,
-    /// How often it was sent on purpose: a friction table twice.
+    /// Number of intended transmissions; a friction table is sent twice.
     pub times: u32,
-    /// s.
+    /// Duration, s.
     pub time_s: f64,
 }
 
@@ -84,12 +85,12 @@ impl From<Given> for GivenObject {
     }
 }
 
-/// A hash as it is written everywhere.
+/// Returns the usual text form of a hash.
 pub(super) fn in_words(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-/// The arm that the controller has in use, as a file.
+/// Returns the arm in use by the controller, as a file.
 #[utoipa::path(
     get,
     path = "/api/arm",
@@ -102,10 +103,12 @@ pub(super) async fn arm(State(agent): State<Agent>) -> Result<Json<ArmObject>, P
     Ok(Json(ArmObject { name: arm.name.clone(), hash: in_words(hash), text: arm.to_toml() }))
 }
 
-/// Gives the controller a whole arm: a job. Its settings, name, friction, gains and model are sent, read back and compared.
+/// Sends a complete arm to the controller, as a job.
 ///
-/// Where settings differ the controller has to be in Init or Error (`POST /api/disable`); in Init it holds the arm as soon as it has all of it, and
-/// stays in Init where the arm is stored. What a controller would not take of it is refused before anything is sent.
+/// Settings, name, friction, gains and model are sent, read back and compared. If settings differ, the controller must
+/// be in Init or Error (`POST /api/disable`). In Init it starts the position hold as soon as it has the complete arm,
+/// and stays in Init if the arm is stored. An arm with values that a controller would refuse is refused before anything
+/// is sent.
 #[utoipa::path(
     put,
     path = "/api/arm",
@@ -120,7 +123,7 @@ pub(super) async fn put_arm(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Nobody else's text is read.
+    // The body is read only for the holder of the lease.
     agent.commander(&asker)?;
     let (arm, store) = read(&agent, request, |ArmRequest { text, store }| Ok((taken(&text)?, store))).await?;
     let (commander, turn) = agent.mover(&asker, after)?;
@@ -132,7 +135,7 @@ pub(super) async fn put_arm(
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }
 
-/// An arm that a controller takes.
+/// Returns the arm of a text if a controller would accept it.
 pub(super) fn taken(text: &str) -> Result<Arm, Problem> {
     let arm = Arm::parse(text).map_err(|error| {
         let error = error.in_file("text".as_ref());

@@ -1,4 +1,4 @@
-//! Bodies that are long, or take a while to be understood: read some at once, beside the threads that serve.
+//! Long request bodies: a limited number is read at the same time, and outside the threads that serve requests.
 use agent_kit::api::Problem;
 use axum::Json;
 use axum::body::Bytes;
@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 
 use super::Agent;
 
-/// A body of JSON that may be missing.
+/// Optional JSON body.
 pub(super) struct Perhaps<T>(pub Option<T>);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
@@ -22,7 +22,7 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Perhaps<T> {
     }
 }
 
-/// Reads a body of JSON and what `understand` makes of it; both whether or not somebody waits for it.
+/// Reads a JSON body and converts it with `understand`. Completes even if the client disconnects.
 pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     agent: &Agent,
     request: Request,
@@ -42,7 +42,7 @@ pub(super) async fn read<B: DeserializeOwned, T: Send + 'static>(
     .await?
 }
 
-/// What takes a while, where it keeps nobody else from being served.
+/// Runs a slow function on a thread of its own, so that other requests are served meanwhile.
 pub(super) async fn blocking<T: Send + 'static>(
     act: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, Problem> {

@@ -1,4 +1,4 @@
-//! Commands that are soon over, for who has the lease.
+//! Short commands of the lease holder.
 use std::borrow::Cow;
 use std::time::Duration;
 
@@ -20,16 +20,16 @@ use super::objects::PayloadObject;
 use crate::jobs::{Commander, Turn, stopped};
 use crate::owner::ClientPort;
 
-/// The lease of a client that waits for an answer is renewed so often.
+/// Interval at which the lease of a client that waits for an answer is renewed.
 const RENEWED: Duration = Duration::from_millis(300);
 /// Slowest speed, % (J-57).
 const SPEED_MIN: u8 = 5;
 
-/// % of the speed of the trajectory.
+/// Speed, % of the speed of the trajectory.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SpeedObject {
-    /// 5 to 100.
+    /// Speed, 5 to 100 %.
     #[schema(minimum = 5, maximum = 100)]
     pub percent: u8,
 }
@@ -38,12 +38,12 @@ pub struct SpeedObject {
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Switch {
-    /// True: on.
+    /// `true`: on.
     pub on: bool,
 }
 
 impl Agent {
-    /// Has the end of the line of the client that commands do something that moves nothing.
+    /// Runs a command that cannot move the arm on the session of the lease holder.
     pub(super) async fn command<T, E>(
         &self,
         asker: &Asker,
@@ -59,7 +59,7 @@ impl Agent {
         self.act(&commander, turn, what, act).await
     }
 
-    /// The same for what may move the arm.
+    /// Runs a command that may move the arm on the session of the lease holder.
     pub(super) async fn motion<T, E>(
         &self,
         asker: &Asker,
@@ -75,7 +75,7 @@ impl Agent {
         self.act(&commander, turn, what, act).await
     }
 
-    /// Does it, and logs it whether or not somebody waits for the end of it.
+    /// Runs the command and logs its result, even if the client disconnects.
     pub(super) async fn act<T, E>(
         &self,
         commander: &Commander,
@@ -102,14 +102,14 @@ impl Agent {
         loop {
             tokio::select! {
                 done = &mut acting => return done?,
-                // Whoever waits for an answer is there.
+                // A client that waits for an answer is alive.
                 () = tokio::time::sleep(RENEWED) => self.line.with(|line, now| line.renew(client, now)),
             }
         }
     }
 }
 
-/// Goes on after a pause.
+/// Resumes a paused motion.
 #[utoipa::path(
     post,
     path = "/api/resume",
@@ -123,7 +123,7 @@ pub(super) async fn resume(
 ) -> Result<StatusCode, Problem> {
     let commander = agent.commander(&asker)?;
     if commander.is_moving() {
-        // A motion that somebody stopped before it began is not what is gone on with.
+        // A motion that another client stopped before it began must not be resumed.
         agent.line.with(|line, now| {
             line.could_ask(commander.client, now)?;
             match line.status() {
@@ -144,7 +144,7 @@ fn not_paused(status: &Status) -> Problem {
     Problem::of(&MotionError::NotPaused { state, trajectory })
 }
 
-/// Another speed on the path, now.
+/// Changes the speed on the path immediately.
 #[utoipa::path(
     put,
     path = "/api/speed",
@@ -173,7 +173,7 @@ pub(super) async fn speed(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Teaching: the arm is led by hand. Or ends it.
+/// Starts or ends Teaching, in which the arm is led by hand.
 #[utoipa::path(
     post,
     path = "/api/teach",
@@ -215,7 +215,9 @@ pub(super) async fn gripper(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Takes the torque off all joints, at rest. An arm without brakes falls.
+/// Takes the torque off all joints, at rest.
+///
+/// An arm without brakes falls.
 #[utoipa::path(
     post,
     path = "/api/disable",
@@ -227,7 +229,7 @@ pub(super) async fn disable(State(agent): State<Agent>, asker: Asker) -> Result<
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// What the arm carries at its flange from now on.
+/// Sets the payload at the flange.
 #[utoipa::path(
     put,
     path = "/api/payload",
@@ -245,7 +247,7 @@ pub(super) async fn set_payload(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// A payload that is one of a body.
+/// Returns the payload if it is physically possible.
 pub(super) fn body(payload: PayloadObject) -> Result<Payload, Problem> {
     let payload = Payload::from(payload);
     payload.check().map_err(|e| {

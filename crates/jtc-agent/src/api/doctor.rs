@@ -1,4 +1,4 @@
-//! What is wrong with link, bus and set-up, as `jtc doctor` finds it.
+//! Diagnosis of link, bus and set-up, like `jtc doctor`.
 use std::time::Duration;
 
 use agent_kit::api::{Problem, Refusals};
@@ -13,32 +13,32 @@ use utoipa::ToSchema;
 use super::Agent;
 use super::error::Denials;
 
-/// How long is listened: 50 statuses.
+/// Listening time: 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
 
-/// What was found.
+/// Result of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct DoctorObject {
-    /// Nothing is a problem.
+    /// `true` if no finding is a problem.
     pub healthy: bool,
-    /// How long was listened, s.
+    /// Listening time, s.
     pub listened_s: f64,
-    /// Statuses that came meanwhile.
+    /// Number of statuses received in this time.
     pub statuses: u64,
-    /// Worst first.
+    /// Findings, worst first.
     pub findings: Vec<FindingObject>,
 }
 
-/// A finding.
+/// Finding of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct FindingObject {
     /// `problem`, `warning` or `good`.
     pub severity: String,
-    /// What it is.
+    /// Observation.
     pub what: String,
-    /// What usually causes it; empty where nothing is known.
+    /// Usual cause; empty if no cause is known.
     pub why: String,
-    /// What helps; empty where nothing is to be done.
+    /// Next step; empty if no action is needed.
     pub next: String,
 }
 
@@ -54,9 +54,9 @@ impl From<Finding> for FindingObject {
     }
 }
 
-/// Looks for what is wrong with link, joint bus and set-up, which takes two seconds. Nothing is changed.
+/// Diagnoses link, joint bus and set-up, which takes two seconds and changes nothing.
 ///
-/// The link is judged by all that came from the controller. Other rates are not tried: the line is in use.
+/// The link is judged by all bytes that the controller has sent. Other rates are not tried, because the line is in use.
 #[utoipa::path(
     get,
     path = "/api/doctor",
@@ -75,7 +75,7 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
         Some(status) => absent(&agent, status).await?,
         None => Vec::new(),
     };
-    // A stop and a jump of an encoder are under torque only.
+    // A held stop and an encoder jump exist only under torque.
     let reactions = match &status {
         Some(status) if words::has_torque(status) => agent.ask(|session| Ok(session.reactions())).await?,
         _ => None,
@@ -98,7 +98,8 @@ pub(super) async fn doctor(State(agent): State<Agent>) -> Result<Json<DoctorObje
     Ok(Json(DoctorObject { healthy, listened_s: time_s, statuses, findings }))
 }
 
-/// The joints that are set absent. A drive that answers although its joint is has no bit of its own (J-53): the controller is asked.
+/// Returns the joints that are set absent. The status has no bit for an absent joint whose drive answers (J-53), so the
+/// controller is asked.
 async fn absent(agent: &Agent, status: &Status) -> Result<Vec<Joint>, Problem> {
     if status.errors & error::EXTERNAL_JOINTS == 0 {
         return Ok(words::absent(status));

@@ -1,4 +1,4 @@
-//! What the API sends where something is not done: one object, whatever it was.
+//! Error answers of the API: one type of object for all errors.
 use std::collections::BTreeMap;
 
 use agent_kit::api::Problem;
@@ -52,7 +52,7 @@ impl From<Unable> for Problem {
     }
 }
 
-/// What a command may be refused with beside what every request may.
+/// Refusals that a command can receive in addition to those of every request.
 pub(super) struct Denials;
 
 impl IntoResponses for Denials {

@@ -1,4 +1,4 @@
-//! What happens, as it happens: events by number, and a stream of them with what the controller reports.
+//! Events as numbered lists, and a live stream of events with the controller's statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};
@@ -15,14 +15,16 @@ use tokio::time::Instant;
 use super::{Agent, Caller, StatusObject};
 use crate::jobs::Happening;
 
-/// How often the controller is reported on a stream, at least.
+/// Longest interval between status messages of a stream.
 const QUIET: Duration = Duration::from_millis(500);
 
-/// An event.
+/// Event with its number and time.
 pub(super) type EventObject = Entry<Happening>;
 type EventsObject = events::EventsObject<EventObject>;
 
-/// What has happened behind a number: after a lost connection, ask on from the last one.
+/// Returns the events after a number.
+///
+/// After a lost connection, continue from the last one.
 #[utoipa::path(
     get,
     path = "/api/events",
@@ -37,15 +39,15 @@ pub(super) async fn events(
     agent.events.ask(&agent.jobs.journal, request).await
 }
 
-/// The message of the stream that is no event.
+/// Message of the stream that is not an event.
 #[derive(serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage {
-    /// What the controller reports; old ones are left out for one who reads slowly.
+    /// Status of the controller; older statuses are left out for a slow reader.
     Status(Box<StatusObject>),
 }
 
-/// `GET /api/stream`: what the controller reports, at most 25 times a second, and what happens.
+/// Serves `GET /api/stream`: statuses, at most 25 times a second, and events.
 pub(super) async fn stream(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,

@@ -1,19 +1,19 @@
-//! What a code means: the pages of `jtc explain`.
+//! Meaning of codes: the pages of `jtc explain`.
 use agent_kit::api::{Number, Problem, Refusals};
 use axum::Json;
 use jtc_host::explain::{Page, find, named, pages};
 use utoipa::ToSchema;
 
-/// A page about a code.
+/// Page about a code.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PageObject {
-    /// Name of the code, unique: as in `error_codes` of the status.
+    /// Name of the code, unique; as in `error_codes` of the status.
     pub code: String,
-    /// As it stands on a screen.
+    /// Title for display.
     pub title: String,
-    /// What it means, what usually causes it, what to do, the next command: as `jtc explain` prints it.
+    /// Text of the page, as `jtc explain` prints it: meaning, usual cause, remedy and next command.
     pub text: String,
-    /// Other pages that fit what was asked for.
+    /// Names of other pages that match the request.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub also: Vec<String>,
 }
@@ -24,7 +24,7 @@ impl From<&Page> for PageObject {
     }
 }
 
-/// All pages.
+/// Returns all pages about codes.
 #[utoipa::path(
     get,
     path = "/api/explain",
@@ -35,7 +35,7 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     Json(pages().map(PageObject::from).collect())
 }
 
-/// The page about a code.
+/// Returns the page about a code.
 #[utoipa::path(
     get,
     path = "/api/explain/{code}",
@@ -51,7 +51,7 @@ pub(super) async fn list() -> Json<Vec<PageObject>> {
     )
 )]
 pub(super) async fn explain(Number(code): Number<String>) -> Result<Json<PageObject>, Problem> {
-    // What has the name is meant, whatever else has the same words.
+    // An exact name takes precedence over other pages with the same words.
     let fitting = named(&code).map_or_else(|| find(&code), |page| vec![page]);
     let (first, others) = fitting.split_first().ok_or_else(|| {
         let message = format!("nothing is known about \"{}\"", agent_kit::gate::plain(&code));

@@ -1,31 +1,32 @@
-//! Held stops in the API (J-69): the words and values of [`jtc_host::held_stop`], with their description.
+//! Held stops in the API (J-69): texts and values of [`jtc_host::held_stop`], with their description.
 use jtc_host::held_stop::{HeldStop, Reacting};
 use utoipa::ToSchema;
 
-/// A held stop: the controller has brought the arm to rest and holds it.
+/// Held stop: the controller has brought the arm to rest and holds its position.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct HeldStopObject {
-    /// Kind of the cause: `overload`, `push`, `position-error`, `position-over-limit`, `velocity-over-limit`, `acceleration-over-limit`,
-    /// `friction-table-value-missing`, `unstable`, `encoder-jump`, `speed-scale`, `approach`, `gains`, `shove`; later versions may have others.
+    /// Kind of the cause: `overload`, `push`, `position-error`, `position-over-limit`, `velocity-over-limit`,
+    /// `acceleration-over-limit`, `friction-table-value-missing`, `unstable`, `encoder-jump`, `speed-scale`,
+    /// `approach`, `gains`, `shove`; later versions may have others.
     pub kind: String,
-    /// Number of the kind, as Modbus has it.
+    /// Number of the kind, as in the Modbus registers.
     pub number: u8,
-    /// Name of its page: `GET /api/explain/{code}`.
+    /// Name of the page about it: `GET /api/explain/{code}`.
     pub code: String,
-    /// Joint from 1 that the cause was found at first; missing: at none in particular.
+    /// First joint with the cause, counted from 1; missing: no particular joint.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<u8>,
-    /// Value that was found; missing where the kind has none.
+    /// Value that caused the stop; missing if the kind has no value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f32>,
-    /// Limit of the value; missing where there is none.
+    /// Limit of the value; missing without a limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<f32>,
-    /// Unit of value and limit; empty where they have none.
+    /// Unit of value and limit; empty if they have no unit.
     pub unit: String,
     /// Cause in words.
     pub text: String,
-    /// What removes the cause, in words.
+    /// Remedy in words.
     pub remedy: String,
     /// Time since the held stop began, s.
     pub since_s: f64,
@@ -40,20 +41,20 @@ impl From<HeldStop> for HeldStopObject {
     }
 }
 
-/// What a controller does about what it has found.
+/// Reactions of a controller to disturbances.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 pub struct ReactionsObject {
-    /// The last held stop, also when its errors have been cleared since; missing: there was none since the controller started, or since
+    /// Last held stop, also if its errors have been cleared since; missing: none since the controller started, or since
     /// the occurred errors were cleared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_held_stop: Option<HeldStopObject>,
-    /// Joints from 1 that yield to a push, or lower a load.
+    /// Joints that yield to a push or lower a load, counted from 1.
     pub yields: Vec<u8>,
-    /// Joints from 1 whose encoder has jumped: no trajectory is executed until their drives were reset.
+    /// Joints whose encoder has jumped, counted from 1: no trajectory is executed until their drives are reset.
     pub encoder_jumped: Vec<u8>,
-    /// Rate of path time, path seconds per second; 0 where no trajectory is executed.
+    /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
     pub path_rate: f32,
-    /// Time for which this run has been held back because a torque was at its limit, s.
+    /// Time for which this run was slowed down because a torque was at its limit, s.
     pub held_back_s: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Who the controller is and what its arm is, asked once in a while for all who look.
+//! Identity of the controller and its arm, read from time to time and shared by all readers.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -8,44 +8,45 @@ use tokio::time::{Instant, timeout};
 
 use super::Agent;
 
-/// What was asked is taken to be so for this time.
+/// Time for which the last answer is used.
 const FRESH: Duration = Duration::from_secs(10);
-/// Longest that is waited for the controller.
+/// Longest wait for the controller.
 const ASK_TIME: Duration = Duration::from_secs(3);
-/// A controller that has been silent for so long is not asked.
+/// Silence after which the controller is not asked.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// What is known of the controller.
+/// Known identity of the controller.
 #[derive(Clone)]
 pub(super) struct Identity {
     asked: Option<Instant>,
-    /// What it says of itself; `None` where it has no extensions, or has not answered yet.
+    /// Identity as the controller reports it; `None` without extensions, or before its first answer.
     pub info: Option<Info>,
-    /// Its arm; the agent's where it cannot be asked.
+    /// Arm of the controller; the agent's arm if the controller cannot be asked.
     pub arm: Arc<Arm>,
-    /// That of its arm.
+    /// Hash of the controller's arm.
     hash: Option<u64>,
-    /// Frames that may have changed the arm, as far as they had gone to the controller when it was asked.
+    /// Number of frames that may have changed the arm, sent before the controller was asked.
     changes: u64,
 }
 
 impl Identity {
-    /// Before it was asked.
+    /// Returns the identity before the controller was asked.
     pub fn of(arm: &Arm) -> Self {
         let hash = arm.hash().ok().flatten();
         Self { asked: None, info: None, arm: Arc::new(arm.clone()), hash, changes: 0 }
     }
 
-    /// What the controller says of itself, where the arm is the one that it has in use.
+    /// Returns the identity that the controller reports, if the known arm is its arm in use.
     pub fn of_controller(&self) -> Option<&Info> {
         self.info.as_ref().filter(|info| Some(info.hash) == self.hash)
     }
 }
 
 impl Agent {
-    /// What is known of the controller: it is asked where that is not of the last seconds, or its arm may have changed since.
+    /// Returns the identity of the controller. Asks the controller if the last answer is older than 10 s, or if its arm
+    /// may have changed since.
     pub(super) async fn identity(&self) -> Identity {
-        // Whoever comes meanwhile waits for what the first one asks.
+        // Concurrent requests wait for the answer to the first one.
         let mut known = self.identity.lock().await;
         let changes = self.line.arm_changes();
         let old = known.asked.is_none_or(|asked| asked.elapsed() >= FRESH) || known.changes != changes;

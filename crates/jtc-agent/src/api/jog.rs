@@ -1,4 +1,4 @@
-//! Jogging, for who has the lease: as long as somebody holds a key down, and sees what comes of it.
+//! Jogging by the lease holder: the arm moves while a key is held down and the user sees current statuses.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Body, Problem, Refusals};
@@ -14,35 +14,37 @@ use utoipa::{IntoParams, ToSchema};
 use super::Agent;
 use super::error::Denials;
 
-/// So old may be what a person saw when a jog arrives that was asked for by it.
+/// Largest age of the status that the user saw when the jog request arrives.
 const SEEN_WITHIN: Duration = Duration::from_millis(500);
-/// So far may the time of what was seen be ahead: it was rounded, and sent before.
+/// Tolerance for a status time that is ahead of the agent's: the time was rounded and sent earlier.
 const AHEAD: Duration = Duration::from_millis(100);
 
-/// Rates of the joints.
+/// Joint rates of a jog.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JogRequest {
-    /// rad/s, base to wrist. They hold for 200 ms: send them again in time, and zeros at the end.
+    /// Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again in time, and zeros at the end.
     #[schema(min_items = 6, max_items = 6)]
     pub rates_rad_s: [f64; 6],
 }
 
-/// What the client knew when it asked for a jog.
+/// Knowledge of the client when it requested the jog.
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct KnownToJog {
-    /// `last_halt` of the status that the client looked at. Where another halt has come since then, also by this client, nothing moves,
-    /// however long this request was on its way. Missing: the last one when the head of this request arrived; it is refused within 3 s
-    /// behind a halt of others.
+    /// Value of `last_halt` in the status that the client used. If another Stop or Pause has been requested since then,
+    /// also by this client, the request moves nothing, however long it was on its way. Missing: the last one when the
+    /// head of this request arrived; the request is also refused within 3 s after a Stop or Pause of another
+    /// client.
     asked_after: Option<u64>,
-    /// `at_ms` of the newest status that the person saw. Where this request arrives more than 500 ms behind it nothing moves.
-    /// Zeros, the end of jogging, are taken all the same.
+    /// Value of `at_ms` in the newest status that the user saw. If this request arrives more than 500 ms later, nothing
+    /// moves. Zeros, which end the jog, are always accepted.
     as_of_ms: Option<u64>,
 }
 
-/// What the client knew; a halt that it does not name is taken before its body, which may be long on its way.
+/// Knowledge of the client. A missing number of the last Stop or Pause is filled in before the body, which may arrive
+/// slowly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JogAsked {
     after: AskedAfter,
@@ -60,12 +62,12 @@ impl FromRequestParts<Agent> for JogAsked {
     }
 }
 
-/// A duration as it is compared.
+/// Returns a duration in ms.
 const fn ms(duration: Duration) -> u64 {
     duration.as_millis() as u64
 }
 
-/// Why what was asked for by a status of `as_of_ms` moves nothing that arrived at `arrived_ms`.
+/// Returns the refusal of a request that is based on a status of `as_of_ms` and arrived too late, at `arrived_ms`.
 fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     let (late, ahead) = (arrived_ms.saturating_sub(as_of_ms), as_of_ms.saturating_sub(arrived_ms));
     if ahead > ms(AHEAD) {
@@ -86,7 +88,7 @@ fn too_late(as_of_ms: u64, arrived_ms: u64) -> Option<Problem> {
     })
 }
 
-/// Moves single joints as long as it is asked again and again.
+/// Moves single joints while the request is repeated.
 #[utoipa::path(
     post,
     path = "/api/jog",
@@ -103,10 +105,10 @@ pub(super) async fn jog(
     let commander = agent.commander(&asker)?;
     let turn = commander.turn()?;
     let moves = rates_rad_s.iter().any(|rate| *rate != 0.0);
-    // All of it is there now: its body may have come behind its head.
+    // The request is complete now: the body may have arrived later than the head.
     let arrived_ms = agent.now_ms();
     if let Some(late) = as_of_ms.filter(|_| moves).and_then(|as_of_ms| too_late(as_of_ms, arrived_ms)) {
-        // A key that is held down behind a Stop has to be let go, too, where what it asks for comes late.
+        // After a Stop the key must be released even if its requests come late: each of them extends the hold-off, too.
         agent.line.with(|line, now| line.could_jog(commander.client, now))?;
         return Err(late);
     }

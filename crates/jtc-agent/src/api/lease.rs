@@ -1,4 +1,4 @@
-//! The lease of clients that have no connection of their own: who commands shows by each request that it is there.
+//! Lease of clients without a connection of their own: each request shows that the holder is alive.
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -18,34 +18,35 @@ use super::{Agent, Caller};
 use crate::jobs::{Commander, Turn, Unable};
 use crate::line::{Denied, Introduction, Policy};
 
-/// Who wants to command.
+/// Request for the lease.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaseRequest {
-    /// What people are to call it: the first 64 characters.
+    /// Name of the client for people: the first 64 characters.
     pub name: String,
-    /// How long the lease lasts without a request of this client, s.
+    /// Duration of the lease without a request of this client, s.
     #[serde(default = "default_lasts_s")]
     #[schema(minimum = 1, maximum = 60)]
     pub lasts_s: f64,
-    /// What becomes of a motion when it has lapsed.
+    /// Policy for a motion after the lease has lapsed.
     #[serde(default)]
     pub policy: Policy,
-    /// Where another client commands: ask it for the lease, and wait for it. One waits at a time, which shows by PUT that it is there.
+    /// `true`: if another client holds the lease, ask for it and wait. One client waits at a time, and shows by PUT
+    /// requests that it is alive.
     #[serde(default)]
     pub ask: bool,
 }
 
-/// A client that may command, or waits for it.
+/// Client that holds the lease or waits for it.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LeaseGrant {
-    /// Goes with each request of this client, in the header `Lease-Key`. Nobody else is to know it.
+    /// Secret key, which this client sends with each request in the header `Lease-Key`.
     pub key: String,
-    /// It commands; else it waits until the one who does lets it go.
+    /// `true` if the client holds the lease; otherwise it waits until the holder releases it.
     pub held: bool,
-    /// How long it lasts without a request, s.
+    /// Duration of the lease without a request, s.
     pub lasts_s: f64,
-    /// What becomes of a motion when it has lapsed.
+    /// Policy for a motion after the lease has lapsed.
     pub policy: Policy,
 }
 
@@ -56,7 +57,7 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// The client that asks with a key, with its lease renewed: it commands, or it is an error.
+    /// Returns the client of a lease key and renews its lease. Returns an error if it does not hold the lease.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Arc<Commander>, Problem> {
         let (commander, lasts) = self.client(asker)?;
         let held = self.line.with(|line, now| line.take_lease(commander.client, Some(lasts), now));
@@ -64,8 +65,9 @@ impl Agent {
         Ok(commander)
     }
 
-    /// The same, for what may move the arm: nothing that was asked for before this moves it any more where somebody has stopped it, and
-    /// nothing at all for three seconds then. The turn is taken first: what still waits for its own is not let through by this.
+    /// Like [`commander`](Self::commander), for requests that may move the arm. Refuses requests from before the last
+    /// Stop or Pause, and all requests for three seconds after one of another client. The turn is taken first, so that
+    /// requests that still wait for their turn are not permitted by this one.
     pub(super) fn mover(
         &self,
         asker: &Asker,
@@ -77,7 +79,7 @@ impl Agent {
         Ok((commander, turn))
     }
 
-    /// The client that asks with a key, and how often it does at least.
+    /// Returns the client of a lease key, and the duration of its lease without a request.
     pub(super) fn client(&self, asker: &Asker) -> Result<(Arc<Commander>, Duration), Problem> {
         asker.caller.operator()?;
         let key = asker.key().ok_or(lease::Denied::NoKey)?;
@@ -85,7 +87,9 @@ impl Agent {
     }
 }
 
-/// Takes the lease: one client commands at a time. It is renewed by every command.
+/// Takes the lease, which one client holds at a time.
+///
+/// Every command renews it.
 #[utoipa::path(
     post,
     path = "/api/lease",
@@ -125,7 +129,7 @@ pub(super) async fn take(
     Ok(Json(LeaseGrant { key, held, lasts_s, policy }))
 }
 
-/// Renews the lease, or takes it again where nobody else has.
+/// Renews the lease, or takes it again if it is free.
 #[utoipa::path(
     put,
     path = "/api/lease",
@@ -149,7 +153,9 @@ pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Js
     Ok(Json(state))
 }
 
-/// Lets the lease go: to the client that has asked for it, if one has. Not while a job of this client goes on.
+/// Releases the lease, which passes to the waiting client if there is one.
+///
+/// Refused while a job of this client runs.
 #[utoipa::path(
     delete,
     path = "/api/lease",
@@ -161,11 +167,11 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let (commander, _) = agent.client(&asker)?;
     let turn = match commander.turn() {
         Ok(turn) => Some(turn),
-        // Its thread is gone: it has nothing going on.
+        // Its thread has ended, so it runs no job.
         Err(Unable::Gone) => None,
         Err(busy) => return Err(busy.into()),
     };
-    // One that waits has none to give.
+    // A client that only waits has no lease to release.
     let _ = agent.line.with(|line, now| line.release_lease(commander.client, now));
     agent.line.wake();
     agent.note("left", json!({ "client": commander.client.0, "name": commander.name }));

@@ -1,4 +1,4 @@
-//! The flight recorder of the controller: what it does, its log as a file, and beginning anew.
+//! Flight recorder of the controller: its state, its log as a file, and restart.
 use std::io::Cursor;
 use std::path::Path;
 
@@ -22,60 +22,60 @@ use crate::jobs::Commander;
 use crate::line::{Introduction, Policy};
 use crate::owner::ClientPort;
 
-/// What the file is called.
+/// Name of the file.
 const FILE: &str = "flight-recorder.mcap";
 
-/// What the flight recorder does.
+/// State of the flight recorder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LogStatusObject {
-    /// In words: it records, or why it has stopped.
+    /// State in words: it records, or the reason why it has stopped.
     pub state: String,
-    /// Blocks of 1 KiB that it has begun since the start of the controller, those counted that are gone.
+    /// Number of blocks of 1 KiB begun since the start of the controller, including overwritten ones.
     pub blocks: u32,
 }
 
-/// A recording in MCAP with the log in it, as `jtc log fetch` writes it.
+/// MCAP recording with the log, as `jtc log fetch` writes it.
 #[derive(ToSchema)]
 #[schema(value_type = String, format = Binary)]
 #[expect(dead_code, reason = "describes a body")]
 pub struct LogFile(Vec<u8>);
 
-/// What the log holds, tick by tick: 1000 rows a second, in columns of the same length. A value that is not known is null.
+/// Values of the log per tick: 1000 rows a second, in columns of the same length. A value that is not known is null.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LogValues {
-    /// Time of each row, s, 0 at the last one.
+    /// Time of each row, s; 0 at the last row.
     pub times_s: Vec<f64>,
     /// State of the controller in the last row.
     pub state: String,
-    /// Base to wrist.
+    /// Joints, base to wrist.
     pub joints: Vec<LogJoint>,
 }
 
-/// A joint in the log.
+/// Values of a joint in the log.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LogJoint {
-    /// Measured, rad.
+    /// Measured position, rad.
     pub position_rad: Vec<Option<f64>>,
-    /// Commanded, rad.
+    /// Commanded position, rad.
     pub commanded_rad: Vec<Option<f64>>,
-    /// Commanded minus measured, of the same time, rad.
+    /// Commanded minus measured position at the same time, rad.
     pub error_rad: Vec<Option<f64>>,
-    /// Measured, rad/s.
+    /// Measured velocity, rad/s.
     pub velocity_rad_s: Vec<Option<f64>>,
-    /// Commanded on the bus, N·m.
+    /// Torque commanded on the bus, N·m.
     pub torque_nm: Vec<Option<f64>>,
 }
 
 impl LogValues {
-    /// The samples of the last start of the controller that lie within `last_s` of the last one.
+    /// Returns the samples since the last start of the controller that are at most `last_s` older than the last one.
     fn of(samples: &[Sample], last_s: f64) -> Self {
         let end = samples.last().map_or(0.0, |sample| sample.time_s);
-        // Half a tick more: the difference of two times in seconds is not exact.
+        // Half a tick more, because the difference of two times in seconds is not exact.
         let from = end - last_s - 0.5e-3;
         let rows: Vec<&Sample> =
             samples.iter().filter(|sample| (from..=end).contains(&sample.time_s)).collect();
         let joint = |j: usize| {
-            // Seven digits are more than an encoder has.
+            // Seven digits exceed the resolution of an encoder.
             let column = |value: fn(&JointSample) -> f64| {
                 let known = |sample: &&Sample| {
                     sample.joints.get(j).map(value).filter(|x| x.is_finite()).map(|x| (x * 1e7).round() / 1e7)
@@ -98,12 +98,12 @@ impl LogValues {
     }
 }
 
-/// How much of the log is wanted.
+/// Part of the log to return.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct LogWindow {
-    /// The last seconds of it.
+    /// Duration of the part, s; it ends with the log.
     #[serde(default = "window_default_s")]
     #[param(minimum = 0.01, maximum = 60)]
     last_s: f64,
@@ -113,7 +113,7 @@ fn window_default_s() -> f64 {
     2.0
 }
 
-/// What the flight recorder does. It goes on with it.
+/// Returns the state of the flight recorder, which continues.
 #[utoipa::path(
     get,
     path = "/api/log/status",
@@ -125,10 +125,12 @@ pub(super) async fn status(State(agent): State<Agent>) -> Result<Json<LogStatusO
     Ok(Json(LogStatusObject { state: status.state.name().to_owned(), blocks: status.end }))
 }
 
-/// The log of the flight recorder, as a recording. One at a time.
+/// Returns the log of the flight recorder as a recording.
 ///
-/// It takes as long as the line takes for up to 160 kB, at 115,200 Bd some 40 s; recording rests meanwhile, and the
-/// arm may move.
+/// One request at a time.
+///
+/// The log has up to 160 kB, which takes some 40 s at 115,200 Bd. The flight recorder pauses meanwhile. The arm may
+/// move.
 #[utoipa::path(
     get,
     path = "/api/log",
@@ -151,7 +153,9 @@ pub(super) async fn fetch(
     Ok((headers, file))
 }
 
-/// The last of what the log holds, as numbers: what a plot of a moment needs, at 1 kHz. It takes as long as the whole log; one at a time.
+/// Returns the last part of the log as numbers at 1 kHz, for a plot.
+///
+/// The request takes as long as for the complete log. One request at a time.
 #[utoipa::path(
     get,
     path = "/api/log/values",
@@ -174,20 +178,20 @@ pub(super) async fn values(
     from_log(&agent, &caller, last).await.map(Json)
 }
 
-/// Reads the log, and makes of it what is asked for: for operators, one at a time.
+/// Reads the log and converts it; for operators, one request at a time.
 async fn from_log<T: Send + 'static>(
     agent: &Agent,
     caller: &Caller,
     make: impl FnOnce(&Account) -> Result<T, Problem> + Send + 'static,
 ) -> Result<T, Problem> {
-    // Reading it holds up what it records.
+    // The flight recorder pauses while its log is read.
     caller.operator()?;
     agent.note("log", json!({ "from": caller.peer.to_string() }));
     let room = agent.logs.clone().try_acquire_owned().map_err(|_| {
         let next = "ask again in some seconds: a log is read by one at a time";
         Problem::new("busy", "somebody reads the log of the flight recorder", next)
     })?;
-    // A client of its own: whoever asks something else meanwhile does not wait for it.
+    // A client of its own, so that other questions do not wait for it.
     let name = format!("{}: log", caller.peer);
     let introduction = Introduction { name, role: caller.role, policy: Policy::Continue };
     let reader = Commander::new(&agent.line, introduction);
@@ -207,7 +211,7 @@ async fn from_log<T: Send + 'static>(
     made.await?
 }
 
-/// The recording as bytes.
+/// Returns the recording as bytes.
 fn written(account: &Account) -> Result<Vec<u8>, Problem> {
     let mut file = Cursor::new(Vec::new());
     account.write(&mut file, Path::new(FILE)).map_err(|error| Problem::of(&error))?;
@@ -219,7 +223,7 @@ fn empty() -> Problem {
     Problem::new("empty-log", message, "ask again after a second").kind(ErrorKind::Device)
 }
 
-/// Forgets the log: the flight recorder begins anew, also one that has stopped at an error.
+/// Deletes the log and restarts the flight recorder, also after it has stopped at an error.
 #[utoipa::path(
     delete,
     path = "/api/log",

@@ -1,4 +1,4 @@
-//! What brings a controller back: single nodes cleared and reset, the arm that is built into it.
+//! Maintenance: clearing and resetting single nodes, and use of the built-in arm.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -17,7 +17,7 @@ use super::commands::SpeedObject;
 use super::error::Denials;
 use crate::owner::ClientPort;
 
-/// Nodes whose errors are cleared.
+/// Nodes whose errors to clear.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ClearRequest {
@@ -25,12 +25,12 @@ pub struct ClearRequest {
     #[serde(default)]
     #[schema(max_items = 6)]
     pub joints: Vec<u8>,
-    /// The gripper.
+    /// `true` for the gripper.
     #[serde(default)]
     pub gripper: bool,
 }
 
-/// Nodes that start anew.
+/// Nodes to restart.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ResetRequest {
@@ -38,18 +38,18 @@ pub struct ResetRequest {
     #[serde(default)]
     #[schema(max_items = 6)]
     pub joints: Vec<u8>,
-    /// The gripper.
+    /// `true` for the gripper.
     #[serde(default)]
     pub gripper: bool,
-    /// All joints and the gripper.
+    /// `true` for all joints and the gripper.
     #[serde(default)]
     pub all: bool,
-    /// Also where the arm has torque: somebody supports it, or it may fall.
+    /// `true`: restart also under torque. The arm must be supported, or it may fall.
     #[serde(default)]
     pub arm_may_fall: bool,
 }
 
-/// Bits 0 to 5 of joints 1 to 6 and bit 6 of the gripper.
+/// Returns bits 0 to 5 for joints 1 to 6 and bit 6 for the gripper.
 fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     let mut mask = if gripper { 1 << words::GRIPPER } else { 0 };
     for number in joints {
@@ -64,9 +64,10 @@ fn nodes(joints: &[u8], gripper: bool) -> Result<u8, Problem> {
     Ok(mask)
 }
 
-/// Clears the errors of the controller and of all drives, or of those that are named.
+/// Clears the errors of the controller and of all drives, or of the named drives.
 ///
-/// Of all drives also those that have occurred; where some are named their current ones, and those of the controller itself.
+/// For all drives this includes the errors that have occurred before. For named drives it covers their current errors
+/// and those of the controller itself.
 #[utoipa::path(
     post,
     path = "/api/clear",
@@ -93,7 +94,9 @@ pub(super) async fn clear(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Has nodes of the joint bus start anew. Where the arm moves no joint does.
+/// Restarts nodes of the joint bus.
+///
+/// No joint restarts while the arm moves.
 #[utoipa::path(
     post,
     path = "/api/reset",
@@ -121,7 +124,9 @@ pub(super) async fn reset(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Has the controller use the arm that is built into it, or stored: friction, gains and model. In Init it holds the arm then.
+/// Makes the controller use its stored or built-in friction, gains and model.
+///
+/// In Init the controller starts the position hold then.
 #[utoipa::path(
     post,
     path = "/api/arm/defaults",
@@ -138,7 +143,7 @@ pub(super) async fn defaults(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// The speed on the path, as the controller has it.
+/// Returns the speed on the path that the controller uses.
 #[utoipa::path(
     get,
     path = "/api/speed",
@@ -147,6 +152,6 @@ pub(super) async fn defaults(
 )]
 pub(super) async fn speed(State(agent): State<Agent>) -> Result<Json<SpeedObject>, Problem> {
     let speed = agent.ask(|session| Ok(session.speed()?)).await?;
-    // As it was set: in whole percent.
+    // The speed is set in whole percent.
     Ok(Json(SpeedObject { percent: (speed * 100.0).round().clamp(0.0, 100.0) as u8 }))
 }

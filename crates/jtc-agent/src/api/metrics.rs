@@ -1,4 +1,4 @@
-//! What monitoring asks for: numbers of controller, arm, line and agent in the text format of Prometheus.
+//! Metrics of controller, arm, line and agent in the text format of Prometheus.
 use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
@@ -10,18 +10,18 @@ use prometheus::{CounterVec, GaugeVec, Opts, Registry, TextEncoder};
 use super::Agent;
 use agent_kit::api::{Problem, Refusals};
 
-/// What the format is called; readers of other formats read this one, too.
+/// Content type of the Prometheus text format; programs that prefer another format accept it, too.
 const FORMAT: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// A number with the values of its labels.
+/// Value with the values of its labels.
 type Labelled = (Vec<String>, f64);
 
-/// A page of metrics.
+/// Page of metrics.
 #[derive(Default)]
 struct Page(Registry);
 
 impl Page {
-    /// What can rise and fall.
+    /// Adds values that can rise and fall.
     fn gauges(
         &self,
         name: &str,
@@ -36,7 +36,7 @@ impl Page {
         self.0.register(Box::new(family))
     }
 
-    /// What only rises.
+    /// Adds values that only rise.
     fn counters(
         &self,
         name: &str,
@@ -60,7 +60,7 @@ impl Page {
         self.counters(name, help, &[], [("", value)])
     }
 
-    /// One of several states: 1 for that which is, 0 for the others.
+    /// Adds a state: 1 for the current state, 0 for the others.
     fn state(&self, name: &str, help: &str, all: &[&'static str], is: &str) -> prometheus::Result<()> {
         let unknown = (!all.contains(&is)).then_some(is);
         let states = all.iter().copied().chain(unknown);
@@ -68,7 +68,7 @@ impl Page {
         self.gauges(name, help, &["state"], values)
     }
 
-    /// What the controller reports.
+    /// Adds the values of a status.
     fn status(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         self.state(
             "jtc_controller_state",
@@ -103,7 +103,7 @@ impl Page {
         self.joints(status, arm)
     }
 
-    /// Joints that are measured; the others are left out.
+    /// Adds the measured joints; the others are left out.
     fn joints(&self, status: &Status, arm: &Arm) -> prometheus::Result<()> {
         let each = |value: &dyn Fn(usize) -> f64| -> Vec<Labelled> {
             let measured = Joint::ALL.into_iter().filter(|joint| is_measured(status, joint.index()));
@@ -151,7 +151,7 @@ impl Page {
         )
     }
 
-    /// What the controller says of itself.
+    /// Adds the identity of the controller.
     fn info(&self, info: &Info) -> prometheus::Result<()> {
         let texts = [info.firmware(), info.revision(), info.board.as_str(), info.arm.as_str()];
         self.gauges(
@@ -177,7 +177,7 @@ impl Page {
         )
     }
 
-    /// Frames and statuses.
+    /// Adds counters of frames and statuses.
     fn line(&self, agent: &Agent) -> prometheus::Result<()> {
         let (counts, received) = agent.line.with(|line, _| (line.counts(), line.received()));
         self.counter("jtc_statuses_total", "Statuses received", received.frames)?;
@@ -204,7 +204,7 @@ impl Page {
         )
     }
 
-    /// The agent itself.
+    /// Adds values of the agent itself.
     fn agent(&self, agent: &Agent) -> prometheus::Result<()> {
         let simulated = agent.simulated.to_string();
         self.gauges(
@@ -231,7 +231,7 @@ impl Page {
     }
 }
 
-/// Numbers for monitoring, in the text format of Prometheus.
+/// Returns metrics in the text format of Prometheus.
 #[utoipa::path(
     get,
     path = "/metrics",

@@ -1,4 +1,4 @@
-//! The agent's API: what is asked by HTTP, and one socket for a client's end of the line.
+//! API of the agent: HTTP requests, and a socket with a connection to the line.
 mod absent;
 mod arm;
 mod body;
@@ -65,48 +65,49 @@ use events::EventObject;
 use identity::Identity;
 use objects::Found;
 
-/// Longest body that is read.
+/// Longest request body, bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest of a trajectory: 12,000 points as text, with room to spare. So many of them are read at once.
+/// Longest body with a trajectory, bytes: 12,000 points as text, with a margin. The number of such bodies read at the
+/// same time is limited.
 const TRAJECTORY_MAX: usize = 16 << 20;
-/// Longest of an arm: a robot description, with room to spare.
+/// Longest body with an arm, bytes: a robot description, with a margin.
 const ARM_MAX: usize = 1 << 20;
-/// Longest of waypoints.
+/// Longest body with waypoints, bytes.
 const PLAN_MAX: usize = 1 << 18;
 const TRAJECTORIES_AT_ONCE: usize = 4;
 const CHECKS_AT_ONCE: usize = 2;
-/// Longest that a request may take.
+/// Longest duration of a request.
 const REQUEST_TIME: Duration = Duration::from_secs(15);
 
-/// Longest that reading the log of a flight recorder may take, at 115,200 Bd some 40 s, and a plan.
+/// Longest duration of a plan, or of reading the log of a flight recorder, which takes some 40 s at 115,200 Bd.
 const LONG_TIME: Duration = Duration::from_secs(120);
 
-/// What every handler has.
+/// State that every handler receives.
 #[derive(Clone)]
 pub struct Agent {
     line: Line,
     jobs: Arc<Jobs>,
     gate: Gate,
-    /// A number of its own, by which clients know that it is another one.
+    /// Number that identifies this run of the agent for clients.
     id: Arc<str>,
     port: Arc<str>,
     simulated: bool,
     sockets: Sockets,
     bodies: Arc<Semaphore>,
-    /// Checks of trajectories at once.
+    /// Limit of simultaneous checks of trajectories.
     checks: Arc<Semaphore>,
-    /// Plans at once.
+    /// Limit of simultaneous plans.
     plans: Arc<Semaphore>,
-    /// Reports that are made at once.
+    /// Limit of reports that are generated at the same time.
     reports: Arc<Semaphore>,
-    /// Logs of the flight recorder that are read at once.
+    /// Limit of flight recorder logs that are read at the same time.
     logs: Arc<Semaphore>,
     events: Arc<Events>,
     identity: Arc<tokio::sync::Mutex<Identity>>,
 }
 
 impl Agent {
-    /// An agent of a line. `port` is what people call it.
+    /// Creates the agent of a line. `port` is the port's name for people.
     ///
     /// # Errors
     ///
@@ -140,7 +141,7 @@ impl Agent {
         })
     }
 
-    /// Everything that is served.
+    /// Returns the router with all requests.
     pub fn router(self) -> Router {
         let (router, mut description) = described().split_for_parts();
         let (slow, of_slow) = slow().split_for_parts();
@@ -164,16 +165,16 @@ impl Agent {
         self.gate.note(what, facts);
     }
 
-    /// Lines that the log of commands lost.
+    /// Returns the number of lines that the log of commands lost.
     fn lost_lines(&self) -> u64 {
         self.gate.lost_lines()
     }
 
-    /// Stops or pauses for somebody who asked by HTTP. For the line it is somebody else than who commands, whoever it is: what is on its
-    /// way from there may have been sent before.
+    /// Sends a Stop or a Pause of an HTTP client. For the line the sender always differs from the lease holder, because
+    /// requests of the holder may have been sent before.
     fn halt(&self, asker: &Asker, command: ExecCommand) -> Result<Json<SentObject>, Problem> {
         let caller = &asker.caller;
-        // Who it is does not matter, but for going on later.
+        // The identity of the client matters only for its later requests.
         let client = self.client(asker).ok().map(|(client, _)| client);
         let name = client.as_ref().map_or_else(|| caller.peer.to_string(), |client| client.name.clone());
         let lost = self.line.lost();
@@ -182,7 +183,7 @@ impl Agent {
         });
         match client {
             Some(_) => self.note("halt", facts),
-            // One that shows no lease can ask without end.
+            // A client without a lease can send such requests without limit.
             None => self.gate.note_repeated("halt", caller.peer, facts),
         }
         if let Some(lost) = lost {
@@ -198,12 +199,12 @@ impl Agent {
         Ok(Json(SentObject { sent: command.name().to_owned(), halt }))
     }
 
-    /// Time since this agent began, ms.
+    /// Returns the time since the start of this agent, ms.
     fn now_ms(&self) -> u64 {
         self.line.now().as_millis() as u64
     }
 
-    /// The controller, as its last status has it, and who commands.
+    /// Returns the last status of the controller, and the lease.
     fn status(&self, caller: &Caller) -> StatusObject {
         let lost = self.line.lost();
         let (status, lease, clients, last_halt, at) = self.line.with(|line, now| {
@@ -238,7 +239,7 @@ impl Agent {
     }
 }
 
-/// The description of the API, OpenAPI 3.1, as JSON.
+/// Returns the description of the API, OpenAPI 3.1, as JSON.
 pub fn description() -> String {
     text(&described().merge(slow()).into_openapi())
 }
@@ -305,13 +306,13 @@ fn described() -> OpenApiRouter<Agent> {
     others.merge(trajectories).merge(arms)
 }
 
-/// What takes its time.
+/// Returns the requests with a longer time limit.
 fn slow() -> OpenApiRouter<Agent> {
     let plans = OpenApiRouter::new().routes(routes!(plans::plan)).layer(DefaultBodyLimit::max(PLAN_MAX));
     plans.merge(OpenApiRouter::new().routes(routes!(log::fetch)).routes(routes!(log::values)))
 }
 
-/// The controller, as its last status has it, and who commands.
+/// Returns the last status of the controller, and the lease.
 #[utoipa::path(
     get,
     path = "/api/status",
@@ -322,7 +323,9 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
     Json(agent.status(&caller))
 }
 
-/// Ends the motion on its path, ahead of all else. No lease is needed.
+/// Stops the arm on its path, ahead of all other requests.
+///
+/// No lease is needed.
 #[utoipa::path(
     post,
     path = "/api/stop",
@@ -337,7 +340,9 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     agent.halt(&asker, ExecCommand::Stop)
 }
 
-/// Pauses the motion on its path, ahead of all else. No lease is needed.
+/// Pauses the motion on its path, ahead of all other requests.
+///
+/// No lease is needed.
 #[utoipa::path(
     post,
     path = "/api/pause",
@@ -352,7 +357,7 @@ async fn pause(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObje
     agent.halt(&asker, ExecCommand::Pause)
 }
 
-/// Programs that are given nothing but the agent's address ask there for what they show.
+/// Serves the socket for programs that know only the agent's address and connect to `/`.
 async fn at_root(State(agent): State<Agent>, request: Request<Body>, next: Next) -> Response {
     if request.uri().path() == "/" && request.method() == Method::GET && foxglove::is_asked(request.headers())
     {

@@ -1,4 +1,4 @@
-//! The arm as numbers, for who draws it: frames, limits and masses, without a question on the line for each who looks.
+//! Arm model for display: frames, limits and masses, without a question on the line for each reader.
 use agent_kit::api::Refusals;
 use axum::Json;
 use axum::extract::State;
@@ -10,25 +10,25 @@ use super::Agent;
 use super::arm::in_words;
 use super::identity::Identity;
 
-/// Whose arm it is.
+/// Source of an arm model.
 #[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelSource {
-    /// The controller has it in use.
+    /// Arm in use by the controller.
     Controller,
-    /// The agent was given it, and the controller cannot be asked for its own, or has not answered yet.
+    /// Arm of the agent: the controller cannot be asked for its own, or has not answered yet.
     Agent,
 }
 
-/// The arm in use.
+/// Arm in use.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ModelObject {
-    /// Its name.
+    /// Name of the arm.
     pub name: String,
-    /// Hash of all that decides how the arm moves; missing where the agent's arm lacks a part of that.
+    /// Hash of all parameters that decide how the arm moves; missing if the agent's arm lacks one of them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hash: Option<String>,
-    /// Whose it is.
+    /// Source of the arm.
     pub source: ModelSource,
     /// Acceleration of gravity in the frame of the base, m/s².
     #[schema(min_items = 3, max_items = 3)]
@@ -38,22 +38,22 @@ pub struct ModelObject {
     pub joints: Vec<ModelJoint>,
     /// The flange, which does not move, in the frame of joint 6.
     pub flange: FrameObject,
-    /// Links: the base, and behind each joint the one that it moves, in whose frame its numbers are.
+    /// Links: the base, then for each joint the link that it moves. Values are in the frame of that joint.
     #[schema(min_items = 7, max_items = 7)]
     pub links: Vec<ModelLink>,
 }
 
-/// A joint: where it is, and its limits.
+/// Joint: its frame and its limits.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ModelJoint {
-    /// Which, 1 to 6 from the base.
+    /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
-    /// Its name.
+    /// Name of the joint.
     pub name: String,
-    /// Where its frame is in that of the joint before it, at position 0: x, y, z, m.
+    /// Origin of its frame in the frame of the joint before it, at position 0: x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_xyz_m: [f64; 3],
-    /// How it is turned there: roll, pitch, yaw about fixed axes, as in a URDF, rad.
+    /// Orientation of its frame there: roll, pitch, yaw about fixed axes, as in a URDF, rad.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_rpy_rad: [f64; 3],
     /// Lowest position, rad.
@@ -68,10 +68,10 @@ pub struct ModelJoint {
     pub torque_max_nm: f64,
 }
 
-/// Where a frame is.
+/// Position and orientation of a frame.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct FrameObject {
-    /// x, y, z, m.
+    /// Origin x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub origin_xyz_m: [f64; 3],
     /// Roll, pitch, yaw, rad.
@@ -79,12 +79,12 @@ pub struct FrameObject {
     pub origin_rpy_rad: [f64; 3],
 }
 
-/// A link.
+/// Link of the arm.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ModelLink {
-    /// Its name.
+    /// Name of the link.
     pub name: String,
-    /// kg.
+    /// Mass, kg.
     pub mass_kg: f64,
     /// Centre of mass, m.
     #[schema(min_items = 3, max_items = 3)]
@@ -94,7 +94,7 @@ pub struct ModelLink {
 impl From<&Identity> for ModelObject {
     fn from(identity: &Identity) -> Self {
         let arm: &Arm = &identity.arm;
-        // The same arm has another name where it was given one.
+        // The controller may have another name for the same arm.
         let (source, name) = match identity.of_controller() {
             Some(info) => (ModelSource::Controller, info.arm.to_string()),
             None => (ModelSource::Agent, arm.name.clone()),
@@ -132,7 +132,9 @@ impl From<&Identity> for ModelObject {
     }
 }
 
-/// Frames, limits and masses of the arm in use. The controller is asked when its arm may have changed, and once in a while.
+/// Returns frames, limits and masses of the arm in use.
+///
+/// The controller is asked when its arm may have changed, and when the last answer is older than 10 s.
 #[utoipa::path(
     get,
     path = "/api/arm/model",

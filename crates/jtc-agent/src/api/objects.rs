@@ -1,4 +1,4 @@
-//! What the API sends: one type for each object, from which its description is made.
+//! Objects that the API sends. The API description is made from these types.
 use host_kit::{FrontEnd, Next};
 use jtc_host::explain::{self, Family};
 use jtc_host::held_stop::{self, HeldStop};
@@ -11,120 +11,122 @@ use utoipa::ToSchema;
 use super::held_stop::HeldStopObject;
 use crate::line::Role;
 
-/// The controller, as its last status has it.
+/// Last status of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct StatusObject {
-    /// No arm moves: the controller is simulated.
+    /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
     /// Name of the port.
     pub port: String,
-    /// Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+    /// Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
+    /// even at a steady rate.
     pub at_ms: u64,
-    /// Why the port is gone; missing while it is there.
+    /// Reason why the port was lost; missing while it is available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<String>,
-    /// Time since the last status, ms; missing before the first. Old values are not those of now.
+    /// Age of the last status, ms; missing before the first one. Values of an old status are not current.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_ms: Option<u64>,
-    /// Missing before the first status.
+    /// Content of the last status; missing before the first one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<ControllerObject>,
-    /// Who commands; missing where nobody does.
+    /// Lease; missing if no client holds it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lease: Option<LeaseObject>,
-    /// How many clients are on the line.
+    /// Number of clients on the line.
     pub clients: usize,
-    /// What the caller may do.
+    /// Role of the caller.
     pub role: Role,
-    /// Which agent this is, by a number that it was given at its start.
+    /// Number that identifies this run of the agent.
     pub agent: String,
     /// Number of the last event.
     pub last_event: u64,
-    /// Number of the last Stop or Pause: `asked_after` of what is asked for now.
+    /// Number of the last Stop or Pause: value of `asked_after` for new requests.
     pub last_halt: u64,
 }
 
-/// What the controller reports.
+/// Status of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ControllerObject {
     /// State, in the words of the protocol.
     pub state: String,
-    /// What becomes of the trajectory.
+    /// State of the trajectory.
     pub trajectory: String,
-    /// The 1 ms point of the trajectory that the controller is at.
+    /// Current 1 ms point of the trajectory.
     pub point: u32,
-    /// Errors now.
+    /// Current errors.
     pub errors: Vec<String>,
-    /// Names of their pages, in the same order: `GET /api/explain/{code}`.
+    /// Names of the pages about these errors, in the same order: `GET /api/explain/{code}`.
     pub error_codes: Vec<String>,
-    /// What is wrong, the most particular first, with the joint of each: also what its drive reports. `GET /api/explain/{code}` takes them as
-    /// they are.
+    /// Causes of the errors, the most specific first, each with its joint; includes the errors of its drive.
+    /// `GET /api/explain/{code}` accepts these texts.
     pub causes: Vec<String>,
-    /// The held stop that the arm is in, with its cause (J-69); missing where it is in none, or the controller has not told its cause yet.
+    /// Held stop with its cause (J-69); missing without a held stop, or if the controller has not reported the cause yet.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_stop: Option<HeldStopObject>,
-    /// Joints from 1 whose encoder had jumped at the last held stop: no trajectory is executed until their drives were reset; missing: none.
+    /// Joints whose encoder had jumped at the last held stop, counted from 1: no trajectory is executed until their
+    /// drives are reset; missing: none.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub encoder_jumped: Vec<u8>,
-    /// Errors since they were cleared last.
+    /// Errors since the last clearing.
     pub errors_occurred: Vec<String>,
-    /// Where the joints are commanded to be, rad, from the base; missing where the agent does not know: no trajectory that was sent through
-    /// it is executed.
+    /// Commanded joint positions, rad, from the base; missing if the agent does not know them: no trajectory that was
+    /// sent through the agent is being executed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(min_items = 6, max_items = 6)]
     pub commanded_rad: Option<[f64; 6]>,
     /// Joints, from the base.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<JointObject>,
-    /// What helps now; empty where nothing is wrong.
+    /// Next step; empty without a problem.
     pub next: String,
 }
 
-/// What the controller reports of a joint.
+/// Status of a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JointObject {
-    /// 1 to 6, from the base.
+    /// Number of the joint, 1 to 6 from the base.
     pub joint: u8,
     /// State of its drive.
     pub state: String,
-    /// rad; missing where it is not known.
+    /// Position, rad; missing if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_rad: Option<f32>,
-    /// rad/s; missing alike.
+    /// Velocity, rad/s; missing if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity_rad_s: Option<f32>,
-    /// N·m; missing alike.
+    /// Torque, N·m; missing if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_nm: Option<f32>,
-    /// °C; missing alike.
+    /// Temperature, °C; missing if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<u8>,
-    /// Errors that the controller has found at it.
+    /// Errors of this joint that the controller has detected.
     pub errors: Vec<String>,
-    /// Names of their pages, in the same order.
+    /// Names of the pages about these errors, in the same order.
     pub error_codes: Vec<String>,
 }
 
-/// Who commands.
+/// Lease, and its holder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LeaseObject {
-    /// Its name.
+    /// Name of the holder.
     pub holder: String,
-    /// For how long, ms.
+    /// Time since the holder took the lease, ms.
     pub age_ms: u64,
-    /// How long it lasts without renewal, ms; missing: as long as the client is connected.
+    /// Time until the lease lapses without renewal, ms; missing: it lasts while the client is connected.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub left_ms: Option<u64>,
-    /// Who has asked for it.
+    /// Name of the client that waits for the lease.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wanted_by: Option<String>,
 }
 
-/// What an arm carries at its flange.
+/// Payload at the flange.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PayloadObject {
-    /// kg; 0: nothing.
+    /// Mass, kg; 0: no payload.
     #[schema(minimum = 0)]
     pub mass_kg: f64,
     /// Centre of mass in the frame of the flange, m.
@@ -148,12 +150,12 @@ impl From<Payload> for PayloadObject {
     }
 }
 
-/// What the controller has told of a held stop and of its encoders.
+/// Held stop and encoder state that the controller has reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Found {
-    /// Cause of the held stop that the arm is in, and its age, ms.
+    /// Cause and age in ms of the current held stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints whose encoder has jumped, a bit for each.
+    /// Joints whose encoder has jumped, one bit each.
     pub jumped: u8,
 }
 
@@ -167,17 +169,17 @@ impl Found {
     }
 }
 
-/// A command that was handed to the line.
+/// Command that was handed to the line.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct SentObject {
-    /// What was sent: `stop` or `pause`.
+    /// Command: `stop` or `pause`.
     pub sent: String,
-    /// Its number: `last_halt` until the next.
+    /// Number of the command: value of `last_halt` until the next one.
     pub halt: u64,
 }
 
 impl ControllerObject {
-    /// What a status reports, with where the joints are commanded to be, as far as that is known.
+    /// Returns the content of a status, with the commanded joint positions if they are known.
     pub(super) fn new(status: &Status, commanded_rad: Option<[f64; 6]>, found: &Found) -> Self {
         let texts = |words: Vec<&'static str>| words.into_iter().map(str::to_owned).collect();
         let codes = |family, word: u16| texts(explain::names(family, word.into()));

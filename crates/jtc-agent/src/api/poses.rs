@@ -1,4 +1,4 @@
-//! Named poses: those of the agent's arm file, and those that were saved through it.
+//! Named poses: those of the agent's arm file, and those that were saved through the agent.
 use agent_kit::api::{Number, Problem, Refusals};
 use agent_kit::gate::plain;
 use axum::extract::State;
@@ -14,51 +14,51 @@ use super::body::{Perhaps, blocking};
 use super::error::Denials;
 use super::{Agent, Caller};
 
-/// Where a pose is kept.
+/// Place where a pose is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, ToSchema)]
 pub enum PoseFrom {
-    /// In the arm file that the agent was given: it is changed there.
+    /// Arm file of the agent; change the pose there.
     #[serde(rename = "arm file")]
     ArmFile,
-    /// By the agent.
+    /// Store of the agent.
     #[serde(rename = "agent")]
     Agent,
 }
 
-/// A named pose.
+/// Named pose.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PoseObject {
-    /// Its name.
+    /// Name of the pose.
     pub name: String,
-    /// Where the joints are, from the base, rad.
+    /// Joint positions, from the base, rad.
     #[schema(min_items = 6, max_items = 6)]
     pub positions_rad: [f64; 6],
-    /// Where it is kept.
+    /// Place where the pose is kept.
     pub from: PoseFrom,
-    /// Why no motion leads there, in words; missing where one may.
+    /// Reason why no motion can lead to the pose, in words; missing if a motion is possible.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub warning: Option<String>,
 }
 
-/// Where a pose is.
+/// Position of a pose.
 #[derive(Clone, Copy, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PoseRequest {
-    /// rad, from the base; missing: where the arm stands now.
+    /// Joint positions, rad, from the base; missing: the current position of the arm.
     #[serde(default)]
     #[schema(min_items = 6, max_items = 6)]
     pub positions_rad: Option<[f64; 6]>,
 }
 
 impl Agent {
-    /// All poses that have a name, rad. One of the arm file stands before one of the same name that was saved.
+    /// Returns all named poses, rad. A pose of the arm file takes precedence over a saved pose of the same name.
     pub(super) fn poses(&self) -> Poses {
         let mut poses = self.jobs.store.poses.list();
         poses.extend(self.jobs.arm().poses.clone());
         poses
     }
 
-    /// A pose as it is shown: with what the limits of the arm in use have to do with it.
+    /// Returns a pose for display, with the conflicts with the limits of the arm in use.
     fn shown(&self, arm: &Arm, name: String, positions_rad: [f64; 6]) -> PoseObject {
         let from =
             if self.jobs.arm().poses.contains_key(&name) { PoseFrom::ArmFile } else { PoseFrom::Agent };
@@ -66,7 +66,7 @@ impl Agent {
         PoseObject { name, positions_rad, from, warning }
     }
 
-    /// Nobody changes the arm file from here.
+    /// Returns an error for a pose of the arm file, which cannot be changed through the API.
     fn of_agent(&self, name: &str) -> Result<(), Problem> {
         if !is_pose_name(name) {
             return Err(pose_error(&PoseError::Name { name: plain(name) }));
@@ -81,7 +81,7 @@ impl Agent {
     }
 }
 
-/// Why a pose is none, or leads nowhere.
+/// Returns the problem for an invalid pose.
 pub(super) fn pose_error(error: &PoseError) -> Problem {
     let object = Problem::of(error);
     match error {
@@ -92,7 +92,7 @@ pub(super) fn pose_error(error: &PoseError) -> Problem {
     }
 }
 
-/// All named poses.
+/// Returns all named poses.
 #[utoipa::path(
     get,
     path = "/api/poses",
@@ -104,7 +104,7 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<PoseObject>> {
     Json(agent.poses().into_iter().map(|(name, position)| agent.shown(&arm, name, position)).collect())
 }
 
-/// Saves a pose, in place of what was saved under this name.
+/// Saves a pose and replaces a saved pose of this name.
 #[utoipa::path(
     put,
     path = "/api/poses/{name}",
@@ -119,7 +119,7 @@ pub(super) async fn put(
     Number(name): Number<String>,
     Perhaps(request): Perhaps<PoseRequest>,
 ) -> Result<Json<PoseObject>, Problem> {
-    // Only operators change where others may move.
+    // Only operators may change targets of other clients.
     caller.operator()?;
     let saved = save(&agent, &name, request.unwrap_or_default()).await;
     let why = saved.as_ref().err().map(|error| error.message.clone());
@@ -149,10 +149,10 @@ async fn save(agent: &Agent, name: &str, request: PoseRequest) -> Result<[f64; 6
     kept.map_err(|error| Problem::of(&error))
 }
 
-/// No joint turns further, rad.
+/// Largest joint position, rad.
 const FARTHEST: f64 = 100.0;
 
-/// Keeps a pose no more that was saved.
+/// Deletes a saved pose.
 #[utoipa::path(
     delete,
     path = "/api/poses/{name}",

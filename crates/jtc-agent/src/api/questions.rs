@@ -1,4 +1,4 @@
-//! What is asked of the controller itself, for all who may look.
+//! Questions to the controller, for all clients.
 use agent_kit::api::{Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
@@ -12,40 +12,40 @@ use super::held_stop::ReactionsObject;
 use super::objects::PayloadObject;
 use crate::owner::ClientPort;
 
-/// Who the controller is.
+/// Identity of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct InfoObject {
-    /// Version of the extensions of its protocol; 0: it has none, and nothing else is known.
+    /// Version of the protocol extensions; 0: the controller has none, and nothing else is known.
     pub extension: u8,
     /// Version of the firmware.
     pub firmware: String,
-    /// Its git revision.
+    /// Git revision of the firmware.
     pub revision: String,
-    /// The board.
+    /// Board of the controller.
     pub board: String,
     /// Name of the arm in use.
     pub arm: String,
-    /// Hash of all that decides how the arm moves.
+    /// Hash of all parameters that decide how the arm moves.
     pub hash: String,
-    /// Parameters that it has not been given.
+    /// Parameters that the controller has not received.
     pub missing: Vec<String>,
-    /// Its defaults are those of an arm that is stored in it, not those of the built-in arm.
+    /// `true` if its defaults are those of a stored arm, not those of the built-in arm.
     pub defaults_stored: bool,
-    /// How often it has started.
+    /// Number of starts.
     pub boots: u32,
-    /// Why it started last.
+    /// Cause of the last start.
     pub boot_cause: String,
-    /// Since then, s.
+    /// Time since the last start, s.
     pub uptime_s: f64,
-    /// Records lost because too many waited.
+    /// Number of records lost because too many waited.
     pub lost_records: u32,
-    /// What it does about what it has found; missing where it does not report that.
+    /// Reactions to disturbances; missing if the controller does not report them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reactions: Option<ReactionsObject>,
 }
 
 impl Agent {
-    /// Asks the controller something for whoever looks.
+    /// Asks the controller a question for any client.
     pub(super) async fn ask<T: Send + 'static>(
         &self,
         act: impl FnOnce(&mut Session<ClientPort>) -> Result<T, Error> + Send + 'static,
@@ -54,7 +54,7 @@ impl Agent {
     }
 }
 
-/// Who the controller is.
+/// Returns the identity of the controller.
 #[utoipa::path(
     get,
     path = "/api/info",
@@ -80,7 +80,7 @@ pub(super) async fn info(State(agent): State<Agent>) -> Result<Json<InfoObject>,
     }))
 }
 
-/// What the arm carries at its flange, as the controller computes.
+/// Returns the payload at the flange that the controller uses.
 #[utoipa::path(
     get,
     path = "/api/payload",

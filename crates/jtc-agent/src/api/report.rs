@@ -9,18 +9,19 @@ use super::body::blocking;
 use super::runs::found;
 use crate::jobs::Stage;
 
-/// What a report may do: its own script and style, and nothing with this agent or anybody else.
+/// Permissions of a report: its own script and style, and no access to this agent or any other server.
 const PAGE_POLICY: &str = "sandbox allow-scripts; default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; frame-ancestors 'self'";
 
-/// A page that opens in a browser, and needs nothing else.
+/// Page that a browser opens without other files.
 #[derive(ToSchema)]
 #[schema(value_type = String)]
 #[expect(dead_code, reason = "describes a body")]
 pub struct ReportPage(String);
 
-/// The report of the last motion of a job that is over, as `jtc traj run` writes it: a page with figures and plots.
+/// Returns the report of the last motion of a finished job: a page with figures and plots.
 ///
-/// It is made of the statuses that came while the motion went on. The reports of the last 16 jobs are kept, within 64 MB.
+/// The page is the same as that of `jtc traj run`. Its data are the statuses received during the motion. The reports
+/// of the last 16 jobs are kept, within 64 MB.
 #[utoipa::path(
     get,
     path = "/api/jobs/{number}/report",

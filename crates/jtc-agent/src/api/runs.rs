@@ -1,4 +1,4 @@
-//! Runs and moves: jobs, and what becomes of them.
+//! Runs and moves as jobs, and their results.
 use std::sync::Arc;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
@@ -22,74 +22,74 @@ use super::poses::pose_error;
 use crate::jobs::{Course, Job, NUMBER_MAX, Order, Stored, run};
 use crate::line::Policy;
 
-/// A run of a trajectory that is kept.
+/// Run of a kept trajectory.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
-    /// Its number.
+    /// Number of the trajectory.
     #[schema(minimum = 1, maximum = 99)]
     pub trajectory: u16,
-    /// Digest of the trajectory that was looked at: where the number has another one by now nothing is sent.
+    /// Digest of the trajectory that the client saw: the run is refused if the number has another trajectory by now.
     #[serde(default)]
     pub digest: Option<String>,
-    /// Where the arm stands elsewhere it is moved to the first point, at `speed_percent` of the limits and at half of them at most. Without
-    /// `speed_percent` at 10 % of the limits, and at 25 % where the controller is a simulator.
+    /// `true`: first move the arm to the first point, if it stands elsewhere. The speed is `speed_percent` of the
+    /// limits, at most 50 %; without `speed_percent` 10 %, and 25 % with a simulated controller.
     #[serde(default)]
     pub approach: bool,
-    /// % of the trajectory's own speed; missing: 100.
+    /// Speed, % of the trajectory's own speed; missing: 100.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 1000)]
     pub speed_percent: Option<f64>,
-    /// How often it is run.
+    /// Number of runs.
     #[serde(default = "one")]
     #[schema(minimum = 1, maximum = 1000000)]
     pub repeat: u32,
-    /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
+    /// Policy for the motion when this client is no longer alive; missing: the policy of its lease.
     #[serde(default)]
     pub policy: Option<Policy>,
-    /// The controller cannot be asked for its limits, and those that are built into it are safe for this arm.
+    /// `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
 
-/// A move from where the arm stands, to one of the three places.
+/// Move from the current position to one of the three targets.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MoveRequest {
-    /// Joint positions, rad, base to wrist.
+    /// Target joint positions, rad, base to wrist.
     #[serde(default)]
     #[schema(min_items = 6, max_items = 6)]
     pub to_rad: Option<[f64; 6]>,
-    /// A named pose, of those that `GET /api/poses` lists.
+    /// Name of a target pose that `GET /api/poses` lists.
     #[serde(default)]
     pub to_pose: Option<String>,
-    /// A pose of the flange.
+    /// Target pose of the flange.
     #[serde(default)]
     pub to_flange: Option<FlangeObject>,
-    /// The flange keeps to a straight line.
+    /// `true`: the flange moves on a straight line.
     #[serde(default)]
     pub line: bool,
-    /// % of what the limits allow; missing: 10, and 25 where the controller is a simulator.
+    /// Speed, % of the limits; missing: 10, and 25 with a simulated controller.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 100)]
     pub speed_percent: Option<f64>,
-    /// Torque to leave for masses and friction that the model does not know, % of each limit.
+    /// Torque margin for masses and friction that the model does not know, % of each limit.
     #[serde(default = "margin")]
     #[schema(minimum = 0, maximum = 50)]
     pub margin_percent: f64,
-    /// What becomes of the motion when this client shows no more that it is there; missing: as its lease has it.
+    /// Policy for the motion when this client is no longer alive; missing: the policy of its lease.
     #[serde(default)]
     pub policy: Option<Policy>,
-    /// The controller cannot be asked for its limits, and those that are built into it are safe for this arm.
+    /// `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm.
     #[serde(default)]
     pub accept_device_limits: bool,
 }
 
-/// A pose of the flange in the frame of the base.
+/// Pose of the flange in the frame of the base.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FlangeObject {
-    /// x, y, z, m.
+    /// Position x, y, z, m.
     #[schema(min_items = 3, max_items = 3)]
     pub xyz_m: [f64; 3],
     /// Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad.
@@ -101,47 +101,48 @@ fn one() -> u32 {
     1
 }
 
-/// A job: something that takes its time.
+/// Job: a request that takes longer than its answer.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JobObject {
-    /// Its number.
+    /// Number of the job.
     pub number: u64,
-    /// What it does.
+    /// Description of the job.
     pub what: String,
-    /// Who asked for it.
+    /// Name of the client that requested it.
     pub client: String,
     /// `running`, `finished`, `stopped` or `failed`.
     pub stage: String,
-    /// Motions that were finished, approaches not counted.
+    /// Number of finished motions, without approaches.
     pub runs: u32,
-    /// Figures of its last motion.
+    /// Results of its last motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub result: Option<ResultObject>,
-    /// Where the report of its last motion is, a page; missing where it has moved nothing, or later ones have taken its place.
+    /// Address of the report of its last motion, a page; missing if nothing moved, or if later reports have replaced
+    /// it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub report: Option<String>,
-    /// What the controller was given of an arm.
+    /// Arm parameters that were sent to the controller.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub given: Option<GivenObject>,
-    /// Why it failed, or was not begun.
+    /// Reason why the job failed or did not begin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<Problem>,
 }
 
-/// Figures of a motion.
+/// Results of a motion.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ResultObject {
-    /// While the trajectory was executed, s.
+    /// Duration of the execution, s.
     pub executed_s: f64,
     /// Joints, from the base.
     #[schema(min_items = 6, max_items = 6)]
     pub joints: Vec<JointResult>,
 }
 
-/// Figures of a joint.
+/// Results for a joint.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JointResult {
-    /// As in the arm file.
+    /// Name of the joint in the arm file.
     pub name: String,
     /// Root mean square of the position error, mrad.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -152,7 +153,7 @@ pub struct JointResult {
     /// Largest absolute torque, N·m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak_torque_nm: Option<f64>,
-    /// The limit, N·m.
+    /// Torque limit, N·m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub torque_limit_nm: Option<f64>,
     /// Largest absolute speed, rad/s.
@@ -184,7 +185,9 @@ impl From<Job> for JobObject {
     }
 }
 
-/// Runs a trajectory: a job. It is checked from where the arm stands, uploaded, executed and followed.
+/// Runs a trajectory, as a job.
+///
+/// The trajectory is checked from the current position, uploaded, executed and monitored.
 #[utoipa::path(
     post,
     path = "/api/runs",
@@ -234,7 +237,7 @@ pub(super) async fn begin_run(
     )
 }
 
-/// Somebody has put something else under the number since.
+/// Returns the error for a number that has another trajectory by now.
 fn replaced(stored: &Stored) -> Problem {
     let Stored { number, name, digest, .. } = stored;
     let message = format!(
@@ -245,7 +248,9 @@ fn replaced(stored: &Stored) -> Problem {
     Problem::new("replaced", message, next)
 }
 
-/// Moves the arm from where it stands to joint positions, a named pose or a pose of the flange: a job.
+/// Moves the arm to joint positions, a named pose or a pose of the flange, as a job.
+///
+/// The motion starts at the current position.
 #[utoipa::path(
     post,
     path = "/api/moves",
@@ -275,7 +280,7 @@ pub(super) async fn begin_move(
     let (place, target) = match (to_rad, to_pose, to_flange) {
         (Some(to), None, None) => (listed(&to), Target::Joints(to)),
         (None, Some(name), None) => {
-            // Whoever may not command learns nothing.
+            // A client without permission gets no other answer.
             agent.commander(&asker)?;
             let arm = Arm { poses: agent.poses(), ..(*agent.identity().await.arm).clone() };
             let to = arm.pose(&name).map_err(|error| pose_error(&error))?;
@@ -304,7 +309,7 @@ fn listed(numbers: &[f64]) -> String {
     numbers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// From 1 on, and no more than that.
+/// Checks that a value is from 1 to `most`.
 fn within(name: &str, value: f64, most: f64) -> Result<(), Problem> {
     if (1.0..=most).contains(&value) {
         return Ok(());
@@ -326,7 +331,7 @@ fn begin(
     let job = agent.jobs.begin(&commander, turn, what.clone(), move |task, session| {
         let (done, error) = run(task, session, &order);
         task.line.with(|line, now| {
-            // Where its end is not certain, what may still move has the policy that it was begun with.
+            // If the result is uncertain, a motion that may continue keeps the policy of its start.
             if error.is_none() || !line.may_move(now) {
                 line.set_policy(client, own);
             }
@@ -340,7 +345,7 @@ fn begin(
     Ok((StatusCode::ACCEPTED, Json(job.into())))
 }
 
-/// The last jobs, oldest first.
+/// Returns the last jobs, oldest first.
 #[utoipa::path(
     get,
     path = "/api/jobs",
@@ -351,7 +356,7 @@ pub(super) async fn jobs(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     Json(agent.jobs.list().into_iter().map(JobObject::from).collect())
 }
 
-/// A job, while it goes on and afterwards.
+/// Returns a job, while it runs and afterwards.
 #[utoipa::path(
     get,
     path = "/api/jobs/{number}",

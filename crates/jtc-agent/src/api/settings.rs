@@ -1,4 +1,4 @@
-//! Settings of the controller: read, and changed all together or not at all.
+//! Settings of the controller: reading them, and changing all or none of a list.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::lease::LeaseKey;
@@ -15,18 +15,18 @@ use super::Agent;
 use super::error::Denials;
 use crate::owner::ClientPort;
 
-/// The code of a setting that is none, or not taken.
+/// Code of an unknown or refused setting.
 const CODE: &str = "setting";
 
-/// When a setting may be changed.
+/// Condition under which a setting may be changed.
 #[derive(Clone, Copy, Debug, serde::Serialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum When {
     /// Without torque: in Init and in Error.
     Unpowered,
-    /// Also while the arm is held, taught or paused.
+    /// Also during position hold, Teaching or a pause.
     Standing,
-    /// Also while it moves.
+    /// Also in motion.
     Always,
 }
 
@@ -40,29 +40,29 @@ impl From<Live> for When {
     }
 }
 
-/// A setting as the controller has it.
+/// Setting of the controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct SettingObject {
-    /// Its name, with its unit.
+    /// Name of the setting, with its unit.
     pub name: String,
-    /// Which joint, 1 to 6 from the base; missing: it is one of the arm.
+    /// Number of the joint, 1 to 6 from the base; missing: a setting of the whole arm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<u8>,
-    /// The value; switches are 0 or 1.
+    /// Value; switches are 0 or 1.
     pub value: f64,
-    /// Its unit; empty where it has none.
+    /// Unit; empty if it has none.
     pub unit: String,
     /// Lowest value.
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// Whole numbers only.
+    /// `true` if only whole numbers are possible.
     pub whole: bool,
-    /// When it may be changed.
+    /// Condition under which it may be changed.
     pub when: When,
-    /// It is stored with the arm, and in its hash.
+    /// `true` if it is stored with the arm and included in its hash.
     pub of_arm: bool,
-    /// What it is.
+    /// Meaning of the setting.
     pub meaning: String,
 }
 
@@ -83,31 +83,31 @@ impl SettingObject {
     }
 }
 
-/// A setting that is to have another value.
+/// New value of a setting.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SettingChange {
-    /// Its name, with its unit.
+    /// Name of the setting, with its unit.
     pub name: String,
-    /// Which joint, from the base; missing for a setting of the arm.
+    /// Number of the joint, from the base; missing for a setting of the arm.
     #[serde(default)]
     #[schema(minimum = 1, maximum = 6)]
     pub joint: Option<u8>,
-    /// The value; switches are 0 or 1.
+    /// Value; switches are 0 or 1.
     pub value: f64,
 }
 
-/// Settings that are to have other values: all of them, or none.
+/// Settings to change: all of them, or none.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsRequest {
-    /// Each at most once.
+    /// Settings, each at most once.
     #[schema(min_items = 1, max_items = 256)]
     pub settings: Vec<SettingChange>,
 }
 
 impl SettingsRequest {
-    /// As the wire has them.
+    /// Returns the values in the form of the protocol.
     fn values(&self) -> Result<Vec<SettingValue>, Problem> {
         let count = self.settings.len();
         if !(1..=SET_VALUES_MAX).contains(&count) {
@@ -126,7 +126,7 @@ impl SettingsRequest {
         Ok(values)
     }
 
-    /// For the log of commands.
+    /// Returns the text for the log of commands.
     fn words(&self) -> String {
         let all: Vec<String> =
             self.settings.iter().map(|change| format!("{} = {}", change.words(), change.value)).collect();
@@ -135,7 +135,7 @@ impl SettingsRequest {
 }
 
 impl SettingChange {
-    /// As the wire has it: of a setting that there is, and within its range.
+    /// Returns the value in the form of the protocol, if the setting exists and the value is in range.
     fn value(&self) -> Result<SettingValue, Problem> {
         let row = settings::named(&self.name).ok_or_else(|| {
             let message = format!("there is no setting {:?}; nothing was changed", short(&self.name));
@@ -185,17 +185,17 @@ impl SettingChange {
     }
 }
 
-/// What somebody has sent as a name, as a line can have it.
+/// Returns a name that a client has sent, shortened to fit in a line.
 fn short(name: &str) -> String {
     agent_kit::gate::plain(name)
 }
 
-/// Nothing of this is changed.
+/// Returns the error for a refused change; no part of the change was applied.
 fn none(message: String, next: &'static str) -> Problem {
     Problem::new(CODE, message, next).kind(ErrorKind::Usage)
 }
 
-/// All settings, as the controller has them.
+/// Returns all settings of the controller.
 #[utoipa::path(
     get,
     path = "/api/settings",
@@ -210,7 +210,9 @@ pub(super) async fn list(State(agent): State<Agent>) -> Result<Json<Vec<SettingO
     Ok(Json(known.collect()))
 }
 
-/// Changes settings: all that are sent, or none. Most of them change without torque only.
+/// Changes all given settings, or none.
+///
+/// Most settings can change only without torque.
 #[utoipa::path(
     put,
     path = "/api/settings",

@@ -1,4 +1,5 @@
-//! A client's end of the line as a WebSocket: binary messages are bytes of the line, text messages are what an agent has to say.
+//! Connection of a client to the line as a WebSocket: binary messages are bytes of the line, text messages are notices
+//! of the agent.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -17,88 +18,90 @@ use super::{Agent, Caller};
 use crate::line::{ClientId, Delivery, Introduction, Policy, Role};
 use crate::owner::Line;
 
-/// Longest message that a client may send.
+/// Longest message of a client, bytes.
 const MESSAGE_MAX: usize = 64 << 10;
-/// How long a client may leave a message untaken.
+/// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// How often a client shows that it is there.
+/// Interval at which a client shows that it is alive.
 const PING_TIME: Duration = Duration::from_secs(1);
-/// So many pings in a row without a sign of it: it commands no more.
+/// Number of unanswered pings in a row after which the client loses the lease.
 const SILENT_MAX: u32 = 4;
-/// The socket was closed because the client was put out: it sent no frames, or did not read.
+/// Close code of a client that the agent disconnected: it sent invalid bytes or too many frames, did not read, or was
+/// silent while it held the lease.
 pub const CLOSE_PUT_OUT: u16 = 4000;
 
-/// How a client introduces itself, in the address of the socket.
+/// Introduction of a client, in the address of the socket.
 #[derive(Clone, Debug, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Joining {
-    /// What people are to call it.
+    /// Name of the client for people.
     name: Option<String>,
-    /// What becomes of its motion without it.
+    /// Policy for its motion when it disconnects.
     #[serde(default)]
     policy: Policy,
 }
 
-/// The first message of an agent.
+/// First message of an agent.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hello {
     /// Name of the port.
     pub port: String,
     /// Rate of the line, Bd, if it has one.
     pub baud: Option<u32>,
-    /// No arm moves.
+    /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
-    /// What this client may do.
+    /// Role of this client.
     pub role: Role,
 }
 
-/// What an agent has to say to a client.
+/// Notice of an agent to a client.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Notice {
-    /// The first message.
+    /// First message.
     Hello(Hello),
-    /// A frame was not passed on.
+    /// Frame that was not passed on.
     Denied {
-        /// Why.
+        /// Reason.
         why: String,
     },
-    /// What was asked about the lease was not done.
+    /// Request about the lease that was refused.
     LeaseDenied {
-        /// Why.
+        /// Reason.
         why: String,
     },
-    /// The arm was stopped or paused. What this client had asked for before moves it no more, until it asks anew: `{"asked_after": number}`.
+    /// Stop or Pause of the arm. Earlier requests of this client no longer move the arm, until it sends a new request:
+    /// `{"asked_after": number}`.
     Halted {
-        /// Number of this halt.
+        /// Number of this Stop or Pause.
         number: u64,
-        /// Who has asked for it.
+        /// Name of the client that requested it.
         by: String,
-        /// What for.
+        /// Command.
         command: String,
-        /// Stops and Pauses of others since this client came.
+        /// Stops and Pauses of other clients since this client connected.
         of_others: Halts,
     },
-    /// Another client asks for the lease.
+    /// Request of another client for the lease.
     LeaseWanted {
-        /// Its name.
+        /// Name of that client.
         by: String,
     },
 }
 
 impl Notice {
     fn message(&self) -> Message {
-        // Made of strings and numbers.
+        // The message contains only strings and numbers, so this cannot fail.
         Message::Text(serde_json::to_string(self).unwrap_or_default().into())
     }
 }
 
-/// What a client asks of the agent itself.
+/// Request of a client to the agent itself.
 #[derive(Clone, Copy, Debug, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Wish {
     Lease(LeaseWish),
-    /// What this client sends from now on was asked for when this halt was the last one that it knew of.
+    /// Number of the last Stop or Pause that the client knew when it decided about its next frames.
     AskedAfter(u64),
 }
 
@@ -107,11 +110,11 @@ enum Wish {
 enum LeaseWish {
     Take,
     Release,
-    /// The client that has it is asked to let it go.
+    /// Asks the holder of the lease to release it.
     Ask,
 }
 
-/// `GET /api/line`: an end of the line for a client.
+/// Serves `GET /api/line`: a connection to the line for a client.
 pub(super) async fn line(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -129,7 +132,7 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     let introduction = Introduction { name: name.clone(), role, policy: joining.policy };
     let joined = agent.line.join(introduction);
     let client = joined.client();
-    // Those who only look may come and go as often as they like.
+    // Viewers may connect and disconnect as often as they like.
     let note = |what, facts| match role {
         Role::Operator => agent.note(what, facts),
         Role::Viewer => agent.gate.note_repeated(what, caller.peer, facts),
@@ -148,7 +151,8 @@ async fn serve(agent: &Agent, caller: &Caller, joining: Joining, mut socket: Web
     note("left", json!({ "client": client.0, "name": name }));
 }
 
-/// Passes messages both ways until one end has gone. Neither waits for the other: a Stop is read also where nothing is taken.
+/// Passes messages in both directions until one end disconnects. The directions do not wait for each other, so a Stop
+/// is read even if the client does not read.
 async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     let alive = AtomicBool::new(true);
     let (to, from) = socket.split();
@@ -158,7 +162,7 @@ async fn pass(line: &Line, client: ClientId, socket: WebSocket) {
     }
 }
 
-/// What the client sends.
+/// Passes on the messages of the client.
 async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>, alive: &AtomicBool) {
     while let Some(Ok(message)) = from.next().await {
         alive.store(true, Ordering::Relaxed);
@@ -171,14 +175,14 @@ async fn receive(line: &Line, client: ClientId, mut from: SplitStream<WebSocket>
     }
 }
 
-/// What it is to get; and whether it is there.
+/// Sends the client its messages, and checks that it is alive.
 async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Message>, alive: &AtomicBool) {
     let mut changes = line.changes();
     let mut pings = tokio::time::interval(PING_TIME);
-    // What this computer has missed is no silence of the client.
+    // A delay of this computer must not count as silence of the client.
     pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut silent = 0;
-    // It knows of all before it came.
+    // The client knows all Stops and Pauses from before it connected.
     let mut known = line.with(|line, _| line.asked_after(client)).unwrap_or_default();
     loop {
         let (deliveries, halt) = line.with(|line, _| {
@@ -230,7 +234,7 @@ async fn deliver(line: &Line, client: ClientId, mut to: SplitSink<WebSocket, Mes
     }
 }
 
-/// What a client asks of the agent; what is none is passed over.
+/// Handles a request of a client to the agent; invalid requests are ignored.
 fn wish(line: &Line, client: ClientId, text: &str) {
     let Ok(wish) = serde_json::from_str(text) else { return };
     line.with(|line, now| {
@@ -252,7 +256,7 @@ fn wish(line: &Line, client: ClientId, text: &str) {
     line.wake();
 }
 
-/// False when the client does not take it.
+/// Sends a message. Returns `false` if the client does not take it.
 async fn send(to: &mut SplitSink<WebSocket, Message>, message: Message) -> bool {
     matches!(tokio::time::timeout(SEND_TIME, to.send(message)).await, Ok(Ok(())))
 }

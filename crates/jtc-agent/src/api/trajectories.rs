@@ -1,4 +1,4 @@
-//! Trajectories by number: kept, checked, listed.
+//! Trajectories by number: keeping, checking and listing them.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Number, Problem, Refusals};
@@ -20,38 +20,40 @@ use super::{Agent, Caller};
 use crate::jobs::Stored;
 use crate::owner::ClientPort;
 
-/// Most points that are shown at once.
+/// Largest number of points in one answer.
 const POINTS_MAX: usize = 2000;
 
-/// A trajectory to keep.
+/// Trajectory to keep.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TrajectoryRequest {
-    /// What people are to call it: the first 64 characters.
+    /// Name for people: the first 64 characters.
     pub name: String,
-    /// A file's text in any form that jtc traj run takes but recordings: CSV with a time column and joints, JSON, or a ROS JointTrajectory.
+    /// Text of a file in any format that jtc traj run accepts, except recordings: CSV with a time column and joints,
+    /// JSON, or a ROS JointTrajectory.
     pub text: String,
-    /// Its numbers are degrees.
+    /// `true` if the angles are in degrees.
     #[serde(default)]
     pub degrees: bool,
 }
 
-/// A trajectory that is kept.
+/// Kept trajectory.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct TrajectoryObject {
-    /// Its number.
+    /// Number of the trajectory.
     pub number: u16,
-    /// What people call it.
+    /// Name for people.
     pub name: String,
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// ms between two points.
+    /// Time between two points, ms.
     pub step_ms: u16,
-    /// s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// What was derived or left out when it was read.
+    /// Notes about values that were derived or left out when it was read.
     pub notes: Vec<String>,
-    /// What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it.
+    /// Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
+    /// `POST /api/runs` accepts it.
     pub digest: String,
 }
 
@@ -70,23 +72,24 @@ impl From<&Stored> for TrajectoryObject {
     }
 }
 
-/// What a trajectory may take the place of.
+/// Condition for replacing a trajectory.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PlaceRequest {
-    /// Of nothing: where the number has a trajectory already it is refused, and nothing is replaced.
+    /// `true`: refuse the trajectory if the number is taken, and replace nothing.
     #[serde(default)]
     #[param(default = false)]
     new: bool,
 }
 
-/// How much of a trajectory is shown.
+/// Amount of points to show.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub(super) struct PointsRequest {
-    /// Most points: of more of them some are left out, evenly, and never the first and the last.
+    /// Largest number of points: if the trajectory has more, points are left out evenly, but never the first and the
+    /// last.
     #[serde(default = "some_points")]
     #[param(minimum = 2, maximum = 2000, default = 500)]
     most: usize,
@@ -96,25 +99,26 @@ fn some_points() -> usize {
     500
 }
 
-/// A trajectory to draw.
+/// Trajectory for a plot.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct PointsObject {
-    /// Its number.
+    /// Number of the trajectory.
     pub number: u16,
-    /// What people call it.
+    /// Name for people.
     pub name: String,
-    /// s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it.
+    /// Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
+    /// `POST /api/runs` accepts it.
     pub digest: String,
     /// Times of the points, s.
     pub times_s: Vec<f64>,
-    /// Where the joints are at each of them, from the base, rad.
+    /// Joint positions at these times, from the base, rad.
     pub positions_rad: Vec<[f64; 6]>,
 }
 
 impl PointsObject {
-    /// So many points at most, which are two or more.
+    /// Returns the trajectory with at most `most` points, but at least two.
     fn new(stored: &Stored, most: usize) -> Self {
         let Stored { number, name, trajectory, digest, .. } = stored;
         let count = trajectory.points.len();
@@ -137,41 +141,41 @@ impl PointsObject {
     }
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct CheckObject {
-    /// Nothing forbids to run it from its first point.
+    /// `true` if the trajectory can run from its first point.
     pub passed: bool,
-    /// s.
+    /// Duration, s.
     pub duration_s: f64,
-    /// What was checked, in short: the digest of the trajectory.
+    /// Digest of the checked trajectory.
     pub digest: String,
-    /// The smallest torque margin; the motion is warned of below 10 %.
+    /// Smallest torque margin; below 10 % there is a warning.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub margin: Option<MarginObject>,
-    /// What is wrong, worst first.
+    /// Problems, worst first.
     pub problems: Vec<ProblemObject>,
 }
 
-/// A thing that is wrong with a trajectory.
+/// Problem of a trajectory.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ProblemObject {
-    /// In words, with value, limit and place.
+    /// Message with value, limit and place.
     pub message: String,
-    /// Which joint; missing: the trajectory as a whole.
+    /// Number of the joint; missing: the trajectory as a whole.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<u8>,
-    /// Point, from 0, where it is worst.
+    /// Index of the worst point, from 0.
     pub point: usize,
     /// Time along the path, s.
     pub time_s: f64,
-    /// Worst value; missing where it is no number.
+    /// Worst value; missing if it is not a number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub value: Option<f64>,
-    /// Its limit.
+    /// Limit of the value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub limit: Option<f64>,
-    /// It does not forbid to run the trajectory.
+    /// `true` if the problem does not prevent a run.
     pub warning: bool,
 }
 
@@ -197,7 +201,7 @@ impl CheckObject {
     }
 }
 
-/// The trajectories that are kept.
+/// Returns the kept trajectories.
 #[utoipa::path(
     get,
     path = "/api/trajectories",
@@ -208,7 +212,9 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<TrajectoryObjec
     Json(agent.jobs.store.list().iter().map(|stored| TrajectoryObject::from(&**stored)).collect())
 }
 
-/// Keeps a trajectory under a number, in place of what had it. A run that has begun goes on with what it has.
+/// Keeps a trajectory under a number and replaces the one before.
+///
+/// A run that has begun continues with its own trajectory.
 #[utoipa::path(
     put,
     path = "/api/trajectories/{number}",
@@ -224,7 +230,7 @@ pub(super) async fn put(
     Asked(place): Asked<PlaceRequest>,
     request: Request,
 ) -> Result<Json<TrajectoryObject>, Problem> {
-    // Only operators change what others may run.
+    // Only operators may change trajectories that other clients run.
     caller.operator()?;
     let own = agent.clone();
     let kept = read(&agent, request, move |request| {
@@ -237,7 +243,7 @@ pub(super) async fn put(
     Ok(Json(kept.await?))
 }
 
-/// Keeps what a text says under a number; a `new` one in place of nothing.
+/// Keeps the trajectory of a text under a number; with `new` only if the number is free.
 pub(super) fn keep(
     agent: &Agent,
     (number, new): (u16, bool),
@@ -252,7 +258,7 @@ pub(super) fn keep(
     stored.map(|stored| TrajectoryObject::from(&*stored)).map_err(|e| Problem::of(&e))
 }
 
-/// Keeps it no more.
+/// Deletes a kept trajectory.
 #[utoipa::path(
     delete,
     path = "/api/trajectories/{number}",
@@ -269,7 +275,7 @@ pub(super) async fn delete(
     Extension(caller): Extension<Caller>,
     Number(number): Number<u16>,
 ) -> Result<StatusCode, Problem> {
-    // Only operators change what others may run.
+    // Only operators may change trajectories that other clients run.
     caller.operator()?;
     let jobs = agent.jobs.clone();
     let gone = blocking(move || jobs.store.delete(number)).await?;
@@ -280,7 +286,7 @@ pub(super) async fn delete(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Points of a trajectory, to draw it.
+/// Returns points of a trajectory, for a plot.
 #[utoipa::path(
     get,
     path = "/api/trajectories/{number}/points",
@@ -307,12 +313,12 @@ pub(super) async fn points(
     Ok(Json(PointsObject::new(&*kept(&agent, number)?, most)))
 }
 
-/// The trajectory that is kept under a number.
+/// Returns the trajectory that is kept under a number.
 fn kept(agent: &Agent, number: u16) -> Result<Arc<Stored>, Problem> {
     agent.jobs.store.get(number).ok_or_else(|| Problem::nothing("trajectory", number, "/api/trajectories"))
 }
 
-/// Checks a trajectory with the limits, the model and the payload of the controller, from its own first point.
+/// Checks a trajectory with the controller's limits, model and payload, from its own first point.
 #[utoipa::path(
     get,
     path = "/api/trajectories/{number}/check",

@@ -1,4 +1,4 @@
-//! A client that has no connection of its own: it asks by HTTP, and shows by each request that it is there.
+//! Session of an HTTP client, which has no connection of its own: each request shows that the client is alive.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -13,60 +13,60 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore, oneshot};
 use crate::line::{ClientId, Introduction, Policy};
 use crate::owner::{ClientPort, Line};
 
-/// How often a client without work takes in what the controller reports.
+/// Interval at which an idle client reads the statuses of the controller.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The code of what was wished of a motion that had ended before.
+/// Error code of a request for a motion that had ended before.
 const MOTION_ENDED: &str = "motion-ended";
 
-/// What a client has its end of the line do.
+/// Function that runs on the session of a client.
 type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 
-/// A client's end of the line, with a session on a thread of its own.
+/// Connection of a client to the line, with a session on a thread of its own.
 pub struct Commander {
-    /// Its number on the line.
+    /// Number of the client on the line.
     pub client: ClientId,
-    /// What people call it.
+    /// Name of the client for people.
     pub name: String,
     work: SyncSender<Work>,
-    /// One thing at a time.
+    /// Permits one function at a time.
     free: Arc<Semaphore>,
-    /// The job that is going on, and what is wished of it.
+    /// Current job, and the queue of requests while it runs.
     job: Mutex<Option<(u64, SyncSender<Wish>)>>,
     seen: Mutex<Instant>,
-    /// The policy that its lease was taken with.
+    /// Policy of its lease.
     pub policy: Policy,
-    /// A motion is going on, and what is wished of it is done.
+    /// `true` while a motion runs, which accepts requests.
     moves: AtomicBool,
 }
 
-/// What is wished of a motion, and who is to know what came of it.
+/// Request while a motion runs, and the receiver of its result.
 pub struct Wish {
-    /// What.
+    /// Requested change.
     pub flow: Flow,
-    /// Receives what came of it.
+    /// Channel for the result.
     pub done: oneshot::Sender<Result<(), Problem>>,
 }
 
-/// The turn to do something with a client's end of the line; it is over when this is dropped.
+/// Turn to use the session of a client; it ends on drop.
 pub struct Turn(#[expect(dead_code, reason = "held until it is over")] OwnedSemaphorePermit);
 
-/// Why a client's end of the line does nothing.
+/// Reason why the session of a client cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unable {
-    /// It is at something else: this job, where it is one.
+    /// The session is in use, by this job if there is one.
     Busy(Option<u64>),
-    /// The line is gone, or the client was put out.
+    /// The line was lost, or the client was disconnected.
     Gone,
 }
 
 impl Commander {
-    /// A client of this line from now on.
+    /// Adds a client to this line.
     pub fn new(line: &Line, introduction: Introduction) -> Arc<Self> {
         let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
         let client = port.client();
-        // One waits while the one before is being taken.
+        // One function can wait while the one before is being received.
         let (work, incoming) = sync_channel(1);
         std::thread::spawn(move || serve(port, &incoming));
         let seen = Mutex::new(Instant::now());
@@ -74,29 +74,30 @@ impl Commander {
         Arc::new(Self { client, name, policy, work, free, job, seen, moves })
     }
 
-    /// It has asked for something.
+    /// Notes that the client has sent a request.
     pub fn see(&self) {
         *self.seen.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
     }
 
-    /// A motion is going on.
+    /// Returns `true` while a motion runs.
     pub fn is_moving(&self) -> bool {
         self.moves.load(Ordering::Acquire)
     }
 
-    /// A motion begins: what is wished of it is done from then on.
+    /// Marks the start of a motion, which accepts requests from then on.
     pub fn motion_begins(&self) {
         self.moves.store(true, Ordering::Release);
     }
 
-    /// A motion has ended. What was wished of it too late is known to have been: its senders are dropped.
+    /// Marks the end of a motion. Requests that came too late are dropped with their senders, which tells their
+    /// clients.
     pub fn motion_ended(&self, wishes: &Receiver<Wish>) {
         let _job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
         self.moves.store(false, Ordering::Release);
         while wishes.try_recv().is_ok() {}
     }
 
-    /// For how long it has not asked for anything, nor has it anything going on.
+    /// Returns the time since the last request of the client; 0 while its session is in use.
     pub fn idle(&self) -> Duration {
         if self.free.available_permits() == 0 {
             return Duration::ZERO;
@@ -104,12 +105,12 @@ impl Commander {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner).elapsed()
     }
 
-    /// The job that is going on.
+    /// Returns the number of the current job.
     pub fn job(&self) -> Option<u64> {
         self.job.lock().unwrap_or_else(PoisonError::into_inner).as_ref().map(|(job, _)| *job)
     }
 
-    /// The turn to do something, where nothing else is going on.
+    /// Returns the turn if the session is free.
     ///
     /// # Errors
     ///
@@ -118,7 +119,7 @@ impl Commander {
         self.free.clone().try_acquire_owned().map(Turn).map_err(|_| Unable::Busy(self.job()))
     }
 
-    /// Does something that is soon over when its turn has come.
+    /// Waits for the turn and runs a short function.
     ///
     /// # Errors
     ///
@@ -131,7 +132,7 @@ impl Commander {
         self.act(Turn(turn), act).await
     }
 
-    /// Does something in its turn.
+    /// Runs a function in the given turn.
     ///
     /// # Errors
     ///
@@ -144,16 +145,16 @@ impl Commander {
         let (done, result) = oneshot::channel();
         let work: Work = Box::new(move |session| {
             let came = act(session);
-            // Free again before anybody knows: it can be asked for the next thing at once.
+            // The session is free before the caller receives the result, so that it can send its next request at once.
             drop(turn);
-            // Whoever asked may have gone; what was asked for is done all the same.
+            // The function has run even if its caller has disconnected.
             let _ = done.send(came);
         });
         self.work.try_send(work).map_err(|_| Unable::Gone)?;
         result.await.map_err(|_| Unable::Gone)
     }
 
-    /// Does something in its turn that nobody waits for; nothing where the line is gone.
+    /// Runs a function in the given turn without a waiting caller; has no effect if the line was lost.
     pub fn tell(&self, turn: Turn, act: impl FnOnce(&mut Session<ClientPort>) + Send + 'static) {
         let work: Work = Box::new(move |session| {
             act(session);
@@ -162,11 +163,12 @@ impl Commander {
         drop(self.work.try_send(work));
     }
 
-    /// Begins a job, which is given what is wished of it on the way; `then` is called when the next thing can be asked for.
+    /// Begins a job, which receives the requests while it runs; `then` is called when the session accepts the next
+    /// request.
     ///
     /// # Errors
     ///
-    /// [`Unable`]: nothing was begun.
+    /// [`Unable`]: the job was not begun.
     pub fn begin<T>(
         self: &Arc<Self>,
         turn: Turn,
@@ -192,7 +194,7 @@ impl Commander {
         })
     }
 
-    /// Wishes something of the motion that is going on, and waits for what comes of it. `None`: no motion is going on.
+    /// Sends a request to the running motion and waits for its result. `None`: no motion runs.
     pub async fn wish(&self, flow: Flow) -> Option<Result<(), Problem>> {
         let done = self.wished(flow)?;
         Some(done.await.unwrap_or_else(|_| {
@@ -204,7 +206,7 @@ impl Commander {
     fn wished(&self, flow: Flow) -> Option<oneshot::Receiver<Result<(), Problem>>> {
         let (done, result) = oneshot::channel();
         let job = self.job.lock().unwrap_or_else(PoisonError::into_inner);
-        // Under the lock that the end of a motion takes: it is not done in the next one.
+        // Under the same lock as the end of a motion, so that the request never reaches the next motion.
         let (_, wishes) = job.as_ref().filter(|_| self.is_moving())?;
         wishes.try_send(Wish { flow, done }).ok().map(|()| result)
     }
@@ -214,7 +216,8 @@ impl Commander {
     }
 }
 
-/// Does what is asked until nobody can ask any more; takes in what comes meanwhile, or it would be put out.
+/// Runs the queued functions until no caller is left. Reads deliveries meanwhile, because a client that does not read
+/// is disconnected.
 fn serve(port: ClientPort, work: &Receiver<Work>) {
     let mut session = Session::new(port);
     loop {

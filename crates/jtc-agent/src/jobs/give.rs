@@ -1,4 +1,4 @@
-//! The whole arm for a controller, as a job.
+//! Sending a complete arm to the controller, as a job.
 use agent_kit::api::Problem;
 use jtc_host::session::{ArmPart, PushReport};
 use jtc_host::{Arm, Error, LinkError, Session};
@@ -7,23 +7,23 @@ use super::task::STOPPED;
 use super::{Done, Happening, Task};
 use crate::owner::ClientPort;
 
-/// What a controller was given of an arm.
+/// Parameters that were sent to the controller.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
-    /// So many settings have changed.
+    /// Number of settings that have changed.
     pub settings: usize,
-    /// It has its name.
+    /// `true` if the controller has the name of the arm.
     pub named: bool,
-    /// Friction, gains and model, as far as they were confirmed.
+    /// Friction, gains and model, as far as the controller confirmed them.
     pub parts: Vec<PushReport>,
-    /// Hash of the arm, where all of it was read back and does not differ.
+    /// Hash of the arm, if all parameters were read back without a difference.
     pub hash: Option<u64>,
-    /// Its number in the memory that lasts.
+    /// Number of the arm in the non-volatile memory.
     pub stored: Option<u32>,
 }
 
 impl Given {
-    /// What is in use of an arm that was not given whole, in words.
+    /// Returns, in words, the parts that are in use of an incompletely sent arm.
     fn in_use(&self) -> Option<String> {
         let mut parts = Vec::new();
         match self.settings {
@@ -39,8 +39,8 @@ impl Given {
     }
 }
 
-/// Gives the controller the whole arm, reads it back and compares; `store`: has it kept over a loss of power. It ends where somebody stops or
-/// pauses the arm: an arm that was given whole has torque.
+/// Sends the complete arm to the controller, reads it back and compares; `store`: also stores it in non-volatile
+/// memory. Ends if the arm is stopped or paused, because a controller with a complete arm applies torque.
 pub fn give(
     task: &Task<'_>,
     session: &mut Session<ClientPort>,
@@ -77,7 +77,7 @@ pub fn give(
     (Done { finished: error.is_none(), given: Some(given), ..Done::default() }, error)
 }
 
-/// Why the controller does not have the whole of it, and what of it is in use.
+/// Returns the reason why the controller does not have the complete arm, and the parts that are in use.
 fn not_given(task: &Task<'_>, error: &Error, given: &Given) -> Problem {
     let halted = match error {
         Error::Cancelled => true,

@@ -1,134 +1,134 @@
-//! What can happen to an arm and its jobs.
+//! Events of an arm and its jobs.
 use agent_kit::api::Problem;
 use utoipa::ToSchema;
 
-/// What has happened.
+/// Event of an arm or a job.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, ToSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Happening {
-    /// Another client commands, or nobody does.
+    /// Change of the lease holder.
     Lease {
-        /// Its name; missing: nobody commands.
+        /// Name of the holder; missing: no client holds the lease.
         #[serde(skip_serializing_if = "Option::is_none")]
         holder: Option<String>,
     },
-    /// Somebody stopped or paused the arm.
+    /// Stop or Pause of the arm.
     Halt {
         /// `stop` or `pause`.
         command: String,
-        /// Who it was.
+        /// Name of the client that requested it.
         by: String,
     },
-    /// The controller reports another state, or other errors.
+    /// Change of the controller's state or errors.
     State {
         /// State, in the words of the protocol.
         state: String,
-        /// What becomes of the trajectory.
+        /// State of the trajectory.
         trajectory: String,
-        /// Errors now.
+        /// Current errors.
         errors: Vec<String>,
     },
-    /// The port is gone.
+    /// Loss of the port.
     Lost {
-        /// Why.
+        /// Reason.
         why: String,
     },
-    /// A job began.
+    /// Start of a job.
     Begun {
-        /// Its number.
+        /// Number of the job.
         job: u64,
-        /// What it does.
+        /// Description of the job.
         what: String,
-        /// Who asked for it.
+        /// Name of the client that requested it.
         client: String,
     },
-    /// Something to know about a job.
+    /// Note about a job.
     Note {
-        /// Its number.
+        /// Number of the job.
         job: u64,
-        /// In words.
+        /// Text of the note.
         text: String,
     },
-    /// A motion passed the check.
+    /// Motion that passed the check.
     Checked {
-        /// The job.
+        /// Number of the job.
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// s.
+        /// Duration, s.
         duration_s: f64,
-        /// Points.
+        /// Number of points.
         points: usize,
-        /// What does not forbid to run it.
+        /// Warnings, which do not prevent a run.
         warnings: Vec<String>,
     },
-    /// A motion is being uploaded.
+    /// Progress of the upload of a motion.
     Uploading {
-        /// The job.
+        /// Number of the job.
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// Segments that the controller has.
+        /// Number of segments that the controller has.
         segments_done: usize,
-        /// Of so many.
+        /// Number of segments of the motion.
         segments: usize,
     },
-    /// The controller has it.
+    /// End of the upload.
     Uploaded {
-        /// The job.
+        /// Number of the job.
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// How long that took, s.
+        /// Duration of the upload, s.
         time_s: f64,
-        /// Bytes on the line.
+        /// Number of bytes on the line.
         bytes: usize,
-        /// Segments that were sent again.
+        /// Number of repeated segments.
         retries: u32,
     },
-    /// The controller was given a part of an arm, and has confirmed it.
+    /// Arm parameter that the controller has confirmed.
     Given {
-        /// The job.
+        /// Number of the job.
         job: u64,
-        /// Which part.
+        /// Name of the parameter.
         parameter: String,
-        /// Bytes of its frame.
+        /// Length of its frame, bytes.
         bytes: usize,
-        /// How long that took, s.
+        /// Duration, s.
         time_s: f64,
     },
-    /// The arm begins to move.
+    /// Start of a motion.
     Executing {
-        /// The job.
+        /// Number of the job.
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// s, at full speed.
+        /// Duration at full speed, s.
         duration_s: f64,
     },
-    /// The arm moves, reported once a second.
+    /// Progress of a motion, once a second.
     Moving {
-        /// The job.
+        /// Number of the job.
         job: u64,
         /// `approach` or `motion`.
         phase: String,
-        /// The 1 ms point that the controller is at.
+        /// Current 1 ms point of the trajectory.
         point: u32,
     },
-    /// A motion of a job came to its end.
+    /// Completed motion of a job.
     Finished {
-        /// The job.
+        /// Number of the job.
         job: u64,
-        /// How many motions of this job were finished, approaches not counted.
+        /// Number of finished motions of this job, without approaches.
         runs: u32,
     },
-    /// A job is over.
+    /// End of a job.
     Ended {
-        /// Its number.
+        /// Number of the job.
         job: u64,
         /// `finished`, `stopped` or `failed`.
         outcome: String,
-        /// Why it failed.
+        /// Reason of a failure.
         #[serde(skip_serializing_if = "Option::is_none")]
         error: Option<Problem>,
     },
@@ -152,5 +152,5 @@ impl agent_kit::journal::Happening for Happening {
     }
 }
 
-/// Events of an arm by number.
+/// Numbered events of an arm.
 pub type Journal = agent_kit::journal::Journal<Happening>;

@@ -1,39 +1,40 @@
-//! Named poses that were saved through the agent; in a file, where there is a directory for trajectories, so that they outlast it.
+//! Named poses that were saved through the agent. With a directory for trajectories they are stored in a file there, so that they
+//! survive a restart of the agent.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use jtc_host::arm::{Poses, is_pose_name};
 
-/// Most poses.
+/// Largest number of poses.
 pub const POSES_MAX: usize = 200;
-/// Name of their file.
+/// Name of the file.
 const FILE: &str = "poses.json";
-/// Version of its form.
+/// Version of the file format.
 const FORMAT: u8 = 1;
-/// Positions are kept to a micrometre at the end of an arm of one metre, as in arm files.
+/// Positions are rounded to a micrometre at the end of an arm of one metre, as in arm files.
 const DECIMALS: f64 = 1e6;
 
-/// Why a pose is not kept.
+/// Reason why a pose is not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum PoseStoreError {
-    /// There are as many as there may be.
+    /// The store is full.
     #[error("{POSES_MAX} poses are kept: there is no room for another")]
     Full,
-    /// The file holds something else.
+    /// The file has invalid contents.
     #[error("{}: {why}", path.display())]
     Form {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Problem in the contents.
         why: String,
     },
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why not.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -56,7 +57,7 @@ impl host_kit::Diagnose for PoseStoreError {
     }
 }
 
-/// As the file has them.
+/// Contents of the file.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Kept {
@@ -69,16 +70,16 @@ struct Kept {
 pub struct PoseStore {
     path: Option<PathBuf>,
     kept: Mutex<Poses>,
-    /// Of who writes the file: whoever reads what is kept waits for no disk.
+    /// Lock of the file's writer, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
 impl PoseStore {
-    /// In a directory.
+    /// Opens the poses of a directory.
     ///
     /// # Errors
     ///
-    /// The file cannot be read, or holds something else.
+    /// The file cannot be read, or has invalid contents.
     pub fn open(directory: &Path) -> Result<Self, PoseStoreError> {
         let path = directory.join(FILE);
         let poses = match std::fs::read(&path) {
@@ -91,16 +92,16 @@ impl PoseStore {
         Ok(Self { path: Some(path), kept: Mutex::new(poses), ..Self::default() })
     }
 
-    /// All of them.
+    /// Returns all poses.
     pub fn list(&self) -> Poses {
         self.lock().clone()
     }
 
-    /// Keeps a pose whose name is one, rad, in place of what had this name; returns it as it is kept.
+    /// Stores a pose with a valid name, rad, and replaces the one of the same name; returns it as stored.
     ///
     /// # Errors
     ///
-    /// [`PoseStoreError`]; what had this name before is kept then.
+    /// [`PoseStoreError`]; the pose of this name is unchanged then.
     pub fn put(&self, name: &str, position: &[f64; 6]) -> Result<[f64; 6], PoseStoreError> {
         let rounded = position.map(|v| (v * DECIMALS).round() / DECIMALS + 0.0);
         self.change(|poses| {
@@ -109,11 +110,11 @@ impl PoseStore {
         })
     }
 
-    /// Keeps it no more. False: there was none.
+    /// Deletes a pose. Returns `false` if the pose did not exist.
     ///
     /// # Errors
     ///
-    /// The file cannot be written; it is kept then.
+    /// The file cannot be written; the pose is kept then.
     pub fn delete(&self, name: &str) -> Result<bool, PoseStoreError> {
         self.change(|poses| Ok(poses.remove(name).is_some()))
     }
@@ -140,7 +141,7 @@ impl PoseStore {
     }
 }
 
-/// The poses of a file.
+/// Returns the poses of a file.
 fn understood(bytes: &[u8]) -> Result<Poses, String> {
     let Kept { format, poses_rad } = serde_json::from_slice(bytes).map_err(|e| e.to_string())?;
     if format != FORMAT {
@@ -191,7 +192,7 @@ mod tests {
         assert_eq!((store.list().len(), store.list()["p7"]), (POSES_MAX, [1.0; 6]));
     }
 
-    /// A directory that takes nothing leaves what was there, in memory and on the disk.
+    /// If a directory cannot be written, the poses in memory and on disk are unchanged.
     #[test]
     fn a_disk_that_takes_nothing_leaves_what_is_kept() {
         let directory = tempfile::tempdir().expect("a directory");

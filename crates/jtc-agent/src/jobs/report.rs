@@ -1,4 +1,4 @@
-//! Reports of the last motions: what is kept of them, from which a page is made when somebody asks for it.
+//! Reports of the last motions: their data is kept, and a page is made from it on request.
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
@@ -10,12 +10,12 @@ use jtc_host::{Arm, Error};
 
 use super::{Job, Task};
 
-/// Jobs whose report is kept, at most,
+/// Largest number of jobs whose report is kept.
 const KEPT: usize = 16;
-/// and bytes that all of them take, at most: that of a motion of ten minutes or more takes some 20 MB.
+/// Largest size of all kept reports, bytes; a motion of ten minutes or more takes some 20 MB.
 const BYTES_MAX: usize = 64 << 20;
 
-/// A motion, as a report shows it.
+/// Data of a report about a motion.
 #[derive(Clone, Debug)]
 pub struct MotionReport {
     info: RecordingInfo,
@@ -24,19 +24,19 @@ pub struct MotionReport {
     failure: Option<RunFailure>,
 }
 
-/// What is known of a motion beside its samples.
+/// Facts about a motion in addition to its samples.
 pub(super) struct Made<'a> {
     /// `approach` or `motion`.
     pub phase: &'a str,
-    /// Motions of its job that were finished before it, approaches not counted.
+    /// Number of finished motions of its job before it, without approaches.
     pub before: u32,
-    /// How it ended.
+    /// Outcome of the motion.
     pub outcome: &'a Result<Outcome, Error>,
-    /// Its upload.
+    /// Upload of the motion.
     pub upload: &'a UploadReport,
-    /// The link since the motion before it ended, or since the run began.
+    /// Statistics of the link since the end of the motion before, or since the start of the run.
     pub link: LinkStatistics,
-    /// When it began, since 1970.
+    /// Start of the motion, since 1970.
     pub began: Duration,
     /// Name of the port.
     pub port: String,
@@ -45,7 +45,7 @@ pub(super) struct Made<'a> {
 }
 
 impl MotionReport {
-    /// Of a motion of a job; `None` where nothing was seen of it.
+    /// Returns the data of a job's motion; `None` if no sample of the motion was received.
     pub(super) fn new(task: &Task<'_>, arm: &Arm, digest: Digest, made: &Made<'_>) -> Option<Self> {
         if digest.samples() == 0 {
             return None;
@@ -61,7 +61,7 @@ impl MotionReport {
             trajectory: task.what.to_owned(),
             start_unix_ns: made.began.as_nanos() as u64,
             ending: Ending { outcome: outcome.into(), reason, ..Ending::default() },
-            // No page shows it.
+            // No page shows the description.
             description: None,
             ..RecordingInfo::of(arm)
         };
@@ -84,19 +84,19 @@ impl MotionReport {
         Some(Self { info, digest, facts, failure })
     }
 
-    /// The page; it opens without a network.
+    /// Returns the page, which needs no network.
     pub fn html(&self) -> String {
         let Self { info, digest, facts, failure } = self;
         html(&ReportInput { facts, failure: failure.as_ref(), ..ReportInput::new(info, digest) })
     }
 
-    /// Memory that it takes, more or less.
+    /// Returns its approximate size in memory, bytes.
     fn bytes(&self) -> usize {
         self.digest.bytes()
     }
 }
 
-/// Drops the reports of jobs for which there is no room beside later ones.
+/// Drops the reports of older jobs that exceed the limits together with later ones.
 pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
     let (mut reports, mut bytes) = (0, 0);
     for report in jobs.iter_mut().rev().map(|job| &mut job.done.report) {
@@ -108,7 +108,7 @@ pub(super) fn make_room(jobs: &mut VecDeque<Job>) {
     }
 }
 
-/// What a job keeps of its last motion.
+/// Report of the last motion of a job.
 pub type Kept = Option<Arc<MotionReport>>;
 
 #[cfg(test)]
@@ -132,7 +132,7 @@ mod tests {
         jobs.iter().filter(|job| job.done.report.is_some()).map(|job| job.number).collect()
     }
 
-    /// The last ones stay, as many as there is room for, and each is a page.
+    /// The last reports are kept within the limits, and each gives a page.
     #[test]
     fn reports_of_the_last_jobs_are_kept_within_their_memory() {
         let mut jobs: VecDeque<Job> = (0..20).map(|n| job(n, usize::from(n % 10 != 9))).collect();

@@ -20,48 +20,48 @@ use super::report::{self, Made, MotionReport};
 use super::{Given, Happening, Task, Wish};
 use crate::owner::ClientPort;
 
-/// How often is reported how far a motion is.
+/// Interval at which the progress of a motion is reported.
 const MOVING: Duration = Duration::from_secs(1);
 
-/// What is run, and how.
+/// Motion to run, and its options.
 #[derive(Clone, Debug)]
 pub struct Order {
-    /// Where it leads.
+    /// Path of the motion.
     pub course: Course,
-    /// Where the arm stands elsewhere it is moved to the first point.
+    /// `true`: first move the arm to the first point, if it stands elsewhere.
     pub approach: bool,
-    /// % of the trajectory's own speed, or of what the limits allow. `None`: the trajectory's own speed, and the default one for a move or
-    /// an approach.
+    /// Speed, % of the trajectory's own speed, or of the limits. `None`: the trajectory's own speed, and the default
+    /// speed of a move or an approach.
     pub speed_percent: Option<f64>,
-    /// How often.
+    /// Number of runs.
     pub repeat: u32,
-    /// The controller has no extensions, uses other limits than the agent's arm, and these are safe for it.
+    /// `true`: the controller has no extensions and uses other limits than the agent's arm, and these are safe for it.
     pub accept_device_limits: bool,
 }
 
-/// How far a run came.
+/// Progress and results of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Done {
-    /// To its end.
+    /// `true` if the run was completed.
     pub finished: bool,
-    /// Motions that were finished, approaches not counted.
+    /// Number of finished motions, without approaches.
     pub runs: u32,
-    /// Figures of the last motion.
+    /// Results of the last motion.
     pub summary: Option<Summary>,
-    /// The report of the last motion, where there is room for it.
+    /// Report of the last motion, if it is within the limits.
     pub report: report::Kept,
-    /// What the controller was given of an arm.
+    /// Arm parameters that were sent to the controller.
     pub given: Option<Given>,
 }
 
-/// Runs what was ordered: how far it came, and what forbids it, or ended it in a fault.
+/// Runs a motion. Returns its progress, and the problem that prevented or ended it.
 pub fn run(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> (Done, Option<Problem>) {
     let mut done = Done::default();
     let error = go(task, session, order, &mut done).err();
     (done, error)
 }
 
-/// The arm that a motion is checked against, and how.
+/// Arm for the check of a motion, and options of the check.
 struct Site {
     arm: Arm,
     options: CheckOptions,
@@ -112,7 +112,7 @@ fn go(
     }
 }
 
-/// The arm of the controller, where it can be asked; else that of the agent.
+/// Returns the arm of the controller if it can be asked, else the agent's arm.
 fn site(task: &Task<'_>, session: &mut Session<ClientPort>, order: &Order) -> Result<Site, Error> {
     let device = session.device_config()?;
     let arm = if session.has_extensions() { session.device_arm()? } else { task.arm.clone() };
@@ -139,17 +139,17 @@ fn trajectory(
     Ok(planned.trajectory)
 }
 
-/// A run on its way.
+/// Running job.
 struct RunJob<'a> {
     task: &'a Task<'a>,
     site: &'a Site,
     move_speed: MoveSpeed,
     done: &'a mut Done,
-    /// The link at the end of the motion before.
+    /// Statistics of the link at the end of the motion before.
     link: LinkStatistics,
     /// Tenths of the upload that were reported.
     upload_shown: usize,
-    /// When the motion began, since 1970.
+    /// Start of the motion, since 1970.
     began: Duration,
     digest: Rc<RefCell<Digest>>,
     reported: Instant,
@@ -244,7 +244,7 @@ impl Observer<ClientPort> for RunJob<'_> {
 
     fn ended(&mut self, session: &mut Session<ClientPort>, leg: &Leg) -> Result<(), Problem> {
         let (task, done) = (self.task, &mut *self.done);
-        // A wish of the last status is not applied: its client learns that the motion has ended.
+        // A request that arrives with the last status is not applied: its client learns that the motion has ended.
         self.wish = None;
         task.commander.motion_ended(task.wishes);
         let digest = self.digest.take();
@@ -270,7 +270,7 @@ impl Observer<ClientPort> for RunJob<'_> {
     }
 }
 
-/// Why a motion was not begun, or failed: an error, or a client that stopped it.
+/// Returns the reason why a motion was not begun or failed: an error, or a Stop of a client.
 fn before_motion(task: &Task<'_>, error: &Error) -> Problem {
     match error {
         Error::Cancelled => task.stopped(),
@@ -279,7 +279,7 @@ fn before_motion(task: &Task<'_>, error: &Error) -> Problem {
     }
 }
 
-/// Why nothing of the run was begun.
+/// Returns the reason why the run was not begun.
 fn not_begun(error: &StartError) -> Problem {
     let object = Problem::of(error);
     match error {

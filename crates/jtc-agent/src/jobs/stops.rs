@@ -1,4 +1,5 @@
-//! The held stop that the arm is in (J-69): its cause stands in no status, so the controller is asked once when it begins.
+//! Current held stop of the arm (J-69). The status does not contain its cause, so the controller is asked once when the
+//! stop begins.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -7,27 +8,30 @@ use jtc_wire::{Reactions, Status, StopCause};
 
 use super::Commander;
 
-/// A question without an answer is repeated after this time.
+/// Time after which an unanswered question is repeated.
 const AGAIN: Duration = Duration::from_secs(2);
 
 #[derive(Default)]
 struct State {
-    /// Held stops that have ended: an answer about an earlier one is void.
+    /// Number of ended held stops; an answer about an earlier one is invalid.
     ended: u64,
     held: bool,
     asked: Option<Instant>,
-    /// When the controller answered, by the line's time; the answer is `None` where it does not tell.
+    /// Time of the controller's answer on the line; the answer is `None` if the controller does not report its
+    /// reactions.
     told: Option<(Duration, Option<Reactions>)>,
-    /// Joints whose encoder had jumped, a bit for each: until the arm is without torque, when drives are configured again.
+    /// Joints whose encoder had jumped, one bit each. Valid until the arm is without torque, because the drives are
+    /// configured again then.
     jumped: u8,
 }
 
-/// What is known of the held stop that the arm is in.
+/// Known facts about the current held stop.
 #[derive(Clone, Default)]
 pub struct Stops(Arc<Mutex<State>>);
 
 impl Stops {
-    /// Cause of the held stop that the arm is in, and its age at this time of the line, ms; `None`: there is none, or it is not known.
+    /// Returns the cause of the current held stop, and its age in ms at this time of the line; `None` without a held
+    /// stop, or if its cause is not known.
     pub fn cause(&self, status: &Status, now: Duration) -> Option<(StopCause, u32)> {
         let state = self.lock();
         let (at, reactions) = state.told.as_ref().filter(|_| status.is_held_stop())?;
@@ -36,15 +40,15 @@ impl Stops {
         Some((cause, ago_ms.saturating_add(since)))
     }
 
-    /// Joints whose encoder has jumped, a bit for each.
+    /// Returns the joints whose encoder has jumped, one bit each.
     pub fn jumped(&self, status: &Status) -> u8 {
         if words::has_torque(status) { self.lock().jumped } else { 0 }
     }
 
-    /// Looks at a status: asks where a held stop has begun.
+    /// Takes a status; asks the controller for the cause when a held stop has begun.
     pub(super) fn see(&self, status: &Status, asker: &Commander) {
         let Some(stop) = self.begins(status) else { return };
-        // Somebody else's question goes on: this one has its turn at the next look.
+        // Another question is in progress: this one is asked at the next check.
         let Ok(turn) = asker.turn() else { return };
         self.lock().asked = Some(Instant::now());
         let own = self.clone();
@@ -55,7 +59,7 @@ impl Stops {
         });
     }
 
-    /// Number of the held stop that is to be asked about, if any.
+    /// Returns the number of the held stop whose cause must be requested, if any.
     fn begins(&self, status: &Status) -> Option<u64> {
         let mut state = self.lock();
         if !words::has_torque(status) {
@@ -109,7 +113,7 @@ mod tests {
         stops.told(next, second(3), Some(reactions));
         assert_eq!(stops.begins(&held), None, "its cause is known");
         assert_eq!(stops.cause(&held, second(4)), Some((cause, 1500)));
-        // A status that is newer than the last look.
+        // A status that is newer than the last check.
         assert_eq!(stops.cause(&free, second(4)), None);
         assert_eq!(stops.begins(&free), None);
         assert_eq!(stops.jumped(&free), 0b100, "it lasts beyond the held stop");

@@ -1,4 +1,4 @@
-//! Trajectories that an agent keeps by number: what a run, or a machine control that knows numbers only, asks for.
+//! Store of trajectories by number, for runs and for machine controls that can only send numbers.
 use std::collections::BTreeMap;
 use std::fs;
 use std::io;
@@ -12,64 +12,64 @@ use sha2::{Digest as _, Sha256};
 
 use super::{PoseStore, PoseStoreError};
 
-/// The numbers that there are: 1 to this.
+/// Largest number of a trajectory; the smallest is 1.
 pub const NUMBER_MAX: u16 = 99;
 
-/// A trajectory that is kept.
+/// Stored trajectory.
 #[derive(Clone, Debug)]
 pub struct Stored {
-    /// Its number.
+    /// Number of the trajectory.
     pub number: u16,
-    /// What people call it.
+    /// Name for people.
     pub name: String,
-    /// The trajectory.
+    /// Points and step of the trajectory.
     pub trajectory: Trajectory,
-    /// What was derived or left out when it was read.
+    /// Notes about values that were derived or left out when it was read.
     pub notes: Vec<String>,
-    /// What is executed of it, in short: another text for any other points or another step, whatever its name is.
+    /// Digest of points and step: it differs for any other points or step, and does not depend on the name.
     pub digest: String,
 }
 
-/// Why something is not kept.
+/// Reason why a trajectory is not stored.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// No such number.
+    /// The number is out of range.
     #[error("{0} is no number of a trajectory: 1 to {NUMBER_MAX} are")]
     Number(u16),
-    /// It was to be kept in place of nothing.
+    /// The number is taken, and the trajectory must not be replaced.
     #[error("trajectory {number} is there already, {name}: nothing was replaced")]
     Taken {
-        /// The number.
+        /// Number of the trajectory.
         number: u16,
-        /// What has it.
+        /// Name of the present trajectory.
         name: String,
     },
-    /// Two files of one number: which of them is meant?
+    /// Two files have the same number.
     #[error("{directory}: two files are trajectory {number}", directory = directory.display())]
     Twice {
-        /// Where.
+        /// Directory of the files.
         directory: PathBuf,
-        /// The number.
+        /// Number of both files.
         number: u16,
     },
-    /// More points than a controller holds.
+    /// The trajectory has more points than a controller holds.
     #[error("{points} points: a controller holds {POINTS_MAX}")]
     TooMany {
-        /// So many.
+        /// Number of points.
         points: usize,
     },
-    /// No trajectory, or none that can be read.
+    /// The file is not a readable trajectory.
     #[error(transparent)]
     File(#[from] FileError),
-    /// The poses beside them.
+    /// The poses in the same directory cannot be used.
     #[error(transparent)]
     Poses(#[from] PoseStoreError),
     /// The directory cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
     Io {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why not.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -96,18 +96,18 @@ impl host_kit::Diagnose for StoreError {
     }
 }
 
-/// Trajectories by number; in a directory, where one is given, so that they outlast the agent.
+/// Trajectories by number, in a directory if there is one, so that they survive a restart of the agent.
 pub struct Store {
     directory: Option<PathBuf>,
     kept: Mutex<BTreeMap<u16, Arc<Stored>>>,
     /// Named poses.
     pub poses: PoseStore,
-    /// Of who writes to the directory: whoever reads what is kept waits for no disk.
+    /// Lock of the directory's writer, so that readers never wait for the disk.
     writing: Mutex<()>,
 }
 
 impl Store {
-    /// In memory alone.
+    /// Returns a store in memory.
     pub fn in_memory() -> Self {
         Self {
             directory: None,
@@ -117,12 +117,12 @@ impl Store {
         }
     }
 
-    /// In a directory: files with names like `7-pick.csv`. What is no such file is left alone.
+    /// Opens a directory of files with names like `7-pick.csv`. Other files are ignored.
     ///
     /// # Errors
     ///
-    /// The directory cannot be read or made, or one of its trajectories is none: an agent that keeps other numbers than people think is
-    /// worse than none.
+    /// The directory cannot be read or made, or one of its trajectories is invalid: it is safer not to start than to
+    /// run with other trajectories than the users expect.
     pub fn open(directory: &Path) -> Result<Self, StoreError> {
         let io = |source| StoreError::Io { path: directory.to_owned(), source };
         fs::create_dir_all(directory).map_err(io)?;
@@ -140,31 +140,31 @@ impl Store {
         Ok(store)
     }
 
-    /// One of them.
+    /// Returns a trajectory by its number.
     pub fn get(&self, number: u16) -> Option<Arc<Stored>> {
         self.lock().get(&number).cloned()
     }
 
-    /// All of them, by number.
+    /// Returns all trajectories, by number.
     pub fn list(&self) -> Vec<Arc<Stored>> {
         self.lock().values().cloned().collect()
     }
 
-    /// Keeps what was read from `text`, a file of any form that [`Loaded::parse`] knows, in place of what had this number. A run that has
-    /// begun goes on with what it has.
+    /// Stores the trajectory of `text`, a file in any format that [`Loaded::parse`] accepts, and replaces the one of
+    /// the same number. A run that has begun continues with its own trajectory.
     ///
     /// # Errors
     ///
-    /// [`StoreError`]; what had this number before is kept then.
+    /// [`StoreError`]; the trajectory of this number is unchanged then.
     pub fn put(&self, number: u16, name: &str, text: &str, degrees: bool) -> Result<Arc<Stored>, StoreError> {
         self.keep((number, name), (text, degrees), false)
     }
 
-    /// The same in place of nothing.
+    /// Like [`put`](Self::put), but never replaces a trajectory.
     ///
     /// # Errors
     ///
-    /// [`StoreError::Taken`], and those of [`put`](Self::put).
+    /// [`StoreError::Taken`], and the errors of [`put`](Self::put).
     pub fn put_new(
         &self,
         number: u16,
@@ -175,7 +175,7 @@ impl Store {
         self.keep((number, name), (text, degrees), true)
     }
 
-    /// Nothing has this number.
+    /// Checks that the number is free.
     ///
     /// # Errors
     ///
@@ -217,11 +217,11 @@ impl Store {
         Ok(stored)
     }
 
-    /// Keeps it no more. False: there was none.
+    /// Deletes a trajectory. Returns `false` if the trajectory did not exist.
     ///
     /// # Errors
     ///
-    /// Its file cannot be removed; it is kept then.
+    /// The file cannot be removed; the trajectory is kept then.
     pub fn delete(&self, number: u16) -> Result<bool, StoreError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(directory) = &self.directory {
@@ -244,20 +244,20 @@ impl Stored {
     }
 }
 
-/// The first 64 bits of SHA-256 over step and points, as text.
+/// Returns the first 64 bits of SHA-256 over step and points, as text.
 fn digest(trajectory: &Trajectory) -> String {
     let mut hash = Sha256::new();
     hash.update(trajectory.step_ms.to_le_bytes());
     for Point { position, velocity, acceleration } in &trajectory.points {
         for value in [position, velocity, acceleration].into_iter().flatten() {
-            // Both zeros are the same.
+            // Positive and negative zero give the same digest.
             hash.update((value + 0.0).to_le_bytes());
         }
     }
     hash.finalize().iter().take(8).map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Number and name of a file that holds a trajectory by number.
+/// Returns number and name of a trajectory file.
 fn numbered(path: &Path) -> Option<(u16, String)> {
     let stem =
         path.file_stem()?.to_str().filter(|_| path.extension().is_some_and(|ending| ending == "csv"))?;
@@ -266,7 +266,7 @@ fn numbered(path: &Path) -> Option<(u16, String)> {
     Some((number, name.to_owned()))
 }
 
-/// A name as a file can have it, of 64 bytes at most.
+/// Returns a name for a file, at most 64 bytes long.
 fn file_name(name: &str) -> String {
     let plain = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
     let mut short = String::new();
@@ -279,19 +279,20 @@ fn file_name(name: &str) -> String {
     if short.is_empty() { "trajectory".to_owned() } else { short }
 }
 
-/// Whole, or not at all. What had the number before goes first: without power in between there is none, and never two.
+/// Writes the file completely or not at all. The old file is removed first: a loss of power in between leaves no
+/// trajectory, never two.
 fn write(directory: &Path, path: &Path, trajectory: &Trajectory, number: u16) -> io::Result<()> {
     let part = path.with_extension("part");
     let written = fs::write(&part, trajectory.to_exact_csv());
     let written = written.and_then(|()| fs::File::open(&part)?.sync_all());
-    // What a full disk has taken of it takes room for nothing.
+    // The incomplete file on a full disk must not occupy space.
     written.inspect_err(|_| drop(fs::remove_file(&part)))?;
     remove(directory, number, Some(path))?;
     fs::rename(&part, path)?;
     fs::File::open(directory)?.sync_all()
 }
 
-/// Removes the files of a number, but for `keep`.
+/// Removes the files of a number, except `keep`.
 fn remove(directory: &Path, number: u16, keep: Option<&Path>) -> io::Result<()> {
     for entry in fs::read_dir(directory)? {
         let path = entry?.path();
@@ -344,10 +345,10 @@ mod tests {
         };
         let first = digest("a", TEXT, false);
         assert!(first.len() == 16 && first.chars().all(|c| c.is_ascii_hexdigit()), "{first}");
-        // Neither its name nor how its text is written is executed.
+        // Name and number format do not change the motion, so they do not change the digest.
         assert_eq!(digest("b", TEXT, true), first);
         assert_eq!(digest("b", &TEXT.replace("0,0\n", "0.0,-0\n"), false), first);
-        // Points, their places and the time between them are.
+        // Points, their order and their step change the motion.
         for other in [
             TEXT.replace("1,0,", "1,0.000001,"),
             TEXT.replace("1,0,0", "1,0,0.000001"),
@@ -370,7 +371,8 @@ mod tests {
         assert!(store.delete(7).is_ok() && store.put_new(7, "pick", TEXT, false).is_ok());
     }
 
-    /// A disk that is full keeps what was there, also for the next agent; with room it takes the next one.
+    /// With a full disk the present trajectory is kept, also for the next agent; with free space the next one is
+    /// stored.
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_disk_leaves_what_had_the_number() {

@@ -1,4 +1,4 @@
-//! What a job has beside its client's end of the line.
+//! State of a job in addition to its session.
 use std::sync::mpsc::Receiver;
 
 use agent_kit::api::Problem;
@@ -8,50 +8,50 @@ use super::{Commander, Happening, Journal, Wish};
 use crate::line::ClientId;
 use crate::owner::Line;
 
-/// The code of what somebody stopped before it moved the arm.
+/// Error code of a request that was stopped before it moved the arm.
 pub const STOPPED: &str = "stopped";
 
-/// A job on its way.
+/// Running job.
 pub struct Task<'a> {
-    /// Its number.
+    /// Number of the job.
     pub job: u64,
-    /// What it does.
+    /// Description of the job.
     pub what: &'a str,
-    /// What is wished on the way.
+    /// Requests while the job runs.
     pub wishes: &'a Receiver<Wish>,
-    /// Where each step is reported.
+    /// Journal for each step.
     pub journal: &'a Journal,
-    /// Where a Stop of somebody else shows.
+    /// Line, which shows a Stop of another client.
     pub line: &'a Line,
-    /// Whose it is.
+    /// Session of the job's client.
     pub commander: &'a Commander,
-    /// The arm of controllers that cannot be asked for theirs.
+    /// Arm for controllers that cannot be asked for theirs.
     pub arm: &'a Arm,
 }
 
 impl Task<'_> {
-    /// Reports something in words.
+    /// Writes a note to the journal.
     pub fn note(&self, text: String) {
         self.journal.write(Happening::Note { job: self.job, text });
     }
 
-    /// Somebody has stopped or paused the arm since this was asked for, or was gone on with.
+    /// Returns `true` if the arm was stopped or paused after this motion was requested or resumed.
     pub fn is_halted(&self) -> bool {
         self.line.with(|line, _| line.is_halted(self.commander.client))
     }
 
-    /// Who stopped or paused it.
+    /// Returns the name of the client that stopped or paused the arm.
     pub fn halted_by(&self) -> String {
         self.line.with(|line, _| line.halted_by(self.commander.client).to_owned())
     }
 
-    /// Somebody stopped the arm before this moved it.
+    /// Returns the error for a job that was stopped before it moved the arm.
     pub fn stopped(&self) -> Problem {
         stopped(self.line, self.commander.client)
     }
 }
 
-/// Somebody stopped the arm before what was asked for moved it.
+/// Returns the error for a request that was stopped before it moved the arm.
 pub fn stopped(line: &Line, client: ClientId) -> Problem {
     let by = line.with(|line, _| line.halted_by(client).to_owned());
     Problem::new(

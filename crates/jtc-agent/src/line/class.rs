@@ -53,7 +53,8 @@ impl HostFrame {
         Some(Self { bytes, frame_type, class })
     }
 
-    /// Returns true if the frame reads the log of the flight recorder. Viewers may not send it, because the recorder pauses meanwhile (J-56).
+    /// Returns true if the frame reads the log of the flight recorder. Viewers may not send it, because the recorder
+    /// pauses meanwhile (J-56).
     pub fn reads_log(&self) -> bool {
         let command = FrameRef::new_checked(&self.bytes).map(Command::parse);
         matches!(command, Some(Ok(Command::GetLog { block, .. })) if block != LOG_NO_BLOCK)

@@ -1,4 +1,4 @@
-//! A client on the line: what it has sent, what it is to get.
+//! Client on the line: its received frames and its waiting deliveries.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -9,40 +9,40 @@ use jtc_wire::{ExecCommand, FRAME_MAX, FRAME_MIN, Response};
 use super::Denied;
 use super::class::HostFrame;
 
-/// Bytes of frames that a client may have waiting: a trajectory in flight and some commands.
+/// Largest number of waiting bytes of a client's frames: a trajectory in flight and some commands.
 const WAITING_MAX: usize = 8 * FRAME_MAX;
-/// As many frames, of whatever length: as many as it may send at once.
+/// Largest number of waiting frames of a client; equal to the number that it may send at once.
 const FRAMES_WAITING: usize = 500;
-/// Bytes that wait for a client that does not take them: two minutes of statuses.
+/// Largest number of unread bytes of a client: two minutes of statuses.
 const UNREAD_MAX: usize = 1 << 20;
 
-/// Frames that a client may send, in a second and at once.
+/// Largest number of frames that a client may send: per second, and in one burst.
 const FRAMES_PER_S: f64 = 250.0;
 const FRAMES_AT_ONCE: f64 = 500.0;
-/// Records that may wait for a client whose frames are refused: one goes with each status.
+/// Largest number of waiting records for refused frames; one is sent with each status.
 const REFUSALS_MAX: usize = 600;
 
-/// A client by number; numbers are not used again.
+/// Number of a client; numbers are not used again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct ClientId(pub u64);
 
-/// What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
+/// Policy for a motion when the client that commanded it disconnects or falls silent.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize, utoipa::ToSchema,
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Policy {
-    /// It goes on, as with a host whose cable is pulled.
+    /// The motion continues, as it does when the cable of a host is pulled.
     #[default]
     Continue,
-    /// It pauses on the path.
+    /// The motion pauses on the path.
     Pause,
-    /// It stops on the path.
+    /// The motion stops on the path.
     Stop,
 }
 
 impl Policy {
-    /// What is sent for it, if anything is.
+    /// Returns the command of the policy, if it has one.
     pub(super) fn command(self) -> Option<ExecCommand> {
         match self {
             Self::Continue => None,
@@ -51,7 +51,7 @@ impl Policy {
         }
     }
 
-    /// In a word.
+    /// Returns a word for the policy.
     pub fn name(self) -> &'static str {
         match self {
             Self::Continue => "continue",
@@ -61,27 +61,27 @@ impl Policy {
     }
 }
 
-/// How a client presents itself.
+/// Introduction of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Introduction {
-    /// What people call it.
+    /// Name of the client for people.
     pub name: String,
-    /// What it may do.
+    /// Role of the client.
     pub role: Role,
-    /// What becomes of its motion without it.
+    /// Policy for its motion when it disconnects or its lease lapses.
     pub policy: Policy,
 }
 
-/// What a client gets.
+/// Delivery to a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Delivery {
-    /// Bytes of the device: statuses, and what it asked for.
+    /// Bytes of the controller: statuses and answers to the client's own requests.
     Bytes(Vec<u8>),
-    /// A frame that it sent was not passed on; its record, which says no more than "not allowed", follows in a status.
+    /// Frame of the client that was not passed on; its record, which only says "not allowed", follows in a status.
     Denied(Denied),
-    /// What it has asked about the lease was not done.
+    /// Request about the lease that was refused.
     LeaseDenied(Denied),
-    /// Another client asks for the lease.
+    /// Request of another client for the lease.
     LeaseWanted(String),
 }
 
@@ -94,54 +94,54 @@ impl Delivery {
     }
 }
 
-/// Why a client was put out.
+/// Reason why a client was disconnected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PutOut {
-    /// It sent bytes that are no frame of a host.
+    /// The client sent bytes that are not a host frame.
     #[error("it sent bytes that are no frame of this protocol")]
     NoFrame,
-    /// It sent more than the line and the others bear.
+    /// The client sent more than the line and the other clients can tolerate.
     #[error(
         "it sent more than {FRAMES_PER_S} frames a second, or more than {FRAMES_WAITING} frames or {WAITING_MAX} bytes wait for the line"
     )]
     TooMuch,
-    /// It commanded, and nothing was received from it for seconds.
+    /// The lease holder was silent for seconds.
     #[error("it commanded, and nothing was received from it for some seconds")]
     Silent,
-    /// It does not read.
+    /// The client does not read.
     #[error("it has left more than {UNREAD_MAX} bytes unread")]
     Unread,
 }
 
-/// A client.
+/// Client on the line.
 pub(super) struct Client {
     pub introduction: Introduction,
-    /// Bytes of a frame that is not whole yet.
+    /// Bytes of an incomplete frame.
     partial: Vec<u8>,
     /// Frames that wait for the line.
     pub waiting: VecDeque<HostFrame>,
     waiting_bytes: usize,
-    /// How many of them are those of one who commands.
+    /// Number of waiting frames that need the lease.
     commands: usize,
-    /// Records of frames that were not passed on.
+    /// Records of refused frames.
     refusals: VecDeque<Response>,
     deliveries: VecDeque<Delivery>,
     unread: usize,
-    /// No motion begins before: somebody else has stopped the arm.
+    /// End of the hold-off after a Stop or a Pause of another client; no motion of this client begins before.
     pub calm_until: Duration,
-    /// The last halt, by number, that what it does now was asked for after.
+    /// Number of the last Stop or Pause that the client knew when it made its present requests.
     pub asked_after: u64,
-    /// Stops and Pauses of others since it came.
+    /// Stops and Pauses of other clients since this client connected.
     pub halts: Halts,
-    /// For how long it commands without showing that it is there; `None`: as long as it is connected.
+    /// Duration of its lease without a sign of life; `None`: while it is connected.
     pub lasts: Option<Duration>,
-    /// When it has shown last that it is there.
+    /// Time of its last sign of life.
     pub shown_at: Duration,
-    /// When its last frame arrived.
+    /// Arrival time of its last frame.
     pub heard_at: Duration,
-    /// Its lease has lapsed, and it has not asked for another since.
+    /// `true` if its lease has lapsed and it has not requested another since.
     pub lapsed: bool,
-    /// Frames that it may send at once, and when that was.
+    /// Number of frames that it may send at once, and the time of that number.
     allowance: f64,
     allowed_at: Duration,
 }
@@ -169,7 +169,7 @@ impl Client {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is whole.
+    /// Takes bytes from the front of `bytes` until a frame is complete.
     pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Result<Option<HostFrame>, PutOut> {
         loop {
             let wanted = match self.partial.get(2..4) {
@@ -193,7 +193,7 @@ impl Client {
         }
     }
 
-    /// It may send another frame now.
+    /// Checks that the client may send another frame now.
     pub fn allow(&mut self, now: Duration) -> Result<(), PutOut> {
         let passed = now.saturating_sub(self.allowed_at).as_secs_f64();
         self.allowance = (self.allowance + passed * FRAMES_PER_S).min(FRAMES_AT_ONCE) - 1.0;
@@ -201,18 +201,18 @@ impl Client {
         if self.allowance < 0.0 { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// A frame of its own was refused: its record goes with one of the next statuses.
+    /// Queues the record of a refused frame, which is sent with one of the next statuses.
     pub fn refuse(&mut self, response: Response) -> Result<(), PutOut> {
         self.refusals.push_back(response);
         if self.refusals.len() > REFUSALS_MAX { Err(PutOut::TooMuch) } else { Ok(()) }
     }
 
-    /// The record of a refused frame that has not gone to it yet.
+    /// Takes the next queued record of a refused frame.
     pub fn take_refusal(&mut self) -> Option<Response> {
         self.refusals.pop_front()
     }
 
-    /// A frame waits for its turn.
+    /// Queues a frame for the line.
     pub fn wait(&mut self, frame: HostFrame) -> Result<(), PutOut> {
         self.waiting_bytes += frame.bytes.len();
         self.commands += usize::from(frame.class.needs_lease());
@@ -224,7 +224,7 @@ impl Client {
         }
     }
 
-    /// The next frame in its turn.
+    /// Takes the next queued frame.
     pub fn take_waiting(&mut self) -> Option<HostFrame> {
         let frame = self.waiting.pop_front()?;
         self.waiting_bytes -= frame.bytes.len();
@@ -232,8 +232,8 @@ impl Client {
         Some(frame)
     }
 
-    /// Takes the frames out that only one who commands sends; the others keep their order. It costs nothing where there are none, whatever
-    /// else waits: a Stop does it with every client.
+    /// Removes the queued frames that need the lease; the others keep their order. Fast without such frames, because a
+    /// Stop does this for every client.
     pub fn take_commands(&mut self) -> Vec<HostFrame> {
         if self.commands == 0 {
             return Vec::new();
@@ -244,14 +244,14 @@ impl Client {
         VecDeque::into(taken)
     }
 
-    /// Gives it something, if it reads.
+    /// Queues a delivery if the client reads.
     pub fn deliver(&mut self, delivery: Delivery) -> Result<(), PutOut> {
         self.unread += delivery.len();
         self.deliveries.push_back(delivery);
         if self.unread > UNREAD_MAX { Err(PutOut::Unread) } else { Ok(()) }
     }
 
-    /// What it has not had yet.
+    /// Takes the queued deliveries.
     pub fn take_deliveries(&mut self) -> Vec<Delivery> {
         self.unread = 0;
         self.deliveries.drain(..).collect()

@@ -1,4 +1,4 @@
-//! The device's side of the line: what is written next, and whose its records are.
+//! Controller's side of the line: the next bytes to write, and the clients that receive records.
 use std::time::Duration;
 
 use jtc_wire::{DataStatus, FrameRef, FrameStatus, FrameType, FromDevice, Response, Status};
@@ -11,7 +11,7 @@ use super::{
 };
 
 impl SharedLine {
-    /// When [`to_device`](Self::to_device) is to be called again if nothing happens before.
+    /// Returns the time at which [`to_device`](Self::to_device) must be called again if no other event occurs before.
     pub fn due(&self, now: Duration) -> Option<Duration> {
         let waits = self.clients.values().any(|client| !client.waiting.is_empty());
         let line = match self.outbox.due(now) {
@@ -19,13 +19,13 @@ impl SharedLine {
             due => due,
         };
         let lease = self.lease.as_ref().and_then(|lease| lease.until);
-        // One that waits for the line is due when the line is.
+        // A command that waits for the line is due when the line is free.
         let own = [self.halts.due(now), self.moving.due()].into_iter().flatten().min();
         let own = own.filter(|_| self.outbox.due(now).is_none());
         [line, lease, own].into_iter().flatten().min()
     }
 
-    /// What is to be written to the device now.
+    /// Returns the bytes to write to the controller now.
     pub fn to_device(&mut self, now: Duration) -> Vec<u8> {
         self.end_lapsed(now);
         self.sent.retain(|sent| now < sent.at + RECORD_TIME);
@@ -60,12 +60,12 @@ impl SharedLine {
         }
     }
 
-    /// What was to be written was handed over to the system, which may have taken until now.
+    /// Notes that the operating system accepted the bytes, which may have taken until now.
     pub fn handed_over(&mut self, now: Duration) {
         self.outbox.handed_over(now);
     }
 
-    /// The next frame, of each client in turn.
+    /// Returns the next frame; clients take turns.
     fn next_turn(&mut self, now: Duration) -> Option<Outgoing> {
         if let Some(frame) = self.moving.frame(now) {
             return Some(Outgoing { client: OWNER, frame });
@@ -87,7 +87,7 @@ impl SharedLine {
             }
             let Some(client) = self.clients.get_mut(&id) else { continue };
             let Some(frame) = client.waiting.front() else { continue };
-            // What is returned has no number: one request of those at a time (J-50).
+            // Returned frames have no number, so one request of this kind is sent at a time (J-50).
             let returns = frame.returns();
             if returns.is_some() && self.returns.is_some() {
                 continue;
@@ -103,8 +103,8 @@ impl SharedLine {
         None
     }
 
-    /// Frames that were taken while their sender commanded, and wait still now that it does not any more. One whose motions go on without
-    /// it takes the lease again where nobody else has.
+    /// Refuses queued frames of clients that have lost the lease. A client whose motion continues without it takes the
+    /// lease again if it is free.
     fn refuse_without_lease(&mut self, now: Duration) {
         let holder = self.lease.as_ref().map(|lease| lease.holder);
         let waits = |client: &Client| client.waiting.front().is_some_and(|frame| frame.class.needs_lease());
@@ -144,7 +144,7 @@ impl SharedLine {
         self.sent.push_back(Sent { client, kind: frame_type as u8, abandoned, at });
     }
 
-    /// Bytes that the device has sent, in any pieces.
+    /// Takes bytes from the controller, in pieces of any length.
     pub fn from_device(&mut self, mut bytes: &[u8], now: Duration) {
         loop {
             match self.receiver.next_frame(&mut bytes) {
@@ -180,7 +180,7 @@ impl SharedLine {
                 && response.data != DataStatus::NoError
                 && response.frame_type == FrameType::TeachingModeEnable as u8
             {
-                // It was refused.
+                // The controller refused it.
                 self.moving.taught();
             }
             if *client == OWNER && taken && response.frame_type == FrameType::TeachingModeDisable as u8 {
@@ -201,10 +201,10 @@ impl SharedLine {
         }
     }
 
-    /// Whose frame a record answers: those of all who asked for the same Stop.
+    /// Returns the clients that receive a record; for a Stop all clients that requested it.
     fn whose(&mut self, response: Response, now: Duration) -> Vec<(ClientId, Response)> {
         let arrived = response.status == FrameStatus::NoError;
-        // Records come in the order of the frames: those before it have none, or a bad one.
+        // Records come in the order of the frames; frames before it have lost their record, or have a bad one.
         let at = self.sent.iter().position(|sent| {
             if arrived { !sent.abandoned && sent.kind == response.frame_type } else { sent.abandoned }
         });
@@ -216,7 +216,7 @@ impl SharedLine {
         if let Some(returns) =
             self.returns.as_mut().filter(|r| r.client == sent.client && Some(r.kind) == returned)
         {
-            // What it returns follows; a refused request returns nothing.
+            // The returned frame follows; a refused request returns none.
             returns.until = if response.accepted() { now + RETURN_TIME } else { now };
         }
         if sent.client == HALTS {

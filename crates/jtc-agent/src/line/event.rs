@@ -1,27 +1,27 @@
-//! What happens on the line.
+//! Events on the line.
 use jtc_wire::{FrameType, Response};
 
 use super::{Class, ClientId, Denied, Lease, Policy, PutOut, Will};
 
-/// What has happened on a line since its owner began.
+/// Numbers of events on a line since its owner began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Frames written that change something.
+    /// Number of written frames that change a state.
     pub sent: u64,
-    /// Those that the device has accepted.
+    /// Number of these frames that the controller accepted.
     pub accepted: u64,
-    /// Those that it has refused.
+    /// Number of these frames that the controller refused.
     pub refused: u64,
-    /// Frames that were not passed on.
+    /// Number of frames that were not passed on.
     pub denied: u64,
-    /// Clients that were put out.
+    /// Number of clients that were disconnected.
     pub put_out: u64,
-    /// Stops and Pauses that the device has not taken after many tries.
+    /// Number of Stops and Pauses that the controller did not confirm after many tries.
     pub not_taken: u64,
 }
 
 impl Counts {
-    /// One more.
+    /// Counts an event.
     pub(super) fn count(&mut self, event: &LineEvent) {
         let count = match event {
             LineEvent::Sent { .. } => &mut self.sent,
@@ -36,54 +36,54 @@ impl Counts {
     }
 }
 
-/// Something that happened on the line and that somebody may want to know.
+/// Event on the line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LineEvent {
-    /// A frame that changes something was written.
+    /// Written frame that changes a state.
     Sent {
-        /// Whose.
+        /// Client that sent the frame.
         client: ClientId,
-        /// Its type.
+        /// Type of the frame.
         frame_type: FrameType,
-        /// Its class.
+        /// Class of the frame.
         class: Class,
-        /// All of it.
+        /// Complete frame.
         bytes: Vec<u8>,
     },
-    /// The device has answered a frame that changes something.
+    /// Answer of the controller to such a frame.
     Answered {
-        /// Whose.
+        /// Client that sent the frame.
         client: ClientId,
-        /// How.
+        /// Answer of the controller.
         response: Response,
     },
-    /// A frame was not passed on.
+    /// Frame that was not passed on.
     Denied {
-        /// Whose.
+        /// Client that sent the frame.
         client: ClientId,
-        /// Its type.
+        /// Type of the frame.
         frame_type: FrameType,
-        /// Why.
+        /// Reason.
         denied: Denied,
     },
-    /// Another client commands, or none.
+    /// Change of the lease holder.
     Lease(Option<Lease>),
-    /// A client went, and its motion with it.
+    /// Policy that was applied to the motion of a client that has disconnected, or whose lease has lapsed.
     PolicyApplied {
-        /// Who it was.
+        /// Client whose policy was applied.
         client: ClientId,
-        /// What was done.
+        /// Applied policy.
         policy: Policy,
     },
-    /// A Stop or Pause was sent many times, and the device did not take it.
+    /// Stop or Pause that was sent many times without a confirmation of the controller.
     NotTaken,
-    /// Something else moves the arm, or the policy of somebody else acts on it; `None`: nothing moves any more.
+    /// Change of the motion, or of the client whose policy applies to it; `None`: no motion any more.
     Will(Option<Will>),
-    /// A client was put out.
+    /// Disconnection of a client by the agent.
     PutOut {
-        /// Who it was.
+        /// Number of the client.
         client: ClientId,
-        /// Why.
+        /// Reason.
         reason: PutOut,
     },
 }

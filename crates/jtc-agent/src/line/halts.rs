@@ -84,7 +84,8 @@ impl Halts {
         self.motion_since = true;
     }
 
-    /// A record arrived for the oldest written frame. Returns the clients that receive it. If the frame did not arrive undamaged, it is sent again.
+    /// A record arrived for the oldest written frame. Returns the clients that receive it. If the frame did not arrive
+    /// undamaged, it is sent again.
     pub fn answered(&mut self, response: &Response, arrived: bool) -> Vec<(ClientId, Response)> {
         let Some(halt) = self.written.pop_front() else { return Vec::new() };
         if !arrived {

@@ -8,62 +8,63 @@ pub(super) const POLICY: &str = "the policy of a client that has gone";
 /// Not a number of a Stop: the policy of the client has ended its requests.
 pub(super) const NOT_ASKED: u64 = u64::MAX;
 
-/// Who commands.
+/// Lease, and its holder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Lease {
-    /// The client that has it.
+    /// Client that holds the lease.
     pub holder: ClientId,
-    /// Since when.
+    /// Time when the holder took the lease.
     pub since: Duration,
-    /// Until when, if it is not renewed: a client without a connection of its own has to show that it is there.
+    /// Time when the lease lapses without renewal; it exists only for clients without a connection of their own.
     pub until: Option<Duration>,
-    /// Who has asked for it.
+    /// Client that waits for the lease.
     pub wanted_by: Option<ClientId>,
 }
 
-/// Why a client may not command.
+/// Reason why a client may not command.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error, serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Denied {
-    /// Another client commands.
+    /// Another client holds the lease.
     #[error("{holder} has commanded this arm for {age_s:.0} s: one client commands at a time", age_s = *age_ms as f64 / 1000.0)]
     Held {
-        /// Its name.
+        /// Name of the holder.
         holder: String,
-        /// For how long, ms.
+        /// Time since the holder took the lease, ms.
         age_ms: u64,
     },
-    /// Another client has asked for the lease before.
+    /// Another client already waits for the lease.
     #[error("{by} has asked for the lease of {holder} before, and waits for it: one waits at a time")]
     Awaited {
-        /// Who commands.
+        /// Name of the holder.
         holder: String,
-        /// Who waits.
+        /// Name of the waiting client.
         by: String,
     },
-    /// This client may look and stop, and not command.
+    /// The client has only read-only access and Stop.
     #[error("this client was let in to look and to stop, not to command")]
     Viewer,
-    /// Somebody stopped the arm just now, and this was sent before or at the same time.
+    /// The arm was stopped or paused after the request, or by another client just before it (hold-off).
     #[error(
         "{by} has stopped the arm: what was asked for before is not done, and nothing that moves it for three seconds"
     )]
     Stopped {
-        /// Who it was.
+        /// Name of the client that stopped or paused the arm.
         by: String,
     },
-    /// The client was put out.
+    /// The client was disconnected.
     #[error("this client is on the line no more: it was put out, or has gone")]
     Gone,
-    /// Nothing is received from the client that commands while the controller supervises its host: questions of others would hide that (J-59).
+    /// The controller supervises its host and the lease holder is silent: questions of other clients would hide that
+    /// (J-59).
     #[error(
         "nothing is received from {who}, and the controller pauses the motion when its host is silent: questions of others wait until the arm stands"
     )]
     Unattended {
-        /// The client that commands, or has commanded.
+        /// Name of the present or last lease holder.
         who: String,
     },
-    /// The client has no lease that it could give.
+    /// The client does not hold the lease.
     #[error("this client does not command the arm: it has no lease to give or to renew")]
     NotHolder,
 }
@@ -74,12 +75,13 @@ impl SharedLine {
         self.lease.as_ref()
     }
 
-    /// Takes or renews the lease. `lasts`: duration without renewal, also for a lease that the client gets later by a command or from another
-    /// client; `None`: while the client is connected.
+    /// Takes or renews the lease. `lasts`: duration without renewal, also for a lease that the client gets later by a
+    /// command or from another client; `None`: while the client is connected.
     ///
     /// # Errors
     ///
-    /// [`Denied`] if another client holds the lease, which is then asked to release it, or if this client may not hold it.
+    /// [`Denied`] if another client holds the lease, which is then asked to release it, or if this client may not hold
+    /// it.
     pub fn take_lease(
         &mut self,
         client: ClientId,
@@ -110,8 +112,8 @@ impl SharedLine {
         Ok(())
     }
 
-    /// Requests the lease from its holder. The first client that requests it keeps its place until it gets the lease, disconnects, or has sent
-    /// nothing for as long as its own lease would last.
+    /// Requests the lease from its holder. The first client that requests it keeps its place until it gets the lease,
+    /// disconnects, or has sent nothing for as long as its own lease would last.
     ///
     /// # Errors
     ///
@@ -147,8 +149,8 @@ impl SharedLine {
         }
     }
 
-    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. If the client wakes it must connect again,
-    /// and see what other clients have done meanwhile.
+    /// Disconnects a holder of the lease that has fallen silent, and applies its policy to its motion. If the client
+    /// wakes it must connect again, and see what other clients have done meanwhile.
     pub fn lapse(&mut self, client: ClientId, now: Duration) {
         if self.lease.as_ref().is_some_and(|lease| lease.holder == client) {
             self.put_out(client, PutOut::Silent, now);

@@ -1,13 +1,14 @@
 //! Shares the line of one controller between many clients. Without I/O: bytes and time go in, bytes come out.
 //!
-//! Each client speaks the protocol of the line as if it were alone. It sends frames, and receives every status with the records of its own
-//! frames only. So every program that can use a serial port can use a shared line. The shared line decides which client may send which frame:
+//! Each client speaks the protocol of the line as if no other client existed, and receives every status with the
+//! records of its own frames only. So every program that can use a serial port can use a shared line. The shared line
+//! decides which client may send which frame:
 //!
 //! - every client may send questions, and a Stop or a Pause, which overtakes all other frames;
 //! - only the holder of the [`Lease`] may send everything else.
 //!
-//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last one moves nothing, even if its frames
-//! arrive later.
+//! Stops and Pauses are numbered together (in the code: *halts*). A request that a client made before the last one
+//! moves nothing, even if its frames arrive later.
 mod class;
 mod client;
 mod device;
@@ -46,7 +47,7 @@ const RECORD_TIME: Duration = Duration::from_secs(2);
 const RETURN_TIME: Duration = Duration::from_millis(500);
 /// Hold-off after a Stop or a Pause of another client: a request for a motion that arrives in this time may have been sent before the Stop.
 const CALM: Duration = Duration::from_secs(3);
-/// Time by which each refused attempt extends the hold-off.
+/// Hold-off after a refused attempt, if the present one would end sooner.
 const CALM_AGAIN: Duration = Duration::from_millis(500);
 
 /// A written frame whose record has not arrived yet.
@@ -93,7 +94,7 @@ pub struct SharedLine {
     counts: Counts,
 }
 
-/// The owner of the line. It acts for clients that have disconnected, and for those without a connection of their own.
+/// Number of the line's owner, which acts for disconnected clients and for those without a connection of their own.
 pub const OWNER: ClientId = ClientId(0);
 /// Stands for all clients that have requested a Stop or a Pause.
 const HALTS: ClientId = ClientId(u64::MAX);
@@ -128,7 +129,7 @@ impl SharedLine {
         let id = ClientId(self.next_id);
         self.next_id += 1;
         let mut client = Client::new(introduction);
-        // It may make requests after the Stops that came before it; but its user may have decided before them, so the hold-off applies.
+        // The client may make requests after earlier Stops; but its user may have decided before them, so the hold-off applies.
         (client.asked_after, client.calm_until) = (self.halted.0, self.calm_until);
         self.clients.insert(id, client);
         id
@@ -171,8 +172,9 @@ impl SharedLine {
         self.status.as_ref()
     }
 
-    /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it. Drops all frames that need
-    /// the lease and are not on the line yet. `name` is reported to the clients whose frames are dropped.
+    /// Sends a Stop or a Pause of a client before all other frames, and repeats it until the controller confirms it.
+    /// Drops all frames that need the lease and are not on the line yet. `name` is reported to the clients whose frames
+    /// are dropped.
     pub fn halt(&mut self, client: ClientId, name: &str, command: ExecCommand, now: Duration) {
         self.halt_by(client, client, name, command, now);
     }
@@ -280,7 +282,8 @@ impl SharedLine {
         self.may_command(id, now)
     }
 
-    /// Returns an error during the hold-off after another client's Stop. Each refused attempt extends the hold-off to `again` from now.
+    /// Returns an error during the hold-off after a Stop or a Pause of another client. Each refused attempt extends the hold-off to
+    /// `again` from now.
     fn is_calm(&mut self, id: ClientId, now: Duration, again: Duration) -> Result<(), Denied> {
         match self.clients.get_mut(&id) {
             Some(client) if now < client.calm_until => {
@@ -301,8 +304,8 @@ impl SharedLine {
         if self.asked_after(id) == Some(NOT_ASKED) { POLICY } else { &self.halted.1 }
     }
 
-    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. Any later one revokes the
-    /// permission, even while the request still waits.
+    /// Permits the client's next motion. `after` is the number of the last Stop or Pause that the client has seen. Any
+    /// later one revokes the permission, even while the request still waits.
     ///
     /// # Errors
     ///
@@ -311,12 +314,12 @@ impl SharedLine {
         self.ask(id, after, Duration::ZERO, now)
     }
 
-    /// Like [`ask_to_move`](Self::ask_to_move), for a request that is repeated while a key is pressed. Each refused repetition extends the hold-off,
-    /// so the arm moves again only after the key was released.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a request that is repeated while a key is pressed. Each refused
+    /// repetition extends the hold-off, so the arm moves again only after the key was released.
     ///
     /// # Errors
     ///
-    /// Those of [`ask_to_move`](Self::ask_to_move).
+    /// The errors of [`ask_to_move`](Self::ask_to_move).
     pub fn ask_to_jog(&mut self, id: ClientId, after: u64, now: Duration) -> Result<(), Denied> {
         self.ask(id, after, CALM_AGAIN, now)
     }
@@ -325,7 +328,7 @@ impl SharedLine {
     ///
     /// # Errors
     ///
-    /// Those of [`ask_to_move`](Self::ask_to_move).
+    /// The errors of [`ask_to_move`](Self::ask_to_move).
     pub fn could_jog(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         self.is_calm(id, now, CALM_AGAIN)
@@ -335,7 +338,7 @@ impl SharedLine {
     ///
     /// # Errors
     ///
-    /// Those of [`ask_to_move`](Self::ask_to_move).
+    /// The errors of [`ask_to_move`](Self::ask_to_move).
     pub fn could_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         self.could_command(id, now)?;
         self.is_calm(id, now, Duration::ZERO)
@@ -384,8 +387,9 @@ impl SharedLine {
         self.moving.end_teaching(now);
     }
 
-    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to stand, because the last status is older than the last
-    /// command; the controller may refuse it then, and other clients are not affected. Returns true if the arm may have been moving.
+    /// Stops or pauses every motion, for the owner. Sends the command even if the arm seems to stand, because the last
+    /// status is older than the last command; the controller may refuse it then, and other clients are not affected.
+    /// Returns true if the arm may have been moving.
     fn hold(&mut self, name: &str, command: ExecCommand, now: Duration) -> bool {
         let moved = self.moving.may_move(self.status.as_ref(), now);
         if moved {

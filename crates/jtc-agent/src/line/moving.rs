@@ -1,4 +1,5 @@
-//! Motion tracker: tells from frames and statuses whether the arm may move. Also repeats the end of Teaching until the controller confirms it.
+//! Motion tracker: tells from frames and statuses whether the arm may move. Also repeats the end of Teaching until the
+//! controller confirms it.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, FrameType, Status, TrajectoryState, fixed};
@@ -19,7 +20,8 @@ pub(super) struct Moving {
     begun_at: Option<Duration>,
     /// Time of the last part of a trajectory.
     uploaded_at: Option<Duration>,
-    /// Set after Teaching was requested. It may wait seconds until the arm is held, and no status shows that.
+    /// Set after Teaching was requested. Teaching can start seconds later, when position hold begins, and no status
+    /// shows the request.
     teaches: bool,
     /// Time at which the end of Teaching is sent.
     end_at: Option<Duration>,

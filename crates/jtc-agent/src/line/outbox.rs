@@ -1,7 +1,8 @@
 //! Transmit queue of the line: whole frames, one after the other, a few bytes ahead of the line.
 //!
-//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] of them are queued there. A Stop does not wait for
-//! the remainder of a long frame: the frame is abandoned, and the controller detects that by the gap after it (J-05).
+//! Bytes that the operating system has accepted cannot be taken back, so at most [`AHEAD`] of them are queued there. A
+//! Stop does not wait for the remainder of a long frame: the frame is abandoned, and the controller detects that by the
+//! gap after it (J-05).
 use std::time::Duration;
 
 use jtc_host::port::line_time;
@@ -9,8 +10,8 @@ use jtc_host::port::line_time;
 use super::ClientId;
 use super::class::HostFrame;
 
-/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin, because each delay of the system makes the estimate of
-/// the line up to a byte too early.
+/// Largest number of bytes queued in the operating system: 256 (J-05), less a margin, because each delay of the system
+/// makes the estimate of the line up to a byte too early.
 const AHEAD: usize = 250;
 /// Silence after an abandoned frame: the 5 ms of J-03, and what adapters may shorten it by.
 const GAP: Duration = Duration::from_millis(8);
@@ -33,7 +34,7 @@ pub struct Outgoing {
 pub enum Passed {
     /// Its last byte was written.
     Written(Outgoing),
-    /// It was abandoned halfway.
+    /// The frame was abandoned halfway.
     Abandoned(Outgoing),
 }
 

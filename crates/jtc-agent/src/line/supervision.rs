@@ -1,5 +1,5 @@
-//! Host supervision (J-59) on a shared line: for the controller all clients are one host, so questions of others must not stand for the client
-//! that commands.
+//! Host supervision (J-59) on a shared line: for the controller all clients are one host, so questions of others must
+//! not stand for the client that commands.
 use std::time::Duration;
 
 use jtc_host::session::host_timeout_ms;
@@ -7,12 +7,13 @@ use jtc_wire::{Answer, Command, ControllerState, FrameRef, Response, Status};
 
 use super::{ClientId, Denied, SharedLine};
 
-/// What is known of the controller's supervision of its host.
+/// Known state of the controller's host supervision.
 #[derive(Debug, Default)]
 pub(super) struct Supervision {
-    /// Its `host_timeout_ms`, as it was last read or set on this line; none without supervision, and where it is not known.
+    /// Value of `host_timeout_ms` that was last read or set on this line; `None` without supervision, or if it is not
+    /// known.
     timeout: Option<Duration>,
-    /// That of a SetSettings whose record has not come, ms.
+    /// Timeout in a SetSettings whose record has not arrived, ms.
     written_ms: Option<f64>,
 }
 
@@ -54,8 +55,9 @@ impl Supervision {
 }
 
 impl SharedLine {
-    /// This client may ask the controller. While the arm moves under host supervision, others may ask only if a frame of the client that
-    /// commands arrived within half of the timeout. Our clients send one in each third of it.
+    /// Checks that this client may ask the controller. While the arm moves under host supervision, other clients may
+    /// ask only if a frame of the lease holder arrived within half of the timeout. The project's own clients send one
+    /// in each third of it.
     pub(super) fn may_ask(&mut self, id: ClientId, now: Duration) -> Result<(), Denied> {
         let Some(timeout) = self.supervision.timeout else { return Ok(()) };
         self.end_lapsed(now);

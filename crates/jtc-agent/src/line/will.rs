@@ -1,24 +1,25 @@
-//! What the policy of a client is to act on, should the agent be killed: a last will, as that of MQTT, that somebody else reads.
+//! Last will of a client, as in MQTT: its policy for the current motion, to be applied by another agent if this agent
+//! is killed.
 use std::time::Duration;
 
 use jtc_wire::{ControllerState, ExecCommand, TrajectoryState};
 
 use super::{LineEvent, POLICY, Policy, SharedLine};
 
-/// What moves the arm, or is about to.
+/// Cause of a present or expected motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Moves {
-    /// Nothing yet: a trajectory is uploaded, and a motion follows as a rule.
+    /// Upload of a trajectory: the arm stands, and a motion usually follows.
     Upload,
-    /// A motion, also one that is paused.
+    /// Motion, also a paused one.
     Motion,
-    /// Somebody leads it by hand, or may soon.
+    /// Teaching: the arm is led by hand, or may be soon.
     Teaching,
 }
 
 impl Moves {
-    /// In words.
+    /// Returns the cause in words.
     pub fn text(self) -> &'static str {
         match self {
             Self::Upload => "an upload",
@@ -28,42 +29,42 @@ impl Moves {
     }
 }
 
-/// Whose policy acts on what moves when nobody is there any more.
+/// Client whose policy applies to the motion after the agent was killed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Will {
-    /// What people call the client.
+    /// Name of the client for people.
     pub client: String,
     /// Its policy.
     pub policy: Policy,
-    /// What moves.
+    /// Cause of the motion.
     pub what: Moves,
 }
 
-/// What was done with what a client has left.
+/// Result of applying a last will.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Applied {
-    /// Nothing moves any more.
+    /// No motion any more.
     Rests,
-    /// It goes on.
+    /// The motion continues.
     GoesOn,
-    /// It was paused before, and stays so.
+    /// The motion was paused before, and stays paused.
     Paused,
-    /// This was sent.
+    /// This command was sent.
     Sent(ExecCommand),
 }
 
 impl SharedLine {
-    /// From now on this policy acts on what moves while nobody commands.
+    /// Sets the policy that applies to the motion while no client holds the lease.
     pub(super) fn bequeath(&mut self, client: String, policy: Policy) {
         self.left = (client, policy);
     }
 
-    /// Does what a client has left to an agent that was killed before it could. Where nothing seems to move it is sent as well, as a status
-    /// is older than the last command.
+    /// Applies the will of a client whose agent was killed before it could. The command is sent even if the arm seems
+    /// to stand, because a status is older than the last command.
     pub fn apply_left(&mut self, client: &str, policy: Policy, now: Duration) -> Applied {
         self.bequeath(client.to_owned(), policy);
         if self.status.is_none() {
-            // Nobody knows what moves: what was left is in force until the device reports that nothing does.
+            // The motion is not known: the will applies until the controller reports that the arm stands.
             self.will = Some(self.will_of(Moves::Motion));
         }
         let moves = self.moving.may_move(self.status.as_ref(), now);
@@ -71,7 +72,7 @@ impl SharedLine {
             status.trajectory == TrajectoryState::Pause && status.state == ControllerState::HoldPos
         });
         match policy.command() {
-            // It is so already; another Pause would hold up whoever comes.
+            // The motion is already paused; another Pause would only delay new clients.
             Some(ExecCommand::Pause) if stands => Applied::Paused,
             Some(command) if self.hold(POLICY, command, now) => Applied::Sent(command),
             None if moves => Applied::GoesOn,
@@ -79,12 +80,12 @@ impl SharedLine {
         }
     }
 
-    /// What is in force now, should the agent be killed.
+    /// Returns the will that applies if the agent is killed now.
     pub fn will(&self) -> Option<&Will> {
         self.will.as_ref()
     }
 
-    /// Reports another will when it has changed.
+    /// Reports the will when it has changed.
     pub(super) fn look_what_moves(&mut self, now: Duration) {
         let before = self.will.as_ref().map(|will| will.what);
         let will = self.moving.what(self.status.as_ref(), now, before).map(|what| self.will_of(what));
@@ -94,7 +95,8 @@ impl SharedLine {
         }
     }
 
-    /// That of who commands, or of the last who did; more than that where somebody has asked for more and the device does not take it.
+    /// Returns the will with the policy of the present or last lease holder; a stronger command that the controller has
+    /// not confirmed takes precedence.
     fn will_of(&self, what: Moves) -> Will {
         let holder = self.lease.as_ref().and_then(|lease| self.introduction(lease.holder));
         let (client, policy) =

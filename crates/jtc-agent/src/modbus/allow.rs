@@ -1,31 +1,31 @@
-//! Who may connect: addresses, and networks of them.
+//! Allowed clients: addresses and networks.
 use std::fmt;
 use std::net::IpAddr;
 use std::str::FromStr;
 
-/// An address, or the network of all that begin with the same bits.
+/// Address, or network of all addresses that begin with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Network {
     address: IpAddr,
     bits: u8,
 }
 
-/// What is no address and no network.
+/// Text that is neither an address nor a network.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0} is neither an address nor a network: 192.168.0.10, 192.168.0.0/24 and fd00::/8 are")]
 pub struct NoNetwork(String);
 
 impl Network {
-    /// It has this address.
+    /// Returns `true` if the network contains this address.
     pub fn contains(&self, address: IpAddr) -> bool {
         let (own, other) = (number(self.address), number(address.to_canonical()));
         let left = own.1 - u32::from(self.bits);
-        // All of the bits may be left: a shift by the whole width is none.
+        // `left` may be the full width; `checked_shr` returns `None` then.
         own.1 == other.1 && own.0.checked_shr(left).unwrap_or(0) == other.0.checked_shr(left).unwrap_or(0)
     }
 }
 
-/// An address as a number, and its bits.
+/// Returns an address as a number, and its number of bits.
 fn number(address: IpAddr) -> (u128, u32) {
     match address {
         IpAddr::V4(address) => (u128::from(address.to_bits()), 32),
@@ -60,17 +60,17 @@ impl fmt::Display for Network {
     }
 }
 
-/// Who may connect.
+/// Networks whose addresses may connect.
 #[derive(Clone, Debug, Default)]
 pub struct Allowed(Vec<Network>);
 
 impl Allowed {
-    /// Those of these networks; of none: this computer alone.
+    /// Allows these networks; an empty list allows only this computer.
     pub fn new(networks: Vec<Network>) -> Self {
         Self(networks)
     }
 
-    /// This address may connect.
+    /// Returns `true` if this address may connect.
     pub fn contains(&self, address: IpAddr) -> bool {
         if self.0.is_empty() {
             return address.to_canonical().is_loopback();

@@ -1,4 +1,4 @@
-//! Numbers for what a PLC commands, what becomes of it, and why not.
+//! Numbers of a PLC's commands, their outcomes and errors.
 
 macro_rules! numbered {
     ($(#[$doc:meta])* $name:ident { $($(#[$meaning:meta])* $variant:ident = $code:literal, $text:literal;)+ }) => {
@@ -10,17 +10,17 @@ macro_rules! numbered {
         }
 
         impl $name {
-            /// Every one.
+            /// All values.
             pub const ALL: &[Self] = &[$(Self::$variant),+];
 
-            /// In words.
+            /// Returns the description.
             pub const fn text(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)+
                 }
             }
 
-            /// The one of this number.
+            /// Returns the value with this number.
             pub fn from_number(number: u16) -> Option<Self> {
                 Self::ALL.iter().copied().find(|one| *one as u16 == number)
             }
@@ -29,12 +29,12 @@ macro_rules! numbered {
 }
 
 numbered! {
-    /// What a PLC can have done.
+    /// Command of a PLC.
     Command {
-        /// Nothing.
+        /// No command.
         #[default]
         None = 0, "nothing: the number is acknowledged, no more";
-        /// A stored trajectory.
+        /// Start of a stored trajectory.
         Start = 1, "start the trajectory: a job, checked, uploaded, executed. `result` 1: it has begun";
         /// Pause.
         Pause = 2, "pause";
@@ -58,49 +58,49 @@ numbered! {
         RecoverWithDefaults = 11, "the same where the controller has not been given its arm: it uses its defaults, the stored arm where there is one";
         /// Speed.
         SetSpeed = 12, "set speed: the motion that goes on, and later ones, at `speed` % of their own";
-        /// The lease.
+        /// Release of the lease.
         Release = 13, "let the lease go";
     }
 }
 
-/// The largest number of a command.
+/// Largest number of a command.
 pub const COMMAND_MAX: u16 = Command::Release as u16;
 
 numbered! {
-    /// What became of a command.
+    /// Outcome of a command.
     Outcome {
-        /// There was none.
+        /// No command yet.
         #[default]
         None = 0, "there was no command yet";
         /// Done.
         Done = 1, "done; of a job: begun";
-        /// Wrong number.
+        /// Wrong sequence number.
         Sequence = 2, "`sequence` is neither `acknowledged` nor one more: nothing was done";
-        /// A value.
+        /// Impossible value.
         Value = 3, "a value is not possible for this command, or the watchdog is off: nothing was done";
-        /// No such trajectory.
+        /// Unknown trajectory.
         NoTrajectory = 4, "no trajectory has this number: nothing was done";
         /// Busy.
         Busy = 5, "a job or another command of this PLC goes on: nothing was done";
-        /// Somebody else commands.
+        /// Another client holds the lease.
         Held = 6, "somebody else commands: nothing was done";
-        /// Somebody stopped the arm.
+        /// Another client stopped or paused the arm.
         Stopped = 7, "somebody else stopped or paused the arm less than three seconds ago: nothing was done";
-        /// A coil is 1.
+        /// A coil of a connection is 1.
         Coil = 8, "the coil `stop` or `pause` of a connection is 1: nothing was done";
-        /// Not ready.
+        /// Wrong state of the arm.
         NotReady = 9, "the arm is not in a state for this (`state`, `errors`, `ready`, `paused`): nothing was done";
-        /// No controller.
+        /// No answer of the controller.
         NoController = 10, "the controller is not there or did not answer: the arm may be moving";
-        /// It failed.
+        /// Refused or failed.
         Failed = 11, "it was refused or failed: `command_error` has why";
     }
 }
 
-/// A code that is none of [`ERRORS`].
+/// Number for an error code that is not in [`ERRORS`].
 pub const OTHER_ERROR: u16 = 255;
 
-/// Errors by number: their codes in the API, and what they are. Numbers are never given to another.
+/// Errors by number: their codes in the API, and descriptions. Numbers are never reused.
 #[rustfmt::skip]
 pub const ERRORS: &[(u16, &str, &str)] = &[
     (1, "stopped", "somebody stopped or paused the arm before this moved it"),
@@ -138,7 +138,7 @@ pub const ERRORS: &[(u16, &str, &str)] = &[
     (33, "encoder-jumped", "an encoder has jumped (`encoder_jumped`): its drive is to be reset first"),
 ];
 
-/// The number of an error.
+/// Returns the number of an error.
 pub fn error_number(code: &str) -> u16 {
     ERRORS.iter().find(|(_, name, _)| *name == code).map_or(OTHER_ERROR, |(number, ..)| *number)
 }

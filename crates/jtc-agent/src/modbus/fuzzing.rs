@@ -1,15 +1,15 @@
-//! The body of the fuzz target `modbus_stream`, which has no more of this crate than this file and `pdu`.
+//! Body of the fuzz target `modbus_stream`, which uses only this file and `pdu` of this crate.
 use super::pdu::{Device, Exception, HEADER_LEN, Header, Table, answer};
 
-/// Longest response with its header, by the standard.
+/// Longest response with its header, bytes, by the standard.
 const RESPONSE_MAX: usize = 260;
 
-/// A device of sixteen of everything; what is behind them is not there.
+/// Device with sixteen entries in each table; higher addresses do not exist.
 #[derive(Clone, Default, PartialEq, Debug)]
 pub(super) struct Sixteen {
     coils: [bool; 16],
     registers: [u16; 16],
-    /// Requests that wrote.
+    /// Number of writing requests.
     pub(super) writes: usize,
 }
 
@@ -42,12 +42,13 @@ impl Device for Sixteen {
     }
 }
 
-/// A connection that sends these bytes: each request has one response in its own transaction, no longer than the standard allows, which says
-/// what was done; a request that is refused writes nothing, and one that writes is read back.
+/// Simulates a connection that sends these bytes. Checks that each request has one response with its own transaction
+/// number and within the length of the standard. The response tells if the request was executed. A refused request
+/// writes nothing, and a written value is read back.
 ///
 /// # Panics
 ///
-/// When a promise is broken.
+/// A check fails.
 pub fn modbus_stream(mut data: &[u8]) {
     let mut device = Sixteen::default();
     while let Some((head, rest)) = data.split_first_chunk::<HEADER_LEN>() {
@@ -69,7 +70,7 @@ pub fn modbus_stream(mut data: &[u8]) {
         let writes = [5, 6, 15, 16].contains(&pdu[0]);
         assert_eq!(device.writes, before.writes + usize::from(writes));
         if writes {
-            // What was written is what is read of the same place, as the standard packs it.
+            // Written values must be read from the same addresses, packed as in the standard.
             let (read, count) = match pdu[0] {
                 5 => (1, [0, 1]),
                 6 => (3, [0, 1]),
@@ -91,7 +92,7 @@ pub fn modbus_stream(mut data: &[u8]) {
     }
 }
 
-/// The bits behind `count` are zeros.
+/// Sets the bits after `count` to zero.
 fn masked(bytes: &[u8], count: usize) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if let Some(last) = bytes.last_mut().filter(|_| !count.is_multiple_of(8)) {

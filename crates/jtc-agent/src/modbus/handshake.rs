@@ -1,36 +1,37 @@
-//! The holding registers, and the handshake that makes a command of them: once, whatever is written again or lost on the way.
+//! Holding registers, and the handshake that turns them into commands: each command is executed once, even if writes
+//! are repeated or answers are lost.
 use super::codes::{Command, Outcome};
 use super::map::{HOLDINGS, WATCHDOG_MIN, holding};
 use super::pdu::Exception;
 
-/// A command with all that was written for it, as it was when its number came.
+/// Command with all its parameters, as they were when its sequence number was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Order {
-    /// Its number.
+    /// Sequence number.
     pub sequence: u16,
-    /// What is to be done.
+    /// Command.
     pub command: Command,
-    /// Which trajectory.
+    /// Number of the trajectory.
     pub trajectory: u16,
-    /// %.
+    /// Speed, %.
     pub speed: u16,
-    /// How often.
+    /// Number of runs.
     pub repeat: u16,
-    /// To its first point, where the arm stands elsewhere.
+    /// `true`: first move the arm to the first point, if it stands elsewhere.
     pub approach: bool,
-    /// The watchdog, ms.
+    /// Watchdog, ms.
     pub watchdog_ms: u16,
 }
 
-/// The holding registers of the PLC that commands, and its last command.
+/// Holding registers of the commanding PLC, and its last command.
 ///
-/// A command has the number behind that of the one before. Any other number, and what is written without a new one, has nothing done: neither
-/// what a PLC repeats because an answer was lost, nor what it goes on writing from before the agent was started, for an agent begins with
-/// another number each time.
+/// A command needs the sequence number after that of the last command. With any other number, or without a new one,
+/// no command is executed. So a write that is repeated after a lost answer has no effect. Values that a PLC still writes
+/// from before the start of the agent have no effect either, because each agent starts with another number.
 #[derive(Clone, Debug)]
 pub struct Handshake {
     values: [u16; holding::COUNT],
-    /// Number of the last command that was taken.
+    /// Sequence number of the last accepted command.
     taken: u16,
     acknowledged: u16,
     outcome: Outcome,
@@ -38,7 +39,7 @@ pub struct Handshake {
 }
 
 impl Handshake {
-    /// One whose last number is this.
+    /// Returns the handshake after a last command with this sequence number.
     pub fn new(sequence: u16) -> Self {
         let mut new = Self {
             values: [0; holding::COUNT],
@@ -51,37 +52,37 @@ impl Handshake {
         new
     }
 
-    /// What was written is forgotten: it was another PLC's. The numbers go on.
+    /// Resets the registers, which another PLC has written. The sequence number continues.
     pub fn forget(&mut self) {
         self.values = HOLDINGS.map(|row| row.default);
         self.values[holding::SEQUENCE] = self.taken;
     }
 
-    /// All registers, from address 0.
+    /// Returns all registers, from address 0.
     pub fn values(&self) -> &[u16; holding::COUNT] {
         &self.values
     }
 
-    /// ms without a request after which the policy applies; 0: off.
+    /// Returns the time without a request after which the policy applies, ms; 0: off.
     pub fn watchdog_ms(&self) -> u16 {
         self.values[holding::WATCHDOG]
     }
 
-    /// The last number that was answered, what became of that command, and the number of its error.
+    /// Returns the last acknowledged sequence number, the outcome of that command, and the number of its error.
     pub fn last(&self) -> (u16, Outcome, u16) {
         (self.acknowledged, self.outcome, self.error)
     }
 
-    /// A command is on its way.
+    /// Returns `true` while a command is being executed.
     pub fn is_pending(&self) -> bool {
         self.taken != self.acknowledged
     }
 
-    /// These values may be written. `commands`: this PLC has the lease, and cannot be without a watchdog.
+    /// Checks that these values may be written. `commands`: this PLC holds the lease, so its watchdog cannot be off.
     ///
     /// # Errors
     ///
-    /// [`Exception::Address`] where there is no such register, [`Exception::Value`] where one of the values is not possible.
+    /// [`Exception::Address`] if a register does not exist, [`Exception::Value`] if a value is out of range.
     pub fn check(&self, at: u16, values: &[u16], commands: bool) -> Result<(), Exception> {
         let at = usize::from(at);
         let rows = HOLDINGS.get(at..at + values.len()).ok_or(Exception::Address)?;
@@ -98,7 +99,7 @@ impl Handshake {
         Ok(())
     }
 
-    /// Writes values that passed [`check`](Self::check), all at once. Returns the command that they are, if they are one.
+    /// Writes values that passed [`check`](Self::check), all at once. Returns the command that they complete, if any.
     pub fn write(&mut self, at: u16, values: &[u16]) -> Option<Order> {
         let at = usize::from(at);
         for (register, value) in self.values.iter_mut().skip(at).zip(values) {
@@ -117,7 +118,7 @@ impl Handshake {
         let value = |register: usize| self.values[register];
         Some(Order {
             sequence,
-            // It was checked.
+            // The value was checked before.
             command: Command::from_number(value(holding::COMMAND)).unwrap_or_default(),
             trajectory: value(holding::TRAJECTORY),
             speed: value(holding::SPEED),
@@ -127,7 +128,7 @@ impl Handshake {
         })
     }
 
-    /// What became of a command. Of one that was not waited for nothing is reported any more.
+    /// Reports the outcome of a command. Ignores a command that is no longer pending.
     pub fn acknowledge(&mut self, sequence: u16, outcome: Outcome, error: u16) {
         if sequence == self.taken {
             (self.acknowledged, self.outcome, self.error) = (sequence, outcome, error);
@@ -152,17 +153,17 @@ mod tests {
     fn a_command_is_what_was_written_when_its_number_came() {
         let mut handshake = Handshake::new(41);
         assert_eq!(handshake.values()[holding::SEQUENCE], 41);
-        // Written half, in any order: nothing is done yet.
+        // Partly written, in any order: nothing is executed yet.
         assert_eq!(write(&mut handshake, holding::COMMAND, &[START]), Ok(None));
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[3]), Ok(None));
         let order = write(&mut handshake, holding::SEQUENCE, &[42]).expect("it may be").expect("a command");
         assert_eq!((order.command, order.trajectory, order.speed, order.repeat), (Command::Start, 3, 100, 1));
         assert!(handshake.is_pending());
-        // Another number of the trajectory is for the next command.
+        // A new number of the trajectory applies to the next command.
         assert_eq!(write(&mut handshake, holding::TRAJECTORY, &[4]), Ok(None));
         handshake.acknowledge(42, Outcome::Done, 0);
         assert_eq!((handshake.last(), handshake.is_pending()), ((42, Outcome::Done, 0), false));
-        // All at once.
+        // All registers in one write.
         let all = [500, 2, 5, 20, 7, 1, START, 43];
         let order = write(&mut handshake, 0, &all).expect("it may be").expect("a command");
         let whole = Order {
@@ -219,7 +220,7 @@ mod tests {
             assert_eq!(write(&mut handshake, at, values), Err(exception), "{at} {values:?}");
         }
         assert_eq!((*handshake.values(), handshake.is_pending()), (before, false));
-        // Whoever commands has a watchdog.
+        // A commanding PLC needs a watchdog.
         assert_eq!(handshake.check(holding::WATCHDOG as u16, &[0], true), Err(Exception::Value));
         assert_eq!(handshake.check(holding::WATCHDOG as u16, &[0], false), Ok(()));
     }
@@ -235,8 +236,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is written, and in whatever order: a command comes of a number that is one more than the last alone, with the values
-        /// that the registers have at that moment.
+        /// For any writes in any order, a command results only from the next sequence number, with the values of the
+        /// registers at that moment.
         #[test]
         fn nothing_is_done_without_a_new_number(
             first in any::<u16>(),
@@ -245,7 +246,7 @@ mod tests {
             let mut handshake = Handshake::new(first);
             let mut last = first;
             for (at, mut values, near) in writes {
-                // Numbers near the last one too, or none would ever be the next.
+                // Includes numbers near the last one, otherwise the next number would hardly occur.
                 let place = holding::SEQUENCE.checked_sub(usize::from(at)).filter(|place| *place < values.len());
                 if let Some(place) = place.filter(|_| near) {
                     values[place] = last.wrapping_add(values[place] % 3);

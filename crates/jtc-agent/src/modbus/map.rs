@@ -1,4 +1,4 @@
-//! The register map: one table for what is served and for the page that describes it.
+//! Register map: one table for the server and for the page that describes it.
 use std::time::Duration;
 
 use jtc_host::held_stop;
@@ -10,57 +10,57 @@ use super::codes::{Outcome, error_number};
 use super::pdu::Exception;
 use crate::jobs::{Job, NUMBER_MAX, Stage};
 
-/// Version of this map. It counts up when what has an address changes, not when something is added behind the rest.
+/// Version of this map. The version counts up when the meaning of an address changes, not when entries are added at the end.
 pub const VERSION: u16 = 1;
-/// A number that is not known.
+/// Register value of an unknown number.
 pub const UNKNOWN: u16 = u16::MAX;
 const UNKNOWN_LONG: u32 = u32::MAX;
-/// A controller that has not reported for longer is not there.
+/// Age of the last status after which the controller counts as disconnected.
 pub const FRESH: Duration = Duration::from_secs(1);
-/// The heartbeat counts up so often.
+/// Period of the heartbeat counter.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 
-/// Who commands.
+/// Lease holder, as a connection sees it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Holder {
-    /// Nobody does.
+    /// No client.
     #[default]
     Nobody = 0,
-    /// The PLC that asks.
+    /// PLC of this connection.
     Own = 1,
-    /// Somebody else.
+    /// Another client.
     Other = 2,
 }
 
-/// What a connection is shown.
+/// Values that a connection can read.
 #[derive(Clone, Debug, Default)]
 pub struct View {
     /// Time of the agent.
     pub now: Duration,
-    /// No arm moves.
+    /// `true` if the controller is simulated: no real arm moves.
     pub simulated: bool,
-    /// The port is gone.
+    /// `true` if the port was lost.
     pub lost: bool,
-    /// What the controller reported last, and how long ago.
+    /// Age and content of the last status.
     pub status: Option<(Duration, Status)>,
-    /// Cause of the held stop that the arm is in, and its age, ms.
+    /// Cause and age in ms of the current held stop.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints whose encoder has jumped, a bit for each.
+    /// Joints whose encoder has jumped, one bit each.
     pub jumped: u8,
     /// Speed override, %.
     pub speed: Option<u16>,
-    /// Who commands.
+    /// Lease holder.
     pub holder: Holder,
-    /// Somebody has asked the PLC for the lease.
+    /// `true` if another client waits for the lease of the PLC.
     pub wanted: bool,
-    /// The last job that a PLC began.
+    /// Last job that a PLC began.
     pub job: Option<Job>,
-    /// The command that was acknowledged last, what became of it, and the code of its error.
+    /// Sequence number of the last acknowledged command.
     pub acknowledged: u16,
-    /// What became of it.
+    /// Outcome of that command.
     pub outcome: Outcome,
-    /// Number of its error.
+    /// Number of the error of that command.
     pub error: u16,
 }
 
@@ -73,7 +73,7 @@ impl View {
         self.status(u32::from(UNKNOWN), |status| status.joints.get(n).map_or(u32::from(UNKNOWN), read))
     }
 
-    /// A measured value of a joint; not a number where it is not known.
+    /// Returns the bits of a joint's measured value; NaN if it is not known.
     fn measured(&self, n: usize, read: impl FnOnce(&jtc_wire::JointStatus) -> f32) -> u32 {
         let known = |status: &Status| {
             let joint = status.joints.get(n).filter(|_| is_measured(status, n));
@@ -82,63 +82,63 @@ impl View {
         self.status(f32::NAN, known).to_bits()
     }
 
-    /// Something of the cause of the held stop that the arm is in; 0 where it is in none, or its cause is not known.
+    /// Returns a value of the current held stop's cause; 0 without a held stop, or if its cause is not known.
     fn stop(&self, read: impl FnOnce(&StopCause) -> u32) -> u32 {
         self.stop.as_ref().map_or(0, |(cause, _)| read(cause))
     }
 
-    /// One of its figures; not a number where it has none.
+    /// Returns the bits of a figure of the cause; NaN if the cause has none.
     fn figure(&self, read: impl FnOnce((Option<f32>, Option<f32>)) -> Option<f32>) -> u32 {
         let known = self.stop.as_ref().and_then(|(cause, _)| read(held_stop::figures(cause)));
         known.unwrap_or(f32::NAN).to_bits()
     }
 
-    /// Of the last job; 0 where there was none.
+    /// Returns a value of the last job; 0 before the first job.
     fn job(&self, read: impl FnOnce(&Job) -> u32) -> u32 {
         self.job.as_ref().map_or(0, read)
     }
 
-    /// The controller reports now.
+    /// Returns `true` if the controller reports now.
     pub fn is_fresh(&self) -> bool {
         !self.lost && self.status.as_ref().is_some_and(|(age, _)| *age <= FRESH)
     }
 
-    /// It reports now, and this.
+    /// Returns `true` if the controller reports now and its status fulfils a condition.
     fn reports(&self, what: impl FnOnce(&Status) -> bool) -> bool {
         self.is_fresh() && self.status(false, what)
     }
 
-    /// The arm is held without errors, and nothing moves it: a motion can be begun.
+    /// Returns `true` if the arm is in position hold without errors and without a motion: a motion can begin.
     pub fn is_ready(&self) -> bool {
         self.reports(|s| {
             s.state == ControllerState::HoldPos && s.errors == 0 && words::is_held(s) && !s.is_executing()
         })
     }
 
-    /// A motion is paused.
+    /// Returns `true` if a motion is paused.
     pub fn is_paused(&self) -> bool {
         self.reports(|s| s.trajectory == TrajectoryState::Pause)
     }
 }
 
-/// How a value lies in registers. Of two registers the first one has the upper 16 bits.
+/// Format of a value in registers. The first of two registers has the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// One register.
+    /// One register, unsigned.
     U16,
-    /// Two registers.
+    /// Two registers, unsigned.
     U32,
     /// Two registers, IEEE 754.
     F32,
 }
 
 impl Form {
-    /// Registers of a value.
+    /// Returns the number of registers of a value.
     pub fn words(self) -> u16 {
         if self == Self::U16 { 1 } else { 2 }
     }
 
-    /// As people write it.
+    /// Returns the name for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::U16 => "u16",
@@ -148,41 +148,41 @@ impl Form {
     }
 }
 
-/// Input registers of one meaning.
+/// Input registers with one meaning.
 pub struct Input {
-    /// Address of the first, from 0.
+    /// Address of the first register, from 0.
     pub at: u16,
-    /// How many values: one, or one a joint.
+    /// Number of values: one, or one per joint.
     pub count: u16,
-    /// How each of them lies.
+    /// Format of each value.
     pub form: Form,
-    /// Name.
+    /// Name of the value.
     pub name: &'static str,
-    /// Meaning.
+    /// Meaning of the value.
     pub meaning: &'static str,
-    /// Its n-th value.
+    /// Function for its n-th value.
     pub value: fn(&View, usize) -> u32,
 }
 
-/// A bit that is read.
+/// Read-only bit.
 pub struct DiscreteInput {
-    /// Name.
+    /// Name of the bit.
     pub name: &'static str,
-    /// Meaning.
+    /// Meaning of the bit.
     pub meaning: &'static str,
-    /// Its value.
+    /// Function for its value.
     pub value: fn(&View) -> bool,
 }
 
-/// A holding register.
+/// Holding register.
 pub struct Holding {
-    /// Name.
+    /// Name of the register.
     pub name: &'static str,
     /// Smallest and largest value.
     pub range: (u16, u16),
-    /// Value before it is written.
+    /// Value before the first write.
     pub default: u16,
-    /// Meaning.
+    /// Meaning of the register.
     pub meaning: &'static str,
 }
 
@@ -206,7 +206,7 @@ const fn joints(
     Input { at, count: JOINTS as u16, form, name, meaning, value }
 }
 
-/// The input registers, by address.
+/// Input registers, by address.
 #[rustfmt::skip]
 pub const INPUTS: &[Input] = &[
     one(0, Form::U16, "map_version", "version of this map", |_, _| VERSION.into()),
@@ -261,7 +261,7 @@ pub const INPUTS: &[Input] = &[
         |v, _| v.jumped.into()),
 ];
 
-/// The discrete inputs, from address 0.
+/// Discrete inputs, from address 0.
 #[rustfmt::skip]
 pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
     DiscreteInput { name: "controller_there", meaning: "the controller has reported within the last second", value: View::is_fresh },
@@ -282,30 +282,30 @@ pub const DISCRETE_INPUTS: &[DiscreteInput] = &[
 
 /// Addresses of the holding registers.
 pub mod holding {
-    /// ms without a request after which the policy applies.
+    /// Time without a request after which the policy applies, ms.
     pub const WATCHDOG: usize = 0;
-    /// What becomes of a motion then.
+    /// Policy for a motion after that time.
     pub const POLICY: usize = 1;
-    /// Which trajectory.
+    /// Number of the trajectory.
     pub const TRAJECTORY: usize = 2;
-    /// %.
+    /// Speed, %.
     pub const SPEED: usize = 3;
-    /// How often.
+    /// Number of runs.
     pub const REPEAT: usize = 4;
-    /// To its first point.
+    /// Motion to the first point before the run.
     pub const APPROACH: usize = 5;
-    /// What is to be done.
+    /// Command.
     pub const COMMAND: usize = 6;
-    /// The number that has it done.
+    /// Sequence number, which triggers the command.
     pub const SEQUENCE: usize = 7;
-    /// How many there are.
+    /// Number of holding registers.
     pub const COUNT: usize = 8;
 }
 
 /// Shortest watchdog, ms.
 pub const WATCHDOG_MIN: u16 = 100;
 
-/// The holding registers, from address 0.
+/// Holding registers, from address 0.
 #[rustfmt::skip]
 pub const HOLDINGS: [Holding; holding::COUNT] = [
     Holding { name: "watchdog_ms", range: (0, 60_000), default: 1000,
@@ -324,13 +324,13 @@ pub const HOLDINGS: [Holding; holding::COUNT] = [
 pub const STOP: usize = 0;
 /// Address of the coil that pauses.
 pub const PAUSE: usize = 1;
-/// The coils, from address 0: name and meaning.
+/// Coils, from address 0: name and meaning.
 pub const COILS: [(&str, &str); 2] = [
     ("stop", "from 0 to 1: the motion is stopped on its path, at once"),
     ("pause", "from 0 to 1: the motion is paused on its path, at once"),
 ];
 
-/// The whole image of the input registers.
+/// Returns all input registers.
 pub fn inputs(view: &View) -> Vec<u16> {
     let mut all = Vec::new();
     for row in INPUTS {
@@ -345,7 +345,7 @@ pub fn inputs(view: &View) -> Vec<u16> {
     all
 }
 
-/// `count` of a table from address `at`.
+/// Returns `count` entries of a table from address `at`.
 ///
 /// # Errors
 ///
@@ -378,7 +378,7 @@ mod tests {
         }
     }
 
-    /// What the page promises of the order of the words, in bytes that were written by hand: 1.5 is 3FC00000, 70000 is 00011170.
+    /// The word order that the page documents, with bytes written by hand: 1.5 is 3FC00000, 70000 is 00011170.
     #[test]
     fn two_registers_have_the_upper_half_first() {
         let mut status = Status { point: 70_000, ..Status::default() };

@@ -1,8 +1,8 @@
 //! Modbus TCP for a PLC: the arm as a map of registers.
 //!
-//! [`pdu`] has the protocol, [`map`] the registers, [`handshake`] what makes a command of them, once; [`plc`] decides who of several commands,
-//! `act` does it with the same jobs that the API has, and [`server`] has the connections. Modbus knows no tokens: [`allow`] names who may
-//! connect.
+//! [`pdu`] has the protocol, [`map`] the registers, and [`handshake`] turns registers into commands, each once. [`plc`]
+//! decides which of several connections commands. `act` executes the commands with the same jobs as the API, and
+//! [`server`] has the connections. Modbus has no tokens: [`allow`] names the addresses that may connect.
 mod act;
 pub mod allow;
 pub mod codes;
@@ -23,7 +23,8 @@ pub use server::Server;
 
 use crate::access::TokenError;
 
-/// A number that a fresh agent's commands are counted from: nobody who goes on writing what was written before knows the one behind it.
+/// Returns a random first sequence number for a new agent, so that a PLC that repeats old writes does not hit the next
+/// number.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! The tables of docs/modbus.md, made from those of the code.
+//! Tables of docs/modbus.md, made from the tables of the code.
 use std::fmt::Write as _;
 
 use jtc_host::held_stop;
@@ -8,7 +8,7 @@ use jtc_wire::words::{JOINT_INTERNAL, JTC_ERRORS};
 use super::codes::{Command, ERRORS, OTHER_ERROR, Outcome};
 use super::map::{COILS, DISCRETE_INPUTS, HOLDINGS, INPUTS, VERSION};
 
-/// All of them, as Markdown.
+/// Returns all tables as Markdown.
 pub fn tables() -> String {
     let mut page = format!("Version {VERSION} of the map.\n\n");
     let mut table = |title: &str, head: &[&str], rows: Vec<Vec<String>>| {

@@ -1,14 +1,14 @@
 //! Requests and responses of Modbus TCP, without I/O: bytes go in, bytes come out.
 //!
-//! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b. A request is checked in
-//! the order of its state diagrams: function, quantity, address, then it is done. Whatever the bytes are, there is an answer or the end of the
-//! connection, and nothing that is written is written in part.
+//! The standard is the *Modbus Application Protocol* V1.1b3 with the *Messaging on TCP/IP Implementation Guide* V1.0b.
+//! A request is checked in the order of its state diagrams (function, quantity, address) and then executed. Any bytes
+//! lead to an answer or to the end of the connection, and no write is executed in part.
 
-/// Bytes of the header in front of a request: transaction, protocol, length, unit.
+/// Length of the header before a request, bytes: transaction, protocol, length, unit.
 pub const HEADER_LEN: usize = 7;
-/// Longest request or response behind the header.
+/// Longest request or response after the header, bytes.
 const PDU_MAX: usize = 253;
-/// Most that one request may read or write, by the standard.
+/// Largest quantities of one request, by the standard.
 const READ_BITS_MAX: u16 = 2000;
 const READ_REGISTERS_MAX: u16 = 125;
 const WRITE_BITS_MAX: u16 = 1968;
@@ -17,56 +17,56 @@ const WRITE_REGISTERS_MAX: u16 = 123;
 /// The four tables of a Modbus device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Table {
-    /// Bits that are written.
+    /// Writable bits.
     Coils,
-    /// Bits that are read only.
+    /// Read-only bits.
     DiscreteInputs,
-    /// Registers that are written.
+    /// Writable registers.
     HoldingRegisters,
-    /// Registers that are read only.
+    /// Read-only registers.
     InputRegisters,
 }
 
-/// Why a request is not done, as the standard numbers it.
+/// Reason why a request is not executed, with the number of the standard.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exception {
-    /// The device has no such function.
+    /// The device does not have the function.
     Function = 1,
-    /// The device has nothing at one of the addresses.
+    /// One of the addresses does not exist.
     Address = 2,
-    /// A quantity, a length or a value is not possible.
+    /// A quantity, a length or a value is invalid.
     Value = 3,
-    /// The device failed to do it: here, the controller cannot be reached.
+    /// The device failed: here, the controller cannot be reached.
     Failure = 4,
-    /// The device is busy with somebody else: here, another connection commands.
+    /// The device is busy: here, another connection commands.
     Busy = 6,
 }
 
-/// What answers requests.
+/// Device that answers requests.
 pub trait Device {
-    /// The bits of a table, `count` of them from address `at`.
+    /// Returns `count` bits of a table from address `at`.
     ///
     /// # Errors
     ///
     /// [`Exception`].
     fn bits(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<bool>, Exception>;
 
-    /// The registers of a table, `count` of them from address `at`.
+    /// Returns `count` registers of a table from address `at`.
     ///
     /// # Errors
     ///
     /// [`Exception`].
     fn registers(&mut self, table: Table, at: u16, count: u16) -> Result<Vec<u16>, Exception>;
 
-    /// Writes coils from address `at` on: all of them or none.
+    /// Writes coils from address `at` on, all or none.
     ///
     /// # Errors
     ///
     /// [`Exception`]: nothing was written.
     fn write_coils(&mut self, at: u16, values: &[bool]) -> Result<(), Exception>;
 
-    /// Writes holding registers from address `at` on: all of them or none.
+    /// Writes holding registers from address `at` on, all or none.
     ///
     /// # Errors
     ///
@@ -77,15 +77,16 @@ pub trait Device {
 /// Header of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// What the client counts its requests with, and the unit: both go back as they came.
+    /// Request number of the client; it is returned unchanged, like the unit.
     transaction: [u8; 2],
     unit: u8,
-    /// Bytes of the request behind the header.
+    /// Length of the request after the header, bytes.
     pub len: usize,
 }
 
 impl Header {
-    /// `None`: this is no Modbus, or a length that no request has. There is no telling where the next one begins.
+    /// Returns `None` if the header is not Modbus or has an invalid length. The start of the next request is not known
+    /// then.
     pub fn parse(bytes: [u8; HEADER_LEN]) -> Option<Self> {
         let [t0, t1, p0, p1, l0, l1, unit] = bytes;
         let len = usize::from(u16::from_be_bytes([l0, l1])).checked_sub(1)?;
@@ -93,7 +94,7 @@ impl Header {
         whole.then_some(Self { transaction: [t0, t1], unit, len })
     }
 
-    /// The response with its header.
+    /// Returns the response with its header.
     pub fn respond(&self, pdu: &[u8]) -> Vec<u8> {
         let len = (pdu.len() + 1) as u16;
         let head = [self.transaction, [0, 0], len.to_be_bytes()];
@@ -101,7 +102,7 @@ impl Header {
     }
 }
 
-/// The response of a device to a request. True: it was done.
+/// Returns the response of a device to a request, and `true` if the request was executed.
 pub fn answer(pdu: &[u8], device: &mut impl Device) -> (Vec<u8>, bool) {
     let function = pdu.first().copied().unwrap_or(0);
     match act(pdu, device) {
@@ -175,13 +176,13 @@ fn read_registers(
     Ok([function, (2 * values.len()) as u8].into_iter().chain(bytes).collect())
 }
 
-/// Two words, and no more.
+/// Returns exactly two words.
 fn two(rest: &[u8]) -> Result<(u16, u16), Exception> {
     let [a, b, c, d] = rest.try_into().map_err(|_| Exception::Value)?;
     Ok((u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d])))
 }
 
-/// An address, and a quantity of 1 to `most`.
+/// Returns an address, and a quantity of 1 to `most`.
 fn span(rest: &[u8], most: u16) -> Result<(u16, u16), Exception> {
     two(rest).and_then(|(at, count)| quantity(count, most).map(|_| (at, count)))
 }
@@ -190,7 +191,7 @@ fn quantity(count: u16, most: u16) -> Result<usize, Exception> {
     if (1..=most).contains(&count) { Ok(usize::from(count)) } else { Err(Exception::Value) }
 }
 
-/// An address, a quantity, and exactly the data of so many.
+/// Returns an address, a quantity, and exactly the data for this quantity.
 fn many(rest: &[u8], most: u16, len: fn(usize) -> usize) -> Result<(u16, usize, &[u8]), Exception> {
     let (head, data) = rest.split_at_checked(5).ok_or(Exception::Value)?;
     let (at, count) = two(&head[..4])?;
@@ -210,7 +211,7 @@ mod tests {
         answer(pdu, device).0
     }
 
-    /// The standard's own examples have these forms (V1.1b3, 6.1 to 6.12).
+    /// Requests with the forms of the standard's examples (V1.1b3, 6.1 to 6.12).
     #[test]
     fn requests_are_answered_as_the_standard_has_it() {
         let mut device = Sixteen::default();
@@ -261,7 +262,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any bytes have an answer of their function, no longer than a response may be, and never write more than there is.
+        /// Any bytes get an answer with their function code that is not too long, and never write more entries than
+        /// exist.
         #[test]
         fn any_bytes_are_answered(function in 0..24_u8, rest in prop::collection::vec(any::<u8>(), 0..PDU_MAX)) {
             let pdu: Vec<u8> = [function].into_iter().chain(rest).collect();

@@ -1,4 +1,4 @@
-//! What a PLC's requests do: what it is shown, who of several commands, and what becomes of a command.
+//! Requests of PLCs: the values that they read, the connection that commands, and the outcome of commands.
 use std::collections::BTreeMap;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,25 +16,26 @@ use crate::line::{Introduction, Policy, Role};
 use crate::log::CommandLog;
 use crate::owner::Line;
 
-/// What a PLC is called on the line.
+/// Name of the PLC client on the line.
 const NAME: &str = "the PLC (Modbus)";
-/// A connection that commands and has no watchdog, or a short one, is gone after so long without a request.
+/// Silence after which a commanding connection counts as lost: at least `GONE`, longer with a longer watchdog, and
+/// `GONE_UNWATCHED` without a watchdog.
 const GONE: Duration = Duration::from_secs(1);
 const GONE_UNWATCHED: Duration = Duration::from_secs(60);
 
-/// A connection of a PLC.
+/// Connection of a PLC.
 #[derive(Clone, Copy, Debug)]
 pub struct Connection {
-    /// Its number; numbers are not used again.
+    /// Number of the connection; numbers are not used again.
     pub number: u64,
-    /// Where it comes from.
+    /// Network address of the PLC.
     pub peer: SocketAddr,
 }
 
-/// Who writes the holding registers.
+/// PLC that writes the holding registers.
 struct Operator {
     address: IpAddr,
-    /// `None`: it has gone, or has let the lease go.
+    /// Number of its connection; `None` after it disconnected or released the lease.
     connection: Option<u64>,
     seen: Instant,
 }
@@ -42,10 +43,10 @@ struct Operator {
 struct State {
     handshake: Handshake,
     operator: Option<Operator>,
-    /// Coils of each connection that has written one.
+    /// Coils of each connection that has written a coil.
     coils: BTreeMap<u64, [bool; COILS.len()]>,
     commander: Arc<Commander>,
-    /// The last job, the event up to which it was looked at, and its runs.
+    /// Last job; the fields after it are the last event that was read, and the number of runs.
     job: Option<u64>,
     looked: u64,
     runs: u32,
@@ -53,7 +54,7 @@ struct State {
     asked: Option<Instant>,
 }
 
-/// The one device that all connections speak with.
+/// Modbus device that all connections share.
 pub struct Plc {
     pub(super) line: Line,
     pub(super) jobs: Arc<Jobs>,
@@ -63,7 +64,7 @@ pub struct Plc {
 }
 
 impl Plc {
-    /// That of a line; the number behind `sequence` is that of the first command.
+    /// Returns the device of a line; the first command has the number after `sequence`.
     pub fn new(
         line: Line,
         jobs: Arc<Jobs>,
@@ -75,7 +76,7 @@ impl Plc {
             handshake: Handshake::new(sequence),
             operator: None,
             coils: BTreeMap::new(),
-            // From now on: somebody's Stop concerns it also where it has not asked for anything yet.
+            // Joined now, so that Stops of other clients apply to this client even before its first request.
             commander: commander(&line),
             job: None,
             looked: 0,
@@ -86,7 +87,7 @@ impl Plc {
         Arc::new(Self { line, jobs, log, simulated, state: Mutex::new(state) })
     }
 
-    /// The response to a request.
+    /// Returns the response to a request.
     pub fn respond(self: &Arc<Self>, connection: &Connection, request: &[u8]) -> Vec<u8> {
         self.lock().asked = Some(Instant::now());
         let (response, done) = pdu::answer(request, &mut Asking { plc: self, connection });
@@ -96,7 +97,7 @@ impl Plc {
         response
     }
 
-    /// A connection has gone. The lease goes on until the watchdog, for a PLC that connects again.
+    /// Removes a connection. The lease lasts until the watchdog ends it, for a PLC that connects again.
     pub fn left(&self, connection: &Connection) {
         let mut state = self.lock();
         state.coils.remove(&connection.number);
@@ -105,7 +106,7 @@ impl Plc {
         }
     }
 
-    /// This connection commands, or one of its coils is 1: the arm stands because of it.
+    /// Returns `true` if this connection commands, or if one of its coils holds the arm.
     pub fn needs_its_place(&self, connection: u64) -> bool {
         let state = self.lock();
         let holds = state.coils.get(&connection).is_some_and(|coils| coils.contains(&true));
@@ -115,12 +116,12 @@ impl Plc {
             })
     }
 
-    /// Somebody has asked for something in the last time.
+    /// Returns `true` if a request was received within this time.
     pub fn is_asked(&self, within: Duration) -> bool {
         self.lock().asked.is_some_and(|asked| asked.elapsed() < within)
     }
 
-    /// The speed override is this, %.
+    /// Sets the displayed speed override, %.
     pub fn set_speed(&self, percent: Option<u16>) {
         self.lock().speed = percent;
     }
@@ -130,27 +131,27 @@ impl Plc {
         (state.job, state.runs, state.looked) = (Some(job), 0, 0);
     }
 
-    /// The client of the line that the commands are sent by.
+    /// Returns the client of the line that sends the commands.
     pub(super) fn commander(&self) -> Arc<Commander> {
         let mut state = self.lock();
         if self.line.with(|line, _| line.introduction(state.commander.client).is_none()) {
-            // It was put out.
+            // The client was disconnected from the line.
             state.commander = commander(&self.line);
         }
         state.commander.clone()
     }
 
-    /// A coil of some connection is 1: somebody wants the arm to stand.
+    /// Returns `true` if a coil of any connection is 1, which holds the arm.
     pub(super) fn is_held_by_a_coil(&self) -> bool {
         self.lock().coils.values().any(|coils| coils.contains(&true))
     }
 
-    /// What becomes of a motion without the PLC, and how long that takes.
+    /// Returns the policy for a motion without the PLC, and the time after which it applies.
     pub(super) fn watchdog(&self) -> (Policy, Duration) {
         watchdog(&self.lock().handshake)
     }
 
-    /// The PLC lets the lease go.
+    /// Releases the lease of the PLC.
     pub(super) fn resign(&self) {
         if let Some(operator) = &mut self.lock().operator {
             operator.connection = None;
@@ -161,7 +162,7 @@ impl Plc {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Somebody may not connect.
+    /// Logs a refused connection.
     pub fn refused(&self, peer: SocketAddr, why: &str) {
         let facts = json!({ "from": peer.to_string(), "path": "modbus", "why": why });
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
@@ -176,7 +177,7 @@ impl Plc {
         self.line.with(|line, _| line.lease().is_some_and(|lease| lease.holder == state.commander.client))
     }
 
-    /// A request of the connection that commands shows that it is there.
+    /// Renews the lease after a request of the connection that commands.
     fn renew(&self, connection: &Connection) {
         let mut state = self.lock();
         let Some(operator) =
@@ -191,13 +192,13 @@ impl Plc {
             let lives = |until: Option<Duration>| until.is_none_or(|until| now < until);
             if line.lease().is_some_and(|lease| lease.holder == client && lives(lease.until)) {
                 line.set_policy(client, policy);
-                // It has it.
+                // The client holds the lease, so this cannot fail.
                 let _ = line.take_lease(client, Some(lasts), now);
             }
         });
     }
 
-    /// What a connection is shown.
+    /// Returns the values that a connection can read.
     fn view(&self, connection: &Connection) -> View {
         let lost = self.line.lost().is_some();
         let mut state = self.lock();
@@ -241,7 +242,7 @@ impl Plc {
         }
     }
 
-    /// Runs that a job has finished, while it goes on.
+    /// Returns the number of runs that a running job has finished.
     fn runs(&self, state: &mut State, job: u64) -> u32 {
         if self.jobs.journal.last() != state.looked {
             let excerpt = self.jobs.journal.after(state.looked, Some(job), usize::from(u16::MAX));
@@ -255,7 +256,7 @@ impl Plc {
         state.runs
     }
 
-    /// Stops or pauses for a connection, ahead of all else.
+    /// Sends a Stop or a Pause of a connection, ahead of all other frames.
     fn halt(&self, connection: &Connection, command: ExecCommand) -> Result<(), Exception> {
         let (name, lost) = (format!("the PLC at {}", connection.peer.ip()), self.line.lost());
         let facts = json!({
@@ -265,7 +266,7 @@ impl Plc {
         if lost.is_some() {
             return Err(Exception::Failure);
         }
-        // After its own one it goes on when it likes.
+        // After its own Stop or Pause the connection may command again at once.
         let state = self.lock();
         let is_own = |operator: &Operator| operator.connection == Some(connection.number);
         let own = state.operator.as_ref().is_some_and(is_own).then_some(state.commander.client);
@@ -274,7 +275,7 @@ impl Plc {
         Ok(())
     }
 
-    /// Does what was commanded, and acknowledges it.
+    /// Executes a command and acknowledges it.
     fn obey(self: &Arc<Self>, connection: Connection, order: Order, busy: bool) {
         let halt = match order.command {
             Command::Stop => Some(ExecCommand::Stop),
@@ -290,7 +291,7 @@ impl Plc {
             let outcome = if busy { Outcome::Busy } else { Outcome::Done };
             return self.lock().handshake.acknowledge(order.sequence, outcome, 0);
         }
-        // A Stop that comes before it is begun is behind it.
+        // A Stop between now and the start of the command prevents it.
         let (plc, halt) = (self.clone(), self.line.last_halt());
         tokio::spawn(async move {
             let refusal = plc.act(&order, halt).await.err();
@@ -308,7 +309,7 @@ impl Plc {
 }
 
 impl Operator {
-    /// Nothing comes from it any more.
+    /// Returns `true` if no more requests arrive from the commanding connection.
     fn is_gone(&self, handshake: &Handshake) -> bool {
         let after = match handshake.watchdog_ms() {
             0 => GONE_UNWATCHED,
@@ -319,7 +320,7 @@ impl Operator {
 }
 
 impl State {
-    /// This connection writes the holding registers from now on, if no other one does. `leased`: a PLC has the lease.
+    /// Gives this connection the holding registers if no other connection has them. `leased`: a PLC holds the lease.
     fn operate(&mut self, connection: &Connection, leased: bool) -> Result<(), Exception> {
         let address = connection.peer.ip();
         let same = self.operator.as_ref().is_some_and(|operator| operator.address == address);
@@ -350,7 +351,7 @@ fn watchdog(handshake: &Handshake) -> (Policy, Duration) {
     (policy, Duration::from_millis(handshake.watchdog_ms().into()))
 }
 
-/// A connection that asks.
+/// Connection of the present request.
 struct Asking<'a> {
     plc: &'a Arc<Plc>,
     connection: &'a Connection,
@@ -384,7 +385,7 @@ impl Device for Asking<'_> {
         let before = coils;
         coils[usize::from(at)..][..values.len()].copy_from_slice(values);
         let rises = |coil: usize| coils[coil] && !before[coil];
-        // A Stop is more than a Pause.
+        // A Stop takes precedence over a Pause.
         if rises(map::STOP) {
             self.plc.halt(self.connection, ExecCommand::Stop)?;
         } else if rises(map::PAUSE) {

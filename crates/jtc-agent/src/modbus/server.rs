@@ -1,4 +1,4 @@
-//! Connections of PLCs: who may come, how many, how fast.
+//! Connections of PLCs: allowed addresses, number and request rate.
 use std::collections::BTreeMap;
 use std::io;
 use std::net::TcpListener;
@@ -17,34 +17,34 @@ use super::allow::Allowed;
 use super::pdu::{HEADER_LEN, Header};
 use super::plc::{Connection, Plc};
 
-/// Connections at once.
+/// Largest number of connections.
 pub const CONNECTIONS_MAX: usize = 8;
-/// One that neither commands nor holds the arm by a coil gives way to a new one when it has not asked for anything for so long.
+/// Silence after which a connection that neither commands nor holds the arm by a coil is closed for a new one.
 const GIVES_WAY: Duration = Duration::from_secs(2);
-/// One that has not asked for anything for so long is closed. Longer than the longest watchdog.
+/// Silence after which a connection is closed; longer than the longest watchdog.
 const IDLE: Duration = Duration::from_secs(90);
-/// How long a response may be left untaken.
+/// Longest time in which a response may stay unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
-/// Requests of a connection in a second, and at once.
+/// Largest number of requests of a connection: per second, and in one burst.
 const REQUESTS_PER_S: f64 = 250.0;
 const REQUESTS_AT_ONCE: f64 = 50.0;
-/// How often is looked whether it is to end.
+/// Interval at which the end condition is checked.
 const LOOK: Duration = Duration::from_millis(50);
-/// How often the controller is asked for its speed override, while somebody asks for anything.
+/// Interval at which the controller is asked for its speed override, while a PLC sends requests.
 const SPEED: Duration = Duration::from_secs(2);
 
-/// A Modbus server, on a thread of its own, until it is dropped.
+/// Modbus server on a thread of its own; it ends on drop.
 pub struct Server {
     ended: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Server {
-    /// Serves `plc` at `listener`, for those who are allowed.
+    /// Serves `plc` at `listener` for the allowed addresses.
     ///
     /// # Errors
     ///
-    /// The system has no threads, or the listener fails.
+    /// The system cannot start threads, or the listener fails.
     pub fn start(listener: TcpListener, allowed: Allowed, plc: Arc<Plc>) -> io::Result<Self> {
         listener.set_nonblocking(true)?;
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -84,7 +84,7 @@ async fn until(ended: &AtomicBool) {
     }
 }
 
-/// Keeps the speed override that is shown the one that the controller has.
+/// Updates the displayed speed override from the controller.
 async fn ask_speed(plc: &Plc) {
     loop {
         if plc.is_asked(SPEED) && plc.line.lost().is_none() {
@@ -96,25 +96,25 @@ async fn ask_speed(plc: &Plc) {
     }
 }
 
-/// A connection that is open.
+/// Open connection.
 struct Open {
-    /// When it asked for something last, ms.
+    /// Time of the last request, ms.
     seen: Arc<AtomicU64>,
     abort: AbortHandle,
 }
 
 type Connections = Arc<Mutex<BTreeMap<u64, Open>>>;
 
-/// Takes connections for ever.
+/// Accepts connections without end.
 async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc<Plc>) {
     let (connections, start, mut last) = (Connections::default(), Instant::now(), 0);
     loop {
         let Ok((stream, peer)) = listener.accept().await else {
-            // No more files, for the time being.
+            // The limit of open files is reached for now.
             tokio::time::sleep(LOOK).await;
             continue;
         };
-        // Closed at once.
+        // Closed at once by the drop of the stream.
         if !allowed.contains(peer.ip()) {
             plc.refused(peer, "this address may not connect: --modbus-allow names those that may");
             continue;
@@ -129,13 +129,14 @@ async fn accept(listener: &tokio::net::TcpListener, allowed: &Allowed, plc: &Arc
         let gone = Gone { connection, plc: plc.clone(), connections: connections.clone() };
         let mut open = lock(&connections);
         let conversing = converse(stream, gone, seen.clone(), start);
-        // It cannot end before it is among them: they are locked, and this thread runs it.
+        // The lock is held and this thread runs the connection, so it cannot end before it is in the list.
         open.insert(last, Open { seen, abort: tokio::spawn(conversing).abort_handle() });
     }
 }
 
-/// There is a place for another connection, where need be that of one that asks for nothing. Where all hold the arm there is none: it stands, and
-/// nothing can begin to move it.
+/// Makes room for another connection, if necessary by closing an idle one. Returns `false` if no connection can be
+/// closed: those that are left command, hold the arm by a coil, or are not idle long enough. If all of them hold the
+/// arm, it stands, and no motion can begin.
 fn make_room(connections: &Connections, plc: &Plc, start: Instant) -> bool {
     let mut open = lock(connections);
     if open.len() < CONNECTIONS_MAX {
@@ -161,7 +162,7 @@ fn millis(since: Instant) -> u64 {
     u64::try_from(since.elapsed().as_millis()).unwrap_or(u64::MAX)
 }
 
-/// A connection is gone when this is.
+/// Removes its connection on drop.
 struct Gone {
     connection: Connection,
     plc: Arc<Plc>,
@@ -175,15 +176,15 @@ impl Drop for Gone {
     }
 }
 
-/// Requests and responses, until one end has gone, or sends what is no Modbus.
+/// Answers requests until one end disconnects or the client sends invalid Modbus.
 async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start: Instant) {
-    // A response is not to wait for more.
+    // A response must be sent at once, without waiting for more data.
     let _ = stream.set_nodelay(true);
     let mut pace = Pace::new();
     let mut request = Vec::new();
     loop {
         let Ok(Some(header)) = timeout(IDLE, read(&mut stream, &mut request)).await else { return };
-        // Whoever asks faster waits for its own answers, and for nobody else's.
+        // Per-connection rate limit: a fast client delays only itself.
         tokio::time::sleep(pace.wait(Instant::now())).await;
         seen.store(millis(start), Ordering::Relaxed);
         let response = header.respond(&gone.plc.respond(&gone.connection, &request));
@@ -193,7 +194,7 @@ async fn converse(mut stream: TcpStream, gone: Gone, seen: Arc<AtomicU64>, start
     }
 }
 
-/// Reads a request; `None`: there is none, nor any more.
+/// Reads a request; `None`: the connection has ended.
 async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
     let mut head = [0; HEADER_LEN];
     stream.read_exact(&mut head).await.ok()?;
@@ -203,7 +204,7 @@ async fn read(stream: &mut TcpStream, request: &mut Vec<u8>) -> Option<Header> {
     Some(header)
 }
 
-/// How fast a connection may ask.
+/// Rate limit of a connection.
 struct Pace {
     allowance: f64,
     at: Instant,
@@ -214,7 +215,7 @@ impl Pace {
         Self { allowance: REQUESTS_AT_ONCE, at: Instant::now() }
     }
 
-    /// How long the next request has to wait.
+    /// Returns the time that the next request must wait.
     fn wait(&mut self, now: Instant) -> Duration {
         let passed = now.saturating_duration_since(self.at).as_secs_f64();
         self.allowance = (self.allowance + passed * REQUESTS_PER_S).min(REQUESTS_AT_ONCE) - 1.0;
@@ -231,7 +232,7 @@ mod tests {
     fn whoever_asks_faster_than_it_may_waits() {
         let (mut pace, begin) = (Pace::new(), Instant::now());
         pace.at = begin;
-        // Each as soon as the one before was answered: so many as are free, then at the rate.
+        // Each request follows the answer to the one before: first a burst, then the limited rate.
         let mut now = begin;
         for _ in 0..1000 {
             now += pace.wait(now);

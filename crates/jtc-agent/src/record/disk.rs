@@ -1,4 +1,4 @@
-//! Writing recordings: a thread of its own, which a slow or full disk holds up alone.
+//! Writer of recordings, on a thread of its own, so that a slow or full disk delays nothing else.
 #[cfg(test)]
 mod tests;
 
@@ -16,40 +16,40 @@ use serde_json::{Value, json};
 
 use super::shelf::{Begun, Shelf};
 
-/// Samples that may wait for the disk: minutes of statuses.
+/// Largest number of samples that wait for the disk: minutes of statuses.
 const WAITING_MAX: usize = 1 << 13;
-/// Room that samples leave to what begins and ends recordings.
+/// Queue places that samples leave free for the start and end of recordings.
 const RESERVED: usize = 64;
-/// A disk that took nothing is tried again after this time.
+/// Time after which a failed write is tried again.
 const AGAIN: Duration = Duration::from_secs(5);
 
-/// What is to be written.
+/// Message to the writer's thread.
 enum Message {
     Begin(Box<RecordingInfo>),
     Sample(Box<Sample>),
-    /// How it ended, and how many samples did not get here.
+    /// End of the recording, and number of samples lost before the queue.
     End(Ending, u64),
 }
 
-/// Something that people want to know.
+/// Notice for the user.
 #[derive(Clone, Debug)]
 pub struct Notice {
-    /// A word for logs.
+    /// Keyword for logs.
     pub what: &'static str,
-    /// What is known of it.
+    /// Facts of the notice.
     pub facts: Value,
-    /// For people; `None` where nothing is wrong.
+    /// Warning for people; `None` without a problem.
     pub warning: Option<String>,
 }
 
-/// Called with a notice, on the writer's thread.
+/// Callback for a notice, on the writer's thread.
 pub type Notify = Box<dyn FnMut(Notice) + Send>;
 
-/// The end of the queue at which samples come.
+/// Input of the writer's queue.
 pub struct Disk {
     queue: SyncSender<Message>,
     waiting: Arc<AtomicUsize>,
-    /// Samples of this recording that found no room.
+    /// Number of samples of this recording that found no place.
     lost: u64,
 }
 
@@ -59,7 +59,7 @@ impl Disk {
         (Self { queue, waiting: Arc::default(), lost: 0 }, messages)
     }
 
-    /// Begins the thread that writes into `shelf`.
+    /// Starts the thread that writes into `shelf`.
     pub fn begin(shelf: Shelf, notify: Notify) -> io::Result<(Self, JoinHandle<()>)> {
         let (disk, messages) = Self::new();
         let taken = disk.waiting.clone();
@@ -82,48 +82,48 @@ impl Disk {
         sent
     }
 
-    /// Begins a recording. Never waits, as the others.
+    /// Begins a recording. Like the other methods, never waits.
     pub fn open(&mut self, info: RecordingInfo) {
         self.lost = 0;
         self.send(Message::Begin(Box::new(info)), 0);
     }
 
-    /// A sample of it; one that finds no room is counted.
+    /// Queues a sample; counts it as lost if the queue is full.
     pub fn write(&mut self, sample: &Sample) {
         if !self.send(Message::Sample(Box::new(*sample)), RESERVED) {
             self.lost += 1;
         }
     }
 
-    /// So many samples of it were lost before they got here.
+    /// Adds a number of samples that were lost before this queue.
     pub fn lose(&mut self, samples: u64) {
         self.lost += samples;
     }
 
-    /// Ends it.
+    /// Ends the recording.
     pub fn close(&mut self, ending: Ending) {
         let lost = std::mem::take(&mut self.lost);
         self.send(Message::End(ending, lost), 0);
     }
 }
 
-/// A file that is being written.
+/// File that is being written.
 struct Open {
     recorder: Recorder,
     begun: Begun,
 }
 
-/// The writer's thread.
+/// State of the writer's thread.
 struct Writer {
     shelf: Shelf,
     notify: Notify,
     open: Option<Open>,
-    /// The recording that is to be written, also while the disk takes none.
+    /// Current recording, kept also while it cannot be written.
     wanted: Option<Box<RecordingInfo>>,
     failed: Option<Instant>,
-    /// When it is tried again then.
+    /// Interval until the next attempt.
     again: Duration,
-    /// Samples that could not be written.
+    /// Number of samples that could not be written.
     lost: u64,
 }
 
@@ -143,7 +143,7 @@ impl Writer {
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
-                    // Nobody announced its end.
+                    // The queue closed without an end of the recording.
                     self.end(&Ending::default());
                     return;
                 }
@@ -189,19 +189,19 @@ impl Writer {
         (self.notify)(Notice { what, facts, warning });
     }
 
-    /// Removes old recordings where these take too much room.
+    /// Removes old recordings that exceed the limit.
     fn make_room(&mut self, bytes: u64) {
         for path in self.shelf.make_room(bytes) {
             self.notice("recording-removed", json!({ "file": path }), None);
         }
     }
 
-    /// Begins the file of the recording that is wanted.
+    /// Creates the file of the current recording.
     fn begin(&mut self) {
         let Some(info) = &self.wanted else { return };
         let made = self.shelf.begin(host_kit::unix_time()).map_err(|e| e.to_string());
         let begun = made.and_then(|(file, begun)| {
-            // What precedes all samples is written now: a disk that takes nothing is known before them.
+            // The file header is written now, so that a disk error is found before the first sample.
             let recorder = Recorder::on(file, &begun.path, info)
                 .and_then(|mut recorder| recorder.flush().map(|()| recorder));
             match recorder {
@@ -226,7 +226,7 @@ impl Writer {
         }
     }
 
-    /// The disk does not take it: reported once, until it takes something again.
+    /// Handles a write error: reports it once, until a write succeeds again.
     fn fail(&mut self, error: &str) {
         let file = self.break_off();
         if self.failed.replace(Instant::now()).is_none() {
@@ -237,17 +237,17 @@ impl Writer {
         }
     }
 
-    /// Ends the file as it is.
+    /// Ends the file incomplete.
     fn break_off(&mut self) -> Option<PathBuf> {
         let Open { recorder, begun } = self.open.take()?;
         let (path, samples) = (begun.path.clone(), recorder.samples());
-        // It tries to complete the file, and nobody minds where that fails.
+        // The drop tries to complete the file; a failure has no consequence.
         drop(recorder);
         self.shelf.break_off(begun, samples);
         Some(path)
     }
 
-    /// Hands everything to the operating system, and begins another file where this one is long.
+    /// Passes all data to the operating system, and begins another file if this one is long.
     fn flush(&mut self) {
         let Some(open) = &mut self.open else { return };
         if let Err(error) = open.recorder.flush() {
@@ -266,7 +266,7 @@ impl Writer {
         }
     }
 
-    /// The motion is over.
+    /// Ends the current recording.
     fn end(&mut self, ending: &Ending) {
         self.complete(ending);
         self.wanted = None;

@@ -1,8 +1,8 @@
-//! Recordings of every motion, whoever commanded it: a client of the agent that only looks.
+//! Recordings of every motion of any client, made by a client of the agent with read-only access.
 //!
-//! [`Prepared`] opens the directory, [`Witness`] sees what goes over the line, [`Recorder`] follows the statuses. Two threads do that: one
-//! follows, and one writes, which a slow disk holds up alone. Neither holds up the line: what finds no room between them is counted, and
-//! the recording states how much.
+//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses.
+//! One thread follows and another one writes, so a slow disk delays only the writer. Neither thread delays the line:
+//! samples that find no place between them are counted, and the recording contains their number.
 mod disk;
 mod motion;
 mod shelf;
@@ -32,41 +32,41 @@ use shelf::Shelf;
 
 pub use disk::{Notice, Notify};
 
-/// Frames that wait for the follower.
+/// Largest number of frames that wait for the follower.
 const SEEN_MAX: usize = 256;
-/// Statuses that wait while the controller is asked who it is.
+/// Largest number of statuses that wait while the controller is asked for its identity.
 const ARRIVED_MAX: usize = 1 << 12;
-/// Longest that is waited for a status before it is looked whether all is to end.
+/// Longest wait for a status before the end condition is checked.
 const LOOK: Duration = Duration::from_millis(50);
-/// A line on which nothing was commanded for so long is quiet: the controller may be asked who it is.
+/// Time without a command after which the line is quiet enough to ask the controller for its identity.
 const QUIET: Duration = Duration::from_millis(300);
-/// A controller that did not answer is asked again after this time.
+/// Time after which a controller that did not answer is asked again.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
-/// Longest that the end waits for the disk.
+/// Longest wait for the disk at the end.
 const LAST_WORDS: Duration = Duration::from_secs(5);
-/// As others see the recorder on the line.
+/// Name of the recorder on the line.
 const NAME: &str = "recorder of the agent";
 
-/// What goes to the controller, as far as recordings need it.
+/// Frame to the controller, as far as recordings need it.
 enum Seen {
     /// A Trajectory frame.
     Segment(Vec<u8>),
-    /// Whether such a frame was accepted.
+    /// Answer to such a frame; `true` if it was accepted.
     Answered(bool),
-    /// A Jog, at this time of the line.
+    /// Jog, with its time of the line.
     Jog(Duration),
-    /// Something that may change the arm, at this time of the line.
+    /// Frame that may change the arm, with its time of the line.
     Change(Duration),
 }
 
-/// Sees what happens on the line, for the recorder. It never waits.
+/// Passes events of the line to the recorder. Never waits.
 pub struct Witness {
     seen: SyncSender<Seen>,
     missed: Arc<AtomicBool>,
 }
 
 impl Witness {
-    /// Something happened on the line.
+    /// Takes an event of the line.
     pub fn see(&self, now: Duration, event: &LineEvent) {
         let seen = match event {
             LineEvent::Sent { frame_type: FrameType::Trajectory, bytes, .. } => Seen::Segment(bytes.clone()),
@@ -84,7 +84,7 @@ impl Witness {
     }
 }
 
-/// A directory for recordings, and what is needed to begin.
+/// Directory for recordings, ready to begin.
 pub struct Prepared {
     shelf: Shelf,
     witness: Option<Witness>,
@@ -93,11 +93,11 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Opens the directory, or makes it; recordings take no more than `limit` bytes of it.
+    /// Opens or creates the directory; recordings use at most `limit` bytes of it.
     ///
     /// # Errors
     ///
-    /// It cannot be made or written to, or another agent records into it.
+    /// The directory cannot be created or written, or another agent records into it.
     pub fn open(dir: &Path, limit: u64) -> io::Result<Self> {
         let (sender, seen) = sync_channel(SEEN_MAX);
         let missed = Arc::new(AtomicBool::new(false));
@@ -105,16 +105,16 @@ impl Prepared {
         Ok(Self { shelf: Shelf::open(dir, limit)?, witness, seen, missed })
     }
 
-    /// Sees what happens on the line: for the observer of its owner. There is one.
+    /// Returns the witness for the observer of the line's owner, once.
     pub fn witness(&mut self) -> Option<Witness> {
         self.witness.take()
     }
 
-    /// Begins to record what happens on `line`, which `source` is a name of.
+    /// Begins to record the motions on `line`; `source` is its name.
     ///
     /// # Errors
     ///
-    /// The system has no threads.
+    /// The system cannot start threads.
     pub fn begin(self, line: Line, source: &str, notify: Notify) -> io::Result<Recorder> {
         let Self { shelf, seen, missed, .. } = self;
         let (disk, writer) = Disk::begin(shelf, notify)?;
@@ -139,14 +139,14 @@ impl Prepared {
     }
 }
 
-/// Records until it is dropped.
+/// Recorder that runs until it is dropped.
 pub struct Recorder {
     ended: Arc<AtomicBool>,
     threads: Vec<JoinHandle<()>>,
 }
 
 impl Recorder {
-    /// Ends a recording that is being made, and waits until it is written; not for ever for a disk that does not take it.
+    /// Ends the current recording and waits, for a limited time, until it is written.
     pub fn end(self) {}
 }
 
@@ -160,7 +160,7 @@ impl Drop for Recorder {
     }
 }
 
-/// Who the controller is.
+/// Identity of the controller and its arm.
 struct Identity {
     arm: Arm,
     device: Option<DeviceIdentity>,
@@ -169,31 +169,32 @@ struct Identity {
 }
 
 impl Identity {
-    /// That of a device which does not report it. One whose hash is that of the built-in arm need not be asked for more.
+    /// Returns the identity of a device that does not report it. A controller with the hash of the built-in arm need
+    /// not be asked for more.
     fn built_in() -> Self {
         let arm = Arm::avena();
         Self { delay_ticks: arm.config().delay_ticks, hash: arm.hash().ok().flatten(), arm, device: None }
     }
 }
 
-/// The arm may be another than it was.
+/// Possible change of the arm.
 struct Doubt {
-    /// Since this time of the line.
+    /// Time of the line since when the arm is uncertain.
     since: Duration,
     asked: Option<Duration>,
 }
 
-/// A recording that is being made.
+/// Recording in progress.
 struct Reel {
     trajectory: Option<Arc<Trajectory>>,
-    /// It begins with the first status.
+    /// Clock of the recording; it begins with the first status.
     clock: Option<StatusClock>,
 }
 
-/// Statuses with the times at which they came, and how many found no room.
+/// Statuses with their arrival times, and number of statuses that found no place.
 type Arrived = Rc<RefCell<(VecDeque<(Duration, Status)>, u64)>>;
 
-/// The thread that follows.
+/// State of the following thread.
 struct Following {
     seen: Receiver<Seen>,
     missed: Arc<AtomicBool>,
@@ -206,7 +207,7 @@ struct Following {
     reel: Option<Reel>,
 }
 
-/// A client that looks, and what it receives whatever it does.
+/// Connects a client with read-only access. Returns its session, and the queue of its received statuses.
 fn connect(line: &Line) -> (Session<ClientPort>, Arrived) {
     let introduction = Introduction { name: NAME.into(), role: Role::Viewer, policy: Policy::Continue };
     let mut session = Session::new(line.connect(introduction));
@@ -234,7 +235,7 @@ impl Following {
                     self.follow(steps, &mut session);
                     return;
                 }
-                // It was put out, for a computer that stood still: it comes again.
+                // The client was disconnected because the computer was suspended: it connects again.
                 (session, arrived) = connect(line);
             }
             self.take_seen();
@@ -272,7 +273,7 @@ impl Following {
         }
     }
 
-    /// A controller that starts may have another arm, and has no trajectory.
+    /// Takes a status: a controller that starts may have another arm, and has no trajectory.
     fn look_at(&mut self, now: Duration, status: &Status) {
         if status.state.is_in(&[ControllerState::Start, ControllerState::Init]) {
             self.upload.forget();
@@ -280,8 +281,8 @@ impl Following {
         }
     }
 
-    /// Asks who the controller is where that is in doubt, while the line is quiet. No more often than needed: for the controller's
-    /// supervision of its host each question is a sign of it (J-59).
+    /// Asks for the identity of the controller if it is uncertain and the line is quiet. Asks no more often than
+    /// needed, because host supervision counts each question as a sign of life (J-59).
     fn resolve_doubt(&mut self, session: &mut Session<ClientPort>) {
         let now = session.now();
         let due = self.doubt.as_ref().is_some_and(|doubt| {
@@ -293,14 +294,14 @@ impl Following {
         }
     }
 
-    /// Asks who the controller is, and what its arm is where that is another one.
+    /// Asks for the identity of the controller, and for its arm if it has changed.
     fn ask(&mut self, session: &mut Session<ClientPort>) {
         let asked = Some(session.now());
         if let Some(doubt) = &mut self.doubt {
             doubt.asked = asked;
         }
         let identity = match session.info() {
-            // A device of the protocol without extensions.
+            // Controller without the extensions of the protocol.
             Ok(None) => Some(Identity::built_in()),
             Ok(Some(info)) if self.identity.hash == Some(info.hash) => {
                 self.identity.device = Some((&info).into());
@@ -349,7 +350,7 @@ impl Following {
         }
     }
 
-    /// Begins a recording whose first status came at `from`.
+    /// Begins a recording whose first status arrived at `from`.
     fn begin(&mut self, motion: Motion, from: Duration, session: &Session<ClientPort>) {
         let trajectory = match motion {
             Motion::Execution => self.upload.trajectory(true),

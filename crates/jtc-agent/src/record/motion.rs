@@ -1,4 +1,4 @@
-//! When a recording begins and ends, from the statuses of the controller alone: whoever commanded the motion.
+//! Start and end of recordings, found from the statuses alone, for motions of any client.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -6,34 +6,34 @@ use jtc_host::recording::Ending;
 use jtc_host::words;
 use jtc_wire::{ControllerState, Status, TrajectoryState};
 
-/// What of the time before a motion is recorded with it.
+/// Time before a motion that is recorded with it.
 const BEFORE: Duration = Duration::from_millis(500);
-/// Most statuses of that.
+/// Largest number of statuses in this time.
 const BEFORE_MAX: usize = 256;
-/// An arm that has rested for so long behind its motion rests.
+/// Time at rest after a motion until its recording ends.
 const REST: Duration = Duration::from_millis(500);
-/// A motion that has ended is over after so long also where the arm is not quite at rest.
+/// Time after the end of a motion until its recording ends even if the arm is not quite at rest.
 const OVER: Duration = Duration::from_secs(5);
-/// While the arm stands in a pause, or is taught and not led, nothing more is recorded after this time.
+/// Time after which recording stops while the arm stands in a pause, or in Teaching without being led.
 const STANDS: Duration = Duration::from_secs(10);
-/// A Jog acts for so long (J-58), and some time on its way.
+/// Time for which a Jog acts (J-58), plus its time on the line.
 const JOG: Duration = Duration::from_millis(400);
-/// Without a status for so long the motion is out of sight.
+/// Time without a status after which the motion counts as lost.
 pub const SILENT: Duration = Duration::from_secs(2);
 
 /// Kinds of motions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// Along a trajectory: a run, or the way to its first point.
+    /// Motion along a trajectory: a run, or the approach to its first point.
     Execution,
-    /// Joints at given velocities.
+    /// Jog: joints with commanded velocities.
     Jog,
-    /// By hand.
+    /// Teaching: the arm is led by hand.
     Teaching,
 }
 
 impl Motion {
-    /// As recordings name it.
+    /// Returns the name in recordings.
     pub fn name(self) -> &'static str {
         match self {
             Self::Execution => "execution",
@@ -43,29 +43,29 @@ impl Motion {
     }
 }
 
-/// What is to be done.
+/// Step of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
-    /// A recording begins, with a status that came at this time.
+    /// Begins a recording, with a status that arrived at this time.
     Begin(Motion, Duration),
-    /// A status belongs to it.
+    /// Adds a status.
     Status(Duration, Box<Status>),
-    /// It ends.
+    /// Ends the recording.
     End(Ending),
 }
 
-/// A recording that was begun.
+/// Recording in progress.
 struct Open {
     motion: Motion,
-    /// Since when the arm stands in a pause or unled.
+    /// Time since when the arm stands in a pause, or in Teaching without being led.
     stands: Option<Duration>,
-    /// Since when its motion is over, and since when the arm rests.
+    /// Time since when the motion is over, and since when the arm rests.
     over: Option<Duration>,
     rests: Option<Duration>,
     last: Status,
 }
 
-/// Follows the statuses.
+/// Finds recordings in a stream of statuses.
 #[derive(Default)]
 pub struct Follower {
     before: VecDeque<(Duration, Status)>,
@@ -75,21 +75,21 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// A Jog was sent.
+    /// Notes that a Jog was sent.
     pub fn jog(&mut self, now: Duration) {
         self.jogged = Some(now);
     }
 
-    /// A recording was begun and has not ended.
+    /// Returns `true` while a recording is in progress.
     pub fn is_recording(&self) -> bool {
         self.open.is_some()
     }
 
-    /// The next status, which came at this time.
+    /// Takes the next status, which arrived at `now`.
     pub fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
-        // Another motion has a recording of its own, also right behind the last one.
+        // Another motion gets a recording of its own, even directly after the last one.
         let another = motion.is_some_and(|motion| {
             self.open.as_ref().is_some_and(|open| open.motion != motion)
                 || motion == Motion::Execution && self.begins_anew(status)
@@ -123,7 +123,7 @@ impl Follower {
         steps
     }
 
-    /// No status has come until now.
+    /// Notes that no status has arrived until `now`.
     pub fn silence(&mut self, now: Duration) -> Vec<Step> {
         let silent = self.last.is_some_and(|(at, ..)| now.saturating_sub(at) > SILENT);
         if !silent {
@@ -132,7 +132,7 @@ impl Follower {
         self.end("fault", &format!("no status came for {} s", SILENT.as_secs()))
     }
 
-    /// Nobody follows any more: why.
+    /// Ends the recording because following ends, with the given reason.
     pub fn end(&mut self, outcome: &str, reason: &str) -> Vec<Step> {
         self.last = None;
         self.before.clear();
@@ -140,10 +140,10 @@ impl Follower {
         self.open.take().map(|_| Step::End(ending)).into_iter().collect()
     }
 
-    /// What moves the arm, if anything does.
+    /// Returns the kind of motion, if the arm moves.
     fn motion(&mut self, now: Duration, status: &Status) -> Option<Motion> {
         if status.state != ControllerState::HoldPos {
-            // It acts in HoldPos only.
+            // A Jog acts only in HoldPos.
             self.jogged = None;
         }
         if status.is_executing() {
@@ -158,7 +158,7 @@ impl Follower {
         }
     }
 
-    /// The execution of this status is not the one of the last.
+    /// Returns `true` if this status belongs to another execution than the last one.
     fn begins_anew(&self, status: &Status) -> bool {
         self.last.is_none_or(|(_, trajectory, point)| {
             !matches!(trajectory, TrajectoryState::Execute | TrajectoryState::Pause) || status.point < point
@@ -191,7 +191,7 @@ impl Open {
     }
 }
 
-/// How a motion ended of which this is the last status.
+/// Returns the ending of a motion with this last status.
 fn ending(motion: Motion, status: &Status) -> Ending {
     let fault = status.state == ControllerState::Error || status.errors != 0;
     let (outcome, reason) = match (motion, status.trajectory.known()) {
@@ -208,12 +208,12 @@ fn ending(motion: Motion, status: &Status) -> Ending {
 mod tests {
     use super::*;
 
-    /// An arm that reports every 40 ms.
+    /// Arm that reports every 40 ms.
     struct Arm {
         follower: Follower,
         now: Duration,
         status: Status,
-        /// Begin, End and how many statuses lie between.
+        /// Begin and End, with the number of statuses between them.
         seen: Vec<String>,
         statuses: usize,
     }
@@ -286,7 +286,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(60_000);
         assert_eq!(arm.take(), ["begin execution", "stopped"]);
-        // Half a second before it, 4.4 s in motion, half a second of rest.
+        // Half a second before the motion, 4.4 s in motion, half a second at rest.
         assert!((130..=140).contains(&arm.statuses), "{}", arm.statuses);
     }
 
@@ -300,7 +300,7 @@ mod tests {
             arm.is(HoldPos, end, 0.0);
             arm.run_ms(200);
         }
-        // The next one begins while the arm has not rested for long, or between two statuses.
+        // The next motion begins after a short rest, or between two statuses.
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(400);
         arm.status.point = 0;
@@ -355,7 +355,7 @@ mod tests {
         arm.is(HoldPos, Stop, 0.0);
         arm.run_ms(2_000);
         assert_eq!(arm.take(), ["begin teaching", "finished"]);
-        // One right behind the other.
+        // Two motions directly after each other.
         arm.follower.jog(arm.now);
         arm.run_ms(120);
         arm.is(Teaching, Stop, 0.3);
@@ -375,7 +375,7 @@ mod tests {
         let mut arm = Arm::new();
         arm.is(Operate, Execute, 0.3);
         arm.run_ms(2_000);
-        // Some statuses that are missing end nothing.
+        // A few missing statuses do not end a recording.
         arm.now += Duration::from_millis(1_500);
         arm.status.point += 1_500;
         arm.run_ms(2_000);

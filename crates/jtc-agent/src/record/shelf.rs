@@ -1,7 +1,7 @@
-//! The directory with the recordings of an agent: their names, how much room they take, and which of them go first.
+//! Recording directory: file names, size limit, and deletion of the oldest recordings.
 //!
-//! A list beside them has the names of those that were made here, so that no other file is ever removed. It is locked: two agents do not
-//! share a directory.
+//! A list in the directory names the recordings made here, so that no other file is ever removed. The list is locked,
+//! so two agents cannot share a directory.
 use std::collections::VecDeque;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -10,21 +10,21 @@ use std::time::Duration;
 
 /// Name of the list.
 pub const LIST: &str = ".jtc-recordings";
-/// Ending of a recording that is whole.
+/// Ending of a complete recording.
 const WHOLE: &str = ".mcap";
-/// Ending of one that is being made, or broke off: every command reads it, too.
+/// Ending of a recording that is incomplete or in progress; every command can read it, too.
 const PART: &str = ".part.mcap";
-/// Lines of the list of files that are gone, before it is written anew.
+/// Number of list lines for removed files after which the list is rewritten.
 const GONE_MAX: usize = 10_000;
 
-/// A recording that was made here.
+/// Recording that was made here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Own {
-    /// Without its ending.
+    /// Name without its ending.
     name: String,
-    /// Bytes, where it is not being written; a file of another length is not ours any more.
+    /// Length in bytes, unless it is being written; a file of another length no longer counts as made here.
     bytes: u64,
-    /// It broke off, or is being written.
+    /// `true` if the recording is incomplete or in progress.
     part: bool,
 }
 
@@ -34,34 +34,34 @@ impl Own {
     }
 }
 
-/// Makes a file that is not there.
+/// Function that creates a new file.
 type Make = fn(&Path) -> io::Result<File>;
 
-/// The directory.
+/// Recording directory.
 pub struct Shelf {
     dir: PathBuf,
     make: Make,
     limit: u64,
     list: File,
-    /// Oldest first, without the one that is being written.
+    /// Recordings, oldest first, without the one in progress.
     own: VecDeque<Own>,
     number: u64,
     gone: usize,
 }
 
-/// A recording that is being made.
+/// Recording in progress.
 pub struct Begun {
-    /// Where it is written.
+    /// Path of its file.
     pub path: PathBuf,
     name: String,
 }
 
 impl Shelf {
-    /// Goes on with a directory, or makes it. `limit`: bytes that all recordings take together.
+    /// Opens or creates a directory. `limit`: largest size of all recordings together, bytes.
     ///
     /// # Errors
     ///
-    /// It cannot be made or written to, or another agent has it.
+    /// The directory cannot be created or written, or another agent uses it.
     pub fn open(dir: &Path, limit: u64) -> io::Result<Self> {
         std::fs::create_dir_all(dir)?;
         let path = dir.join(LIST);
@@ -84,7 +84,7 @@ impl Shelf {
         Ok(shelf)
     }
 
-    /// Takes in a line of the list; what is no such line is passed over.
+    /// Takes a line of the list; ignores invalid lines.
     fn take_line(&mut self, line: &str) {
         let mut words = line.split(' ');
         let (Some(what), Some(name), bytes) = (words.next(), words.next(), words.next()) else { return };
@@ -100,8 +100,8 @@ impl Shelf {
         }
     }
 
-    /// Looks what is there of it: files that somebody removed or wrote to are not ours any more. Of one whose agent was killed nobody knows
-    /// the length.
+    /// Checks the listed files: files that were removed or changed from outside no longer count as made here. The
+    /// length of a recording whose agent was killed is not known.
     fn look(&mut self) {
         let dir = self.dir.clone();
         self.own.retain_mut(|own| match length(&own.path(&dir)) {
@@ -113,12 +113,12 @@ impl Shelf {
         });
     }
 
-    /// Writes the list anew, without what is gone.
+    /// Rewrites the list without removed files.
     fn rewrite(&mut self) -> io::Result<()> {
         let mut text = String::new();
         let line =
             |own: &Own| format!("{} {} {}\n", if own.part { "part" } else { "end" }, own.name, own.bytes);
-        // The number goes on behind recordings that are gone.
+        // The number continues after removed recordings.
         if self.number > 0 {
             text += &format!("gone {}\n", name(Duration::ZERO, self.number));
         }
@@ -129,22 +129,22 @@ impl Shelf {
         Ok(())
     }
 
-    /// Appends a line to the list, whole or not at all.
+    /// Appends a line to the list, completely or not at all.
     fn note(&mut self, line: &str) -> io::Result<()> {
         let end = self.list.seek(SeekFrom::End(0))?;
         let written = self.list.write_all(format!("{line}\n").as_bytes());
         if written.is_err() {
-            // It is no worse than before.
+            // The list is as before, even if this fails.
             let _ = self.list.set_len(end);
         }
         written
     }
 
-    /// Begins a file with the next number, at this time since 1970. It is in the list before it is there.
+    /// Creates a file with the next number, at this time since 1970. Its name is added to the list first.
     ///
     /// # Errors
     ///
-    /// The disk takes nothing.
+    /// The disk cannot be written.
     pub fn begin(&mut self, now: Duration) -> io::Result<(File, Begun)> {
         loop {
             let name = name(now, self.number + 1);
@@ -152,7 +152,7 @@ impl Shelf {
                 (self.dir.join(format!("{name}{WHOLE}")), self.dir.join(format!("{name}{PART}")));
             self.number += 1;
             if whole.symlink_metadata().is_ok() || path.symlink_metadata().is_ok() {
-                // Somebody else's, by its name.
+                // A file of this name exists and was not made here.
                 continue;
             }
             self.note(&format!("begin {name}"))?;
@@ -161,11 +161,11 @@ impl Shelf {
         }
     }
 
-    /// A recording is whole: it gets its name.
+    /// Completes a recording: it gets its final name.
     ///
     /// # Errors
     ///
-    /// It is there under its other name.
+    /// The recording keeps its name for incomplete ones.
     pub fn end(&mut self, begun: Begun) -> io::Result<PathBuf> {
         let bytes = length(&begun.path).unwrap_or(0);
         let mut own = Own { name: begun.name, bytes, part: true };
@@ -177,12 +177,12 @@ impl Shelf {
         renamed.and(noted).map(|()| whole)
     }
 
-    /// A recording breaks off: what is there of it stays, if it is anything.
+    /// Ends a recording incomplete; the file is kept if it has samples.
     pub fn break_off(&mut self, begun: Begun, samples: u64) {
         if samples == 0 && std::fs::remove_file(&begun.path).is_ok() {
             let _ = self.note(&format!("gone {}", begun.name));
             self.gone += 1;
-            // The next one may have its number.
+            // The next recording may use its number.
             self.number -= u64::from(number_of(&begun.name) == Some(self.number));
             return;
         }
@@ -191,14 +191,14 @@ impl Shelf {
         self.own.push_back(Own { name: begun.name, bytes, part: true });
     }
 
-    /// Removes the oldest recordings until there is room for so many bytes within the limit; returns what was removed.
+    /// Removes the oldest recordings until `bytes` fit within the limit; returns the removed paths.
     pub fn make_room(&mut self, bytes: u64) -> Vec<PathBuf> {
         let mut removed = Vec::new();
         while self.bytes() + bytes > self.limit
             && let Some(oldest) = self.own.pop_front()
         {
             let path = oldest.path(&self.dir);
-            // A file that somebody has put in its place stays.
+            // A file that has replaced the recording from outside is kept.
             if length(&path) == Some(oldest.bytes) && std::fs::remove_file(&path).is_ok() {
                 removed.push(path);
             }
@@ -206,18 +206,18 @@ impl Shelf {
             let _ = self.note(&format!("gone {}", oldest.name));
         }
         if self.gone > GONE_MAX {
-            // It is as good as it was where that fails.
+            // The old list is still valid if this fails.
             let _ = self.rewrite();
         }
         removed
     }
 
-    /// A recording that is longer than this is continued in another, so that old parts of it can go.
+    /// Returns the size after which a recording is continued in another file, so that old parts can be removed, bytes.
     pub fn longest(&self) -> u64 {
         self.limit / 4
     }
 
-    /// With another way to make files.
+    /// Replaces the function that creates files.
     #[cfg(test)]
     pub fn making(self, make: Make) -> Self {
         Self { make, ..self }
@@ -232,12 +232,13 @@ fn make(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-/// Of a file itself, not of what a link leads to.
+/// Returns the length of a file itself, not of the target of a link.
 fn length(path: &Path) -> Option<u64> {
     path.symlink_metadata().ok().filter(std::fs::Metadata::is_file).map(|found| found.len())
 }
 
-/// Time (UTC) and number, as `20261123T154412Z-000017`: names are in the order of time, as long as nobody sets the clock; numbers always.
+/// Returns a name of time (UTC) and number, as `20261123T154412Z-000017`. Numbers are always in the order of time,
+/// names unless the clock is set.
 fn name(now: Duration, number: u64) -> String {
     let since = now.as_secs();
     let (year, month, day) = date((since / 86_400) as i64);
@@ -245,7 +246,7 @@ fn name(now: Duration, number: u64) -> String {
     format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z-{number:06}")
 }
 
-/// The number in a name; `None` for what is no name of ours.
+/// Returns the number in a name; `None` for names in another format.
 fn number_of(name: &str) -> Option<u64> {
     let (time, number) = name.split_once('-')?;
     let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
@@ -253,7 +254,7 @@ fn number_of(name: &str) -> Option<u64> {
     (digits(date) && digits(time) && digits(number)).then(|| number.parse().ok())?
 }
 
-/// The date of a day since 1970-01-01 (Hinnant, *chrono-Compatible Low-Level Date Algorithms*).
+/// Returns the date of a day since 1970-01-01 (Hinnant, *chrono-Compatible Low-Level Date Algorithms*).
 fn date(days: i64) -> (i64, i64, i64) {
     let days = days + 719_468;
     let (era, of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
@@ -272,7 +273,7 @@ mod tests {
     /// 2026-11-23 15:44:12 UTC.
     const NOW: Duration = Duration::from_secs(1_795_448_652);
 
-    /// Makes a recording of so many bytes; not `whole`: its agent is killed.
+    /// Makes a recording of this number of bytes; if not `whole`, its agent is killed.
     fn make(shelf: &mut Shelf, bytes: usize, whole: bool) -> PathBuf {
         make_at(shelf, NOW, bytes, whole)
     }
@@ -303,7 +304,7 @@ mod tests {
         let mut shelf = Shelf::open(dir.path(), 1000).unwrap();
         let files: Vec<PathBuf> = (0..4).map(|_| make(&mut shelf, 200, true)).collect();
         assert!(shelf.make_room(200).is_empty());
-        // Somebody has put another file in the place of the first, and a link in that of the second.
+        // The first file was replaced from outside by another file, and the second by a link.
         std::fs::write(&files[0], [0; 10]).unwrap();
         std::fs::remove_file(&files[1]).unwrap();
         #[cfg(unix)]
@@ -312,12 +313,13 @@ mod tests {
         assert!(files[0].exists() && others.exists() && files[3].exists());
         #[cfg(unix)]
         assert!(files[1].symlink_metadata().is_ok());
-        // Without room for what is asked, all that are ours go.
+        // If the requested space exceeds the limit, all recordings made here are removed.
         assert_eq!(shelf.make_room(5000), [files[3].clone()]);
         assert!(shelf.make_room(5000).is_empty() && others.exists());
     }
 
-    /// However the computer's clock is set meanwhile, also between two agents: what was made first goes first, and no number is used twice.
+    /// For any changes of the computer's clock, also between two agents: the first recording is removed first, and no
+    /// number is used twice.
     #[test]
     fn the_oldest_are_those_that_were_made_first_whatever_the_clock_shows() {
         let dir = tempfile::tempdir().unwrap();
@@ -346,7 +348,7 @@ mod tests {
         let error = Shelf::open(dir.path(), 1000).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::WouldBlock);
         drop(shelf);
-        // A line that was cut off is passed over.
+        // An incomplete line is ignored.
         let mut list = OpenOptions::new().append(true).open(dir.path().join(LIST)).unwrap();
         list.write_all(b"end 20261123T154412Z-0000").unwrap();
         drop(list);

@@ -1,4 +1,4 @@
-//! What an agent does first with what the one before was killed in.
+//! Last will of a killed agent, applied by the next one at its start.
 use std::time::{Duration, Instant};
 
 use jtc_host::Session;
@@ -11,14 +11,14 @@ use crate::line::{Applied, Introduction, Policy, Role, SharedLine};
 use crate::owner::Line;
 use crate::record::Notice;
 
-/// A controller that is there reports within this time.
+/// Time within which a connected controller reports.
 const REPORTS: Duration = Duration::from_secs(1);
-/// Longest that is waited until it has taken a Stop; that is sent on and on behind that.
+/// Longest wait for the confirmation of a Stop; the Stop is repeated after that, too.
 const TAKES: Duration = Duration::from_secs(1);
-/// How often is looked.
+/// Interval of checks.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// Does what the policy in the file demands of what the controller moves. What was found, and what was done; `None`: there was nothing.
+/// Applies the policy in the file to the controller's motion. Returns a notice about the file and the result; `None` without a file.
 pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     let (client, policy) = match found {
         Found::Nothing => {
@@ -40,15 +40,16 @@ pub fn apply(line: &Line, keeper: &Keeper, found: &Found) -> Option<Notice> {
     Some(notice(found, applied != Applied::Rests, &in_words(applied, reports, taken)))
 }
 
-/// Reads the controller's `host_timeout_ms` for the line. The arm may be moving for a program that is gone, and the timeout decides whose
-/// questions may stand for that program (J-59). Ends without it where the controller has none, or does not answer.
+/// Reads the controller's `host_timeout_ms` for the line. The arm may be moving for a program that was killed, and the
+/// timeout decides which clients' questions may count as that program's sign of life (J-59). Returns without a value if
+/// the controller has none or does not answer.
 pub fn read_host_timeout(line: &Line) {
     let introduction = Introduction { name: "agent".into(), role: Role::Viewer, policy: Policy::Continue };
-    // Whatever is returned, the line has seen it.
+    // The line has seen the value, independent of this result.
     let _ = Session::new(line.connect(introduction)).settings();
 }
 
-/// Waits for something on the line; whether it came.
+/// Waits for a condition on the line; returns `true` if it was met.
 fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> bool {
     let end = Instant::now() + time;
     loop {
@@ -62,7 +63,7 @@ fn until(line: &Line, time: Duration, came: impl Fn(&SharedLine) -> bool) -> boo
     }
 }
 
-/// In words; whether the controller reports, and has taken what was sent.
+/// Returns the result in words; depends on whether the controller reports and has confirmed the command.
 fn in_words(applied: Applied, reports: bool, taken: bool) -> String {
     let sent = match applied {
         Applied::Rests => return "nothing moves any more".into(),

@@ -1,4 +1,4 @@
-//! The file: one for each port, which its owner alone can read, there or not, never half.
+//! File of a last will: one for each port, readable only by its owner, and written completely or not at all.
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -7,50 +7,50 @@ use serde::{Deserialize, Serialize};
 
 use crate::line::{Moves, Policy, Will};
 
-/// Version of its contents.
+/// Version of the file format.
 const VERSION: u32 = 1;
-/// Longer than any.
+/// Limit of the file length, larger than any valid file, bytes.
 const LEN_MAX: u64 = 16 << 10;
-/// Longest name that is shown.
+/// Longest displayed name, characters.
 const NAME_MAX: usize = 100;
 
-/// Its contents.
+/// Contents of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stored {
     version: u32,
-    /// The port, as it was named.
+    /// Name of the port.
     port: String,
-    /// What people call the client.
+    /// Name of the client for people.
     pub client: String,
-    /// Its policy.
+    /// Policy of the client.
     pub policy: Policy,
-    /// What moves.
+    /// Cause of the motion.
     pub what: Moves,
-    /// Since when, s since 1970.
+    /// Start of the motion, s since 1970.
     pub since_unix_s: f64,
 }
 
-/// What lies there when an agent begins.
+/// State of the file when an agent starts.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Found {
-    /// Nothing: the agent before has ended, or nothing moved.
+    /// No file: the agent before has ended properly, or nothing moved.
     Nothing,
-    /// What the agent before was killed in.
+    /// Will of an agent that was killed during a motion.
     Left(Stored),
-    /// Something else, and why: nobody knows whose policy it is.
+    /// Invalid contents, with the reason: the policy is not known.
     Doubtful(String),
 }
 
-/// Where the file of a port is in this folder. The port counts as it is named: a name by what is plugged in stays, where that of the device may be
-/// another one the next time.
+/// Returns the path of a port's file in this folder. The name of the port is used as given: a name that identifies the
+/// adapter (by-id) stays the same, whereas the name of the device may change.
 pub(super) fn path(folder: &Path, port: &str) -> PathBuf {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.' || byte == b'-';
     let escaped = |byte: u8| if plain(byte) { char::from(byte).to_string() } else { format!("_{byte:02x}") };
     folder.join(format!("moves-{}.json", port.bytes().map(escaped).collect::<String>()))
 }
 
-/// What lies at this path, for this port.
+/// Reads the file at this path for this port.
 pub(super) fn read(path: &Path, port: &str) -> Found {
     let metadata = match fs::symlink_metadata(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Found::Nothing,
@@ -90,7 +90,7 @@ fn is_open(_: &fs::Metadata) -> bool {
     false
 }
 
-/// The file is that of another user than its folder, or others can put files into the folder.
+/// Returns `true` if the file belongs to another user than its folder, or if other users can write to the folder.
 #[cfg(unix)]
 fn is_others(folder: &Path, file: &fs::Metadata) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -102,7 +102,8 @@ fn is_others(_: &Path, _: &fs::Metadata) -> bool {
     false
 }
 
-/// Puts it there, in one step. It counts for a killed agent from then on; it outlasts a loss of power as soon as the disk has it.
+/// Writes the file in one step. The file is valid for a killed agent from then on, and survives a loss of power as soon
+/// as the disk has stored it.
 pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> io::Result<()> {
     let Will { client, policy, what } = will.clone();
     let stored = Stored { version: VERSION, port: port.to_owned(), client, policy, what, since_unix_s };
@@ -111,20 +112,20 @@ pub(super) fn write(path: &Path, port: &str, will: &Will, since_unix_s: f64) -> 
     let mut file = begin(&part)?;
     let written = file.write_all(&text).and_then(|()| fs::rename(&part, path));
     if written.is_err() {
-        // What is wrong is the first error.
+        // The first error is the one to report.
         let _ = fs::remove_file(&part);
     }
     written?;
     file.sync_all()
 }
 
-/// Makes it one that cannot be read, where it can be neither written nor taken away: a full disk lets files become shorter.
+/// Makes a file unreadable that can be neither written nor removed: even on a full disk a file can be shortened.
 pub(super) fn spoil(path: &Path) {
-    // Where not even that goes, nothing does.
+    // If even this fails, no other way is left.
     let _ = OpenOptions::new().write(true).truncate(true).open(path);
 }
 
-/// Takes it away.
+/// Removes the file.
 pub(super) fn remove(path: &Path) -> io::Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
@@ -132,7 +133,7 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Files can be written there; where there is no folder one is made.
+/// Checks that files can be written there; creates a missing folder.
 pub(super) fn try_out(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
         let mut builder = fs::DirBuilder::new();
@@ -150,7 +151,7 @@ fn part_of(path: &Path) -> PathBuf {
     path.with_extension("part")
 }
 
-/// A new file that only its owner can read, in place of what a killed agent has left of one.
+/// Creates a file that only its owner can read, and replaces an incomplete one of a killed agent.
 fn begin(part: &Path) -> io::Result<File> {
     remove(part)?;
     let mut options = OpenOptions::new();
@@ -216,7 +217,7 @@ mod tests {
         doubtful("another port");
         write(&path, PORT, &will(Policy::Continue), 0.0).expect("there is room");
         let good = fs::read_to_string(&path).expect("text");
-        // Cut anywhere it is damaged, and never another policy.
+        // A file that is cut off at any byte is damaged, and never shows another policy.
         for n in 0..good.len() {
             fs::write(&path, &good[..n]).expect("a file");
             doubtful("damaged");

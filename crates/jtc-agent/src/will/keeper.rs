@@ -1,4 +1,4 @@
-//! Keeps the file as it is to be, as soon as the disk takes it.
+//! Keeper of the file: updates it as soon as the disk accepts a write.
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -10,20 +10,20 @@ use super::file::{self, Found};
 use crate::line::{LineEvent, Will};
 use crate::record::{Notice, Notify};
 
-/// A disk that took nothing is tried again after this time.
+/// Time after which a failed write is tried again.
 const AGAIN: Duration = Duration::from_secs(5);
-/// Longest that the end waits for the disk.
+/// Longest wait for the disk at the end.
 const LAST: Duration = Duration::from_secs(1);
 
-/// What is to be in the file, and since when.
+/// Intended contents of the file, with the start of the motion.
 type Wanted = Option<(Will, f64)>;
 
 struct Slot {
     wanted: Wanted,
-    /// What lies there stays until it was acted on.
+    /// `true` while the file of the agent before must be kept, until its will was applied.
     held: bool,
     ended: bool,
-    /// The thread has ended.
+    /// `true` after the thread has ended.
     done: bool,
 }
 
@@ -38,11 +38,11 @@ impl Shared {
     }
 }
 
-/// Sees what happens on the line, for the file. It never waits.
+/// Passes events of the line to the keeper. Never waits.
 pub struct Witness(Arc<Shared>);
 
 impl Witness {
-    /// Something happened on the line.
+    /// Takes an event of the line.
     pub fn see(&self, event: &LineEvent) {
         let LineEvent::Will(will) = event else { return };
         let mut slot = self.0.lock();
@@ -53,15 +53,16 @@ impl Witness {
     }
 }
 
-/// The file of a port, kept as long as this is there. What moves when it goes stays in it.
+/// Keeper of a port's file. If the arm moves when the keeper is dropped, the file stays.
 pub struct Keeper(Arc<Shared>);
 
 impl Keeper {
-    /// Begins to keep that of `port` in `folder`; and what lies there, which stays until [`settle`](Self::settle).
+    /// Begins to keep the file of `port` in `folder`. Also returns the present contents, which stay until
+    /// [`settle`](Self::settle).
     ///
     /// # Errors
     ///
-    /// The system has no threads.
+    /// The system cannot start threads.
     pub fn begin(folder: &Path, port: &str, notify: Notify) -> io::Result<(Self, Found)> {
         let path = file::path(folder, port);
         let found = file::read(&path, port);
@@ -79,13 +80,13 @@ impl Keeper {
         Ok((Self(shared), found))
     }
 
-    /// For whoever sees what happens on the line.
+    /// Returns the witness for the observer of the line.
     pub fn witness(&self) -> Witness {
         Witness(self.0.clone())
     }
 
-    /// What lay there was acted on: from now on the file is as the line has it, which has `will` now. `since`: what still moves has done so
-    /// since then.
+    /// Notes that the will of the agent before was applied: from now on the file follows the line, whose present will
+    /// is `will`. `since`: start of a motion that still continues.
     pub fn settle(&self, will: Option<Will>, since: Option<f64>) {
         let mut slot = self.0.lock();
         slot.held = false;
@@ -99,7 +100,7 @@ impl Keeper {
         self.0.changed.notify_all();
     }
 
-    /// The arm was brought to rest for the end.
+    /// Notes that the arm was brought to rest at the end.
     pub fn forget(&self) {
         self.0.lock().wanted = None;
         self.0.changed.notify_all();
@@ -122,17 +123,17 @@ impl Drop for Keeper {
     }
 }
 
-/// s since 1970.
+/// Returns the present time, s since 1970.
 fn now() -> f64 {
     host_kit::unix_time().as_secs_f64()
 }
 
-/// The thread.
+/// State of the writing thread.
 struct Writer {
     shared: Arc<Shared>,
     path: PathBuf,
     port: String,
-    /// What is there; `None`: nobody knows.
+    /// Present contents of the file; `None`: not known.
     there: Option<Wanted>,
     fails: bool,
     notify: Notify,
@@ -140,7 +141,7 @@ struct Writer {
 
 impl Writer {
     fn run(&mut self) {
-        // A folder that takes nothing is known before anything moves.
+        // A folder that cannot be written is found before the first motion.
         let tried = file::try_out(&self.path);
         self.report(tried);
         while let Some(wanted) = self.next() {
@@ -149,7 +150,7 @@ impl Writer {
                 None => file::remove(&self.path),
             };
             if done.is_err() {
-                // What lies there is not what counts: in doubt the arm is stopped.
+                // The file has outdated contents: if in doubt, the arm is stopped.
                 file::spoil(&self.path);
             }
             self.there = done.is_ok().then_some(wanted);
@@ -159,14 +160,14 @@ impl Writer {
         self.shared.changed.notify_all();
     }
 
-    /// What is to be there and is not; `None`: the end.
+    /// Waits until the contents must change, and returns the new contents; `None`: the end.
     fn next(&self) -> Option<Wanted> {
         let mut slot = self.shared.lock();
         let mut tried = self.fails.then(|| slot.wanted.clone());
         let end = Instant::now() + AGAIN;
         loop {
             let is_there = self.there.as_ref() == Some(&slot.wanted);
-            // What failed is tried again in a while, and at once where it is something else now.
+            // A failed write is tried again after a while, and at once if the contents have changed.
             if !slot.held && !is_there && tried.as_ref() != Some(&slot.wanted) {
                 return Some(slot.wanted.clone());
             }
@@ -185,7 +186,7 @@ impl Writer {
         }
     }
 
-    /// The first error of writing is noted, and when it is over.
+    /// Reports the first write error, and its end.
     fn report(&mut self, done: io::Result<()>) {
         let path = self.path.display().to_string();
         match &done {
@@ -254,7 +255,7 @@ mod tests {
         drop(keeper);
         let (keeper, found, _notices) = begin(dir.path());
         let Found::Left(stored) = &found else { panic!("{found:?}") };
-        // It stays until it was acted on, however the agent ends, and keeps its time.
+        // The file stays until its will was applied, however the agent ends, and keeps its time.
         drop(keeper);
         assert_eq!(begin(dir.path()).1, found);
         let (keeper, _, _notices) = begin(dir.path());
@@ -263,7 +264,7 @@ mod tests {
         drop(keeper);
         let (keeper, again, _notices) = begin(dir.path());
         assert_eq!(again, found);
-        // At rest it goes.
+        // The file is removed when the arm is at rest.
         keeper.settle(None, Some(stored.since_unix_s));
         until(dir.path(), "nothing moves", |found| *found == Found::Nothing);
         keeper.witness().see(&moves(Policy::Continue));
@@ -301,7 +302,7 @@ mod tests {
         keeper.settle(None, None);
         keeper.witness().see(&moves(Policy::Continue));
         until(dir.path(), "continue", left(Policy::Continue));
-        // From now on no file can be begun there, as on a full disk.
+        // From now on no file can be created there, as on a full disk.
         let part = file::path(dir.path(), PORT).with_extension("part");
         std::fs::create_dir(&part).expect("a folder");
         keeper.witness().see(&moves(Policy::Stop));

@@ -1,7 +1,7 @@
-//! An agent that is killed leaves whose policy is to act on what moves: a small file, as long as something does, which the next agent at the
-//! same port reads before it serves anyone.
+//! Last will of a killed agent: a small file that names the client whose policy applies, kept while the arm moves. The
+//! next agent at the same port reads it before it serves any client.
 //!
-//! It is written by a thread of its own: neither a Stop nor the line waits for the disk.
+//! A thread of its own writes the file, so neither a Stop nor the line waits for the disk.
 mod apply;
 mod file;
 mod keeper;

@@ -1,4 +1,4 @@
-//! An agent of a simulated controller in this process, and requests to it as anybody could send them.
+//! Agent of a simulated controller in this process, and requests of any client.
 
 pub mod program;
 
@@ -31,7 +31,7 @@ pub fn simulated(baud: u32) -> LivePort {
     LivePort::new(World::new(config))
 }
 
-/// A socket of somebody who looks: `stream`, `line`, or `foxglove` with all its channels.
+/// Socket of a viewer: `stream`, `line`, or `foxglove` with all its channels.
 #[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
 pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
@@ -47,7 +47,7 @@ pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpSt
     socket
 }
 
-/// An agent that ends with the test.
+/// Agent that ends with the test.
 pub struct Served {
     pub address: SocketAddr,
     pub tokens: Tokens,
@@ -68,17 +68,17 @@ impl std::ops::Deref for Served {
 }
 
 impl Served {
-    /// Of a simulated arm on a line at this rate.
+    /// Starts an agent for a simulated arm on a line at this rate.
     pub fn start(baud: u32) -> Self {
         Self::start_with(baud, None, &[])
     }
 
-    /// The same, with TLS where it is given, and pages of these origins may look.
+    /// Like [`Self::start`], with TLS if given, and with read access for pages of these origins.
     pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
         Self::start_on(simulated(baud), tls, origins)
     }
 
-    /// The same of whatever is at this port.
+    /// Like [`Self::start_with`], for any port.
     pub fn start_on(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,
@@ -87,7 +87,7 @@ impl Served {
         Self::start_with_store(port, tls, origins, Store::in_memory(), Arm::avena())
     }
 
-    /// The same with what it keeps, and the arm that it was given.
+    /// Like [`Self::start_on`], with the stored files and the given arm.
     pub fn start_with_store(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,
@@ -121,7 +121,7 @@ impl Served {
         format!("http://{}", self.address)
     }
 
-    /// A conversation of an operator.
+    /// Opens a session of an operator.
     pub fn operator(&self, name: &str) -> Session<AgentPort> {
         self.session(name, Some(&self.tokens.operator))
     }
@@ -131,7 +131,7 @@ impl Served {
         Session::new(AgentPort::open(&self.url(), &options).expect("it is let in"))
     }
 
-    /// Lets the agent end.
+    /// Ends the agent.
     pub fn end(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

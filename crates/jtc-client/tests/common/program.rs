@@ -1,11 +1,11 @@
-//! A program that commands by HTTP.
+//! Program that holds the lease by HTTP.
 use serde_json::{Value, json};
 use test_kit::patience::Patience;
 use test_kit::written::text_with;
 
 use super::Served;
 
-/// A program that has the lease.
+/// Program with the lease.
 pub struct Program<'a> {
     pub served: &'a Served,
     pub key: String,
@@ -36,13 +36,13 @@ impl<'a> Program<'a> {
         assert_eq!(done["stage"], "finished", "{done}");
     }
 
-    /// The job when it is over; the lease is renewed meanwhile.
+    /// Waits for the end of the job and returns it; renews the lease meanwhile.
     pub fn over(&self, job: u64) -> Value {
         over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
     }
 }
 
-/// The job when it is over.
+/// Waits for the end of the job and returns it.
 pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -56,7 +56,7 @@ pub fn over(served: &Served, job: u64, mut meanwhile: impl FnMut()) -> Value {
     }
 }
 
-/// Waits until an event of this kind came behind a number, and returns it with its number.
+/// Waits for an event of this kind after a number, and returns the event with its number.
 pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     let (mut patience, mut last) = (Patience::begin(), after);
     loop {
@@ -73,7 +73,7 @@ pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     }
 }
 
-/// A viewer, an operator without the lease and one who waits for it are refused.
+/// Checks that a viewer, an operator without the lease and an operator who waits for the lease are refused.
 pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
     let ask =
         |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));
@@ -89,7 +89,7 @@ pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value)
     assert!(status == 409 && error["message"].as_str().is_some_and(|m| m.contains("anna")), "{error}");
 }
 
-/// Lines of the log of commands with this in what was commanded; there is one at least.
+/// Returns the lines of the command log that contain this command; there is at least one.
 pub fn logged(served: &Served, what: &str) -> Vec<Value> {
     let text = text_with(&served.log, &[what]);
     let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));

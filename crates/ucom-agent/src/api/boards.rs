@@ -1,4 +1,4 @@
-//! The boards, for all who may look.
+//! Boards, for all clients.
 use agent_kit::api::{Number, Problem, Refusals};
 use axum::Json;
 use axum::extract::State;
@@ -6,16 +6,16 @@ use axum::extract::State;
 use super::objects::{BoardObject, ValuesObject};
 use super::{Agent, Denials};
 
-/// A board that is not known.
+/// Returns the problem for an unknown board.
 pub(super) fn unknown(number: u8) -> Problem {
     Problem::nothing("board", number, "/api/boards")
 }
 
-/// Numbers that boards can have.
+/// Checks numbers of boards.
 ///
 /// # Errors
 ///
-/// One of them is none.
+/// A number is out of range (0–31).
 pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Problem> {
     match boards.into_iter().find(|board| *board > 31) {
         Some(board) => {
@@ -27,7 +27,9 @@ pub(super) fn numbers(boards: impl IntoIterator<Item = u8>) -> Result<(), Proble
     }
 }
 
-/// The boards as last seen. They are asked when the agent starts, by a scan, and whenever something is done with them.
+/// Returns the boards as last seen.
+///
+/// The agent asks the boards at its start, during a scan, and whenever a request involves them.
 #[utoipa::path(
     get,
     path = "/api/boards",
@@ -38,7 +40,7 @@ pub(super) async fn boards(State(agent): State<Agent>) -> Json<Vec<BoardObject>>
     Json(BoardObject::all(&agent.shared.picture()))
 }
 
-/// One board as last seen.
+/// Returns one board as last seen.
 #[utoipa::path(
     get,
     path = "/api/boards/{number}",
@@ -59,7 +61,9 @@ pub(super) async fn board(
     Ok(Json(BoardObject::of(&picture, number, board)))
 }
 
-/// Values of a board by name, in units where the signal table has them. Where its names are not known the board is asked for them.
+/// Returns the values of a board by name, with units if the signal table has them.
+///
+/// If the names of its values are not known, the board is asked for them.
 #[utoipa::path(
     get,
     path = "/api/boards/{number}/values",
@@ -83,7 +87,7 @@ pub(super) async fn values(
         return Ok(Json(ValuesObject::of(&picture, values)));
     }
     if picture.competing_us.is_some() {
-        // Even questions could mix with its own.
+        // Even questions could mix with those of the other PC.
         let message = format!(
             "the names of board {number} are not known, and another PC commands on this bus: it is not asked"
         );

@@ -1,4 +1,4 @@
-//! Commands that are soon over, for who has the lease.
+//! Short commands of the lease holder.
 use std::sync::Arc;
 
 use agent_kit::api::{Asked, Body, Number, Problem, Refusals};
@@ -20,23 +20,23 @@ use super::objects::{AnswerObject, ValueObject};
 use super::{Agent, Denials};
 use crate::owner::Hands;
 
-/// A value as it is given.
+/// Value in a request.
 #[derive(Clone, Debug, serde::Deserialize, serde::Serialize, ToSchema)]
 #[serde(untagged)]
 pub(super) enum GivenValue {
-    /// On or off.
+    /// `true` for on, `false` for off.
     Switch(bool),
-    /// A number, where the signal has no unit.
+    /// Number of a signal without a unit.
     Number(f64),
-    /// As `ucom ci` takes it: a number with its unit (`20.5 deg`), a word (`0x05DC`), `on`, `off`.
+    /// Text as `ucom ci` accepts it: a number with its unit (`20.5 deg`), a word (`0x05DC`), `on`, `off`.
     Text(String),
 }
 
-/// What an input or a parameter is to be.
+/// New value of an input or a parameter.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ValueRequest {
-    /// The value.
+    /// New value.
     value: GivenValue,
 }
 
@@ -57,45 +57,45 @@ impl GivenValue {
     }
 }
 
-/// Whether outputs are enabled.
+/// State of the outputs.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputsRequest {
-    /// True: enabled, where the control loop runs.
+    /// `true`: enable the outputs, which needs a running control loop.
     active: bool,
 }
 
-/// How far a board is stopped.
+/// Extent of a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Level {
-    /// The control loop ends, the application stays.
+    /// Control loop; the application keeps running.
     Loop,
-    /// The application ends, too.
+    /// Control loop and application.
     #[default]
     Application,
 }
 
-/// How far a board is stopped.
+/// Extent of a stop.
 #[derive(Clone, Copy, Debug, serde::Deserialize, IntoParams)]
 #[serde(deny_unknown_fields)]
 #[into_params(parameter_in = Query)]
 pub struct StopRequest {
-    /// `application`, unless it is asked for otherwise.
+    /// Extent; default: `application`.
     #[serde(default)]
     #[param(inline)]
     level: Level,
 }
 
-/// Who reported after a reset.
+/// Boards that reported after a reset.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ResetObject {
-    /// Low bytes of the boards' flash numbers. Their numbers are gone: `POST /api/init` gives new ones.
+    /// Low bytes of the boards' flash numbers. The boards have no numbers now: `POST /api/init` assigns new ones.
     reports: Vec<u8>,
 }
 
 impl Agent {
-    /// Has the owner do something for the client that commands, and logs that it was asked for.
+    /// Runs a command of the lease holder in the owner's thread, and logs it.
     async fn command<T: Send + 'static>(
         &self,
         asker: &Asker,
@@ -105,7 +105,7 @@ impl Agent {
         self.command_with(asker, what, json!({}), act).await
     }
 
-    /// The same; what was asked for is in the log, too.
+    /// Like [`command`](Self::command), with further facts in the log.
     async fn command_with<T: Send + 'static>(
         &self,
         asker: &Asker,
@@ -121,7 +121,7 @@ impl Agent {
         let own = line.clone();
         let act = move |hands: &mut Hands| {
             let done = act(hands).map_err(|error| hands.problem(&error));
-            // Here, as who has asked may have gone.
+            // Logged here, because the client may have disconnected.
             own.end(&done);
             done
         };
@@ -147,7 +147,8 @@ fn set(
     note_rounded(&hands.driver, board, buffer, std::slice::from_ref(&word));
     let now_us = hands.driver.now_us();
     let boards = hands.driver.master.boards();
-    // Of a board that runs inputs are repeated: one that is lost is followed by others. One without power does not run.
+    // Inputs of a running board are repeated, so a lost frame is followed by others. A board without power does not
+    // run.
     let runs = hands.driver.master.repeats_inputs(board)
         && boards.get(board).is_some_and(|board| board.sends_outputs(now_us));
     let quick = runs && buffer == Buffer::Ci;
@@ -183,7 +184,9 @@ impl Agent {
     }
 }
 
-/// Sets a controller input by its name; sent at once, and repeated while the board runs.
+/// Sets a controller input by its name.
+///
+/// The input is sent at once, and repeated while the board runs.
 #[utoipa::path(
     put,
     path = "/api/boards/{number}/inputs/{name}",
@@ -207,7 +210,9 @@ pub(super) async fn set_input(
     agent.set((&asker, after), ("input", Buffer::Ci), place, &request).await
 }
 
-/// Writes a parameter by its name. Boards have no way to read it back.
+/// Writes a parameter by its name.
+///
+/// Boards cannot report their parameters.
 #[utoipa::path(
     put,
     path = "/api/boards/{number}/parameters/{name}",
@@ -262,7 +267,7 @@ pub(super) async fn set_outputs(
     Ok(axum::http::StatusCode::NO_CONTENT)
 }
 
-/// Starts the application of a board; nothing moves by that.
+/// Starts the application of a board, which moves nothing.
 #[utoipa::path(
     post,
     path = "/api/boards/{number}/start",
@@ -283,7 +288,7 @@ pub(super) async fn start_board(
         let all = hands.starting(&[board], |hands| {
             hands.driver.change_each(&[board], |board| Request::Start { board, force: false })
         })?;
-        // Its names are there from now on; without them it is started all the same.
+        // Loads the names of its values; without them the application is started all the same.
         let _ = hands.known(board);
         all.first()
             .map(|one| AnswerObject::of(one, &hands.driver.master.profile()))
@@ -328,7 +333,7 @@ pub(super) async fn stop_board(
     Ok(Json(agent.command(&asker, ("stop", board, None), act).await?))
 }
 
-/// Resets a board: its outputs become safe, and its number is gone.
+/// Resets a board: its outputs become safe, and it loses its number.
 #[utoipa::path(
     post,
     path = "/api/boards/{number}/reset",

@@ -1,4 +1,4 @@
-//! What happens, as it happens: events by number, and a stream of them with the values of running boards.
+//! Events as numbered lists, and a live stream of events with the values of running boards.
 use std::time::Duration;
 
 use agent_kit::api::{Asked, Problem, Refusals};
@@ -18,14 +18,16 @@ use super::objects::{BoardObject, StatusObject, ValuesObject};
 use crate::happening::Happening;
 use crate::picture::Values;
 
-/// How often status and boards are sent on a stream.
+/// Interval at which a stream sends the status and the boards.
 const SLOWLY: Duration = Duration::from_secs(1);
 
-/// An event.
+/// Event with its number and time.
 pub(super) type EventObject = Entry<Happening>;
 type EventsObject = events::EventsObject<EventObject>;
 
-/// What has happened behind a number: after a lost connection, ask on from the last one.
+/// Returns the events after a number.
+///
+/// After a lost connection, continue from the last one.
 #[utoipa::path(
     get,
     path = "/api/events",
@@ -40,19 +42,19 @@ pub(super) async fn events(
     agent.events.ask(&agent.shared.journal, request).await
 }
 
-/// A message of the stream that is no event.
+/// Message of the stream that is not an event.
 #[derive(serde::Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 enum StreamMessage {
-    /// The bus, once a second.
+    /// Status of the bus, once a second.
     Status(Box<StatusObject>),
-    /// The boards, once a second.
+    /// Boards, once a second.
     Boards { boards: Vec<BoardObject> },
-    /// Outputs that have come; old ones are left out for one who reads slowly.
+    /// New outputs; older ones are left out for a slow reader.
     Values { values: Vec<ValuesObject> },
 }
 
-/// `GET /api/stream`: what happens, the values of running boards at most 25 times a second, bus and boards once a second.
+/// Serves `GET /api/stream`: events, values of running boards at most 25 times a second, bus and boards once a second.
 pub(super) async fn stream(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -85,7 +87,7 @@ pub(super) async fn stream(
     )
 }
 
-/// The values that have come behind this time, and that of the newest, µs.
+/// Returns the values that arrived after this time, and the time of the newest, µs.
 fn new_values(agent: &Agent, shown_us: u64) -> Option<(Vec<ValuesObject>, u64)> {
     let picture = agent.shared.picture();
     let time_us = |values: &Values| values.outputs.as_ref().map_or(0, |outputs| outputs.time_us);

@@ -1,4 +1,4 @@
-//! Jobs: what takes longer than a request.
+//! Jobs: requests that take longer than their answer.
 use std::time::Duration;
 
 use agent_kit::api::{Body, Number, Problem, Refusals};
@@ -22,11 +22,11 @@ use crate::jobs::Done;
 use crate::owner::Hands;
 use crate::work::Kind;
 
-/// How long a doctor listens before it asks.
+/// Listening time of a doctor before it asks.
 const LISTEN: Duration = Duration::from_millis(1500);
 
 impl Agent {
-    /// Begins a job for the client that commands; one that may move something, behind the Stop that it was asked for `after`.
+    /// Begins a job of the lease holder. A job that may move a board is begun only if no Stop came after `after`.
     pub(super) fn begin(
         &self,
         (asker, after): (&Asker, Option<AskedAfter>),
@@ -49,7 +49,7 @@ fn texts(findings: &[impl ToString]) -> Vec<String> {
     findings.iter().map(|finding| finding.to_string().replace('`', "")).collect()
 }
 
-/// Asks who is there; changes nothing.
+/// Scans for boards and changes nothing, as a job.
 #[utoipa::path(
     post,
     path = "/api/scan",
@@ -66,26 +66,26 @@ pub(super) async fn scan(
     })
 }
 
-/// A board that is expected at its place.
+/// Expected board at its place.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExpectedBoard {
-    /// Its place, which is its number.
+    /// Place of the board, which becomes its number.
     board: u8,
-    /// Number of its bootloader: who it is.
+    /// Number of its bootloader, which identifies the board.
     flash_number: u16,
 }
 
-/// How the chain is numbered.
+/// Options of the numbering.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InitRequest {
-    /// Boards that are expected at their places: others are an error. Empty: whoever is there.
+    /// Expected boards at their places; other boards are an error. Empty: any boards.
     #[serde(default)]
     expected: Vec<ExpectedBoard>,
 }
 
-/// Resets all boards and numbers them along the chain.
+/// Resets all boards and numbers them along the chain, as a job.
 #[utoipa::path(
     post,
     path = "/api/init",
@@ -117,7 +117,7 @@ pub(super) async fn init(
     })
 }
 
-/// Looks for what is wrong with bus, chain and boards: listens, and asks where that cannot do harm.
+/// Diagnoses bus, chain and boards, as a job: listens, and asks if that cannot do harm.
 #[utoipa::path(
     post,
     path = "/api/doctor",
@@ -134,32 +134,32 @@ pub(super) async fn doctor(
     })
 }
 
-/// A value of an input or a parameter.
+/// Value of an input or a parameter.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NamedValue {
-    /// The board; missing: each of those that are to run.
+    /// Number of the board; missing: each board to run.
     board: Option<u8>,
-    /// Its name.
+    /// Name of the input or parameter.
     name: String,
-    /// The value.
+    /// New value.
     value: GivenValue,
 }
 
-/// What is to run.
+/// Boards to run, with their values.
 #[derive(Clone, Debug, Default, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunRequest {
-    /// Numbers of the boards; empty: all that answer.
+    /// Numbers of the boards; empty: all boards that answer.
     #[serde(default)]
     boards: Vec<u8>,
-    /// Outputs are enabled at the end.
+    /// `true`: enable the outputs at the end.
     #[serde(default)]
     active: bool,
-    /// Inputs that differ from the boards' initial ones.
+    /// Inputs that differ from the boards' initial values.
     #[serde(default)]
     inputs: Vec<NamedValue>,
-    /// Parameters.
+    /// Parameters to write.
     #[serde(default)]
     parameters: Vec<NamedValue>,
 }
@@ -171,7 +171,9 @@ fn assignments(values: &[NamedValue]) -> Result<Vec<Assignment>, Problem> {
     values.iter().map(one).collect()
 }
 
-/// Starts applications and control loops. The job ends when they run; what becomes of them then are events.
+/// Starts applications and control loops, as a job.
+///
+/// The job ends when the boards run. Later changes are reported as events.
 #[utoipa::path(
     post,
     path = "/api/run",
@@ -185,7 +187,7 @@ pub(super) async fn run(
     after: AskedAfter,
     Body(mut request): Body<RunRequest>,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Each once, however often it is named.
+    // Each board once, also if it is named several times.
     request.boards.sort_unstable();
     request.boards.dedup();
     numbers(request.boards.iter().copied())?;
@@ -201,7 +203,7 @@ pub(super) async fn run(
         let begin = |session: &mut Session, cache: &Cache| {
             let mut prepared = Prepared::default();
             let started = start(session, cache, &numbers, (&ci, &par), request.active, &mut prepared);
-            // What the procedure began it has taken back itself.
+            // The procedure has already undone its own steps.
             let report = started.inspect_err(|_| prepared.undo(&mut session.driver))?;
             Ok((report, prepared))
         };
@@ -214,7 +216,7 @@ pub(super) async fn run(
     })
 }
 
-/// Names, plans, and the start of all boards.
+/// Reads the names, plans the inputs, and starts all boards.
 fn start(
     session: &mut Session,
     cache: &Cache,
@@ -236,7 +238,7 @@ fn start(
     }
 }
 
-/// Jobs that are remembered, oldest first.
+/// Returns the kept jobs, oldest first.
 #[utoipa::path(
     get,
     path = "/api/jobs",
@@ -247,7 +249,7 @@ pub(super) async fn list(State(agent): State<Agent>) -> Json<Vec<JobObject>> {
     Json(agent.shared.jobs.list().into_iter().map(JobObject::from).collect())
 }
 
-/// A job, while it goes on and afterwards.
+/// Returns a job, while it runs and afterwards.
 #[utoipa::path(
     get,
     path = "/api/jobs/{number}",
@@ -267,7 +269,7 @@ pub(super) async fn get(
     Ok(Json(job.ok_or_else(|| Problem::nothing("job", number, "/api/jobs"))?.into()))
 }
 
-/// Cancels a job: what it has to undo on the boards it still does.
+/// Cancels a job, which still undoes its steps on the boards.
 #[utoipa::path(
     delete,
     path = "/api/jobs/{number}",

@@ -1,4 +1,4 @@
-//! The lease: who commands shows by each request that it is there.
+//! Lease: each request shows that the holder is alive.
 use agent_kit::access::random;
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::{Asker, Caller};
@@ -13,34 +13,34 @@ use utoipa::ToSchema;
 use super::{Agent, Denials};
 use crate::happening::Policy;
 
-/// Who wants to command.
+/// Request for the lease.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LeaseRequest {
-    /// What people are to call it: the first 64 characters.
+    /// Name of the client for people: the first 64 characters.
     name: String,
-    /// How long the lease lasts without a request of this client, s.
+    /// Duration of the lease without a request of this client, s.
     #[serde(default = "default_lasts_s")]
     #[schema(minimum = 1, maximum = 60)]
     lasts_s: f64,
-    /// What becomes of running boards when it has lapsed.
+    /// Policy for running boards after the lease has lapsed.
     #[serde(default)]
     policy: Policy,
-    /// Where another client commands: ask it for the lease, and wait for it.
+    /// `true`: if another client holds the lease, ask for it and wait.
     #[serde(default)]
     ask: bool,
 }
 
-/// A client that may command, or waits for it.
+/// Client that holds the lease or waits for it.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LeaseGrant {
-    /// Goes with each request of this client, in the header `Lease-Key`. Nobody else is to know it.
+    /// Secret key, which this client sends with each request in the header `Lease-Key`.
     key: String,
-    /// It commands; else it waits until the one who does lets it go.
+    /// `true` if the client holds the lease; otherwise it waits until the holder releases it.
     held: bool,
-    /// How long it lasts without a request, s.
+    /// Duration of the lease without a request, s.
     lasts_s: f64,
-    /// What becomes of running boards when it has lapsed.
+    /// Policy for running boards after the lease has lapsed.
     policy: Policy,
 }
 
@@ -51,13 +51,13 @@ impl Halts for Agent {
 }
 
 impl Agent {
-    /// The client that asks with a key.
+    /// Returns the client of a lease key.
     pub(super) fn client(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
         let (mut leases, now) = self.shared.leases();
         Ok(leases.client(asker.key(), now)?)
     }
 
-    /// The client that asks, with its lease renewed: it commands, or it is an error.
+    /// Returns the client of a lease key and renews its lease. Returns an error if it does not hold the lease.
     pub(super) fn commander(&self, asker: &Asker) -> Result<Client<Policy>, Problem> {
         asker.caller.operator()?;
         let (mut leases, now) = self.shared.leases();
@@ -65,7 +65,9 @@ impl Agent {
     }
 }
 
-/// Takes the lease: one client commands at a time. It is renewed by every command.
+/// Takes the lease, which one client holds at a time.
+///
+/// Every command renews it.
 #[utoipa::path(
     post,
     path = "/api/lease",
@@ -96,7 +98,7 @@ pub(super) async fn take(
     Ok(Json(LeaseGrant { key, held, lasts_s, policy }))
 }
 
-/// Renews the lease, or takes it again where nobody else has.
+/// Renews the lease, or takes it again if it is free.
 #[utoipa::path(
     put,
     path = "/api/lease",
@@ -116,8 +118,9 @@ pub(super) async fn renew(State(agent): State<Agent>, asker: Asker) -> Result<Js
     Ok(Json(LeaseState { held, wanted_by }))
 }
 
-/// Lets the lease go: to the client that has asked for it, if one has. What runs goes on. Refused while something goes on or waits for
-/// this client that may move boards.
+/// Releases the lease, which passes to the waiting client if there is one.
+///
+/// Running boards keep running. Refused while a request of this client that may move boards is running or waiting.
 #[utoipa::path(
     delete,
     path = "/api/lease",
@@ -130,7 +133,7 @@ pub(super) async fn release(State(agent): State<Agent>, asker: Asker) -> Result<
     let client = agent.client(&asker)?;
     {
         let (mut leases, now) = agent.shared.leases();
-        // Outputs would be enabled later, for nobody.
+        // Otherwise outputs could be enabled later without a lease holder.
         if leases.holds(client.id, now) && agent.shared.moves_for(client.id) {
             return Err(Problem::new(
                 "busy",

@@ -1,24 +1,24 @@
-//! A line of the log of commands, which is written whatever becomes of who has asked.
+//! Line of the log of commands, which is written even if the client disconnects.
 use std::sync::{Mutex, PoisonError};
 
 use agent_kit::api::Problem;
 use agent_kit::gate::Gate;
 use serde_json::Value;
 
-/// A command, until what came of it is written down.
+/// Command whose result is not logged yet.
 pub(super) struct Line {
     gate: Gate,
-    /// What it was; `None`: it is written.
+    /// Facts of the command; `None` after the line was written.
     facts: Mutex<Option<Value>>,
 }
 
 impl Line {
-    /// Of a command that is asked for now.
+    /// Returns the line of a command that is requested now.
     pub fn new(gate: &Gate, facts: Value) -> Self {
         Self { gate: gate.clone(), facts: Mutex::new(Some(facts)) }
     }
 
-    /// It was done, or why it was not.
+    /// Logs the result: success, or the reason of the failure.
     pub fn end<T>(&self, done: &Result<T, Problem>) {
         self.write(done.as_ref().err().map(|error| &*error.message));
     }

@@ -1,4 +1,4 @@
-//! The agent's API: what is asked by HTTP, and a stream of what happens.
+//! API of the agent: HTTP requests, and a stream of events.
 mod boards;
 mod commands;
 mod events;
@@ -37,32 +37,32 @@ use crate::owner::{Owner, Shared};
 use events::EventObject;
 use objects::{LeaseObject, StatusObject};
 
-/// Longest body that is read.
+/// Longest request body, bytes.
 const BODY_MAX: usize = 64 << 10;
-/// Longest with images: 1 MiB each, as text.
+/// Longest request body with images, bytes: 1 MiB each, as text.
 const IMAGES_MAX: usize = 6 << 20;
-/// Requests with images that are read at once.
+/// Largest number of requests with images that are read at the same time.
 const UPDATES_READ: usize = 2;
-/// Longest that a request may take.
+/// Longest duration of a request.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 
-/// What every handler has.
+/// State that every handler receives.
 #[derive(Clone)]
 pub struct Agent {
     shared: Arc<Shared>,
     gate: Gate,
-    /// A number of its own, by which clients know that it is another one.
+    /// Number that identifies this run of the agent for clients.
     id: Arc<str>,
     bus: Arc<str>,
     simulated: bool,
     sockets: Sockets,
     events: Arc<Events>,
-    /// Room for requests with images.
+    /// Limit of simultaneous requests with images.
     images: Arc<Semaphore>,
 }
 
 impl Agent {
-    /// An agent of a bus. `bus` is what people call it.
+    /// Creates the agent of a bus. `bus` is its name for people.
     ///
     /// # Errors
     ///
@@ -96,7 +96,7 @@ impl Agent {
         })
     }
 
-    /// Everything that is served.
+    /// Returns the router with all requests.
     pub fn router(self) -> Router {
         let (router, description) = described().split_for_parts();
         router
@@ -135,7 +135,7 @@ impl Agent {
     }
 }
 
-/// The description of the API, OpenAPI 3.1, as JSON.
+/// Returns the description of the API, OpenAPI 3.1, as JSON.
 pub fn description() -> String {
     text(&described().into_openapi())
 }
@@ -181,7 +181,7 @@ fn described() -> OpenApiRouter<Agent> {
     others.merge(images)
 }
 
-/// What a command may be refused with beside what every request may.
+/// Refusals that a command can receive in addition to those of every request.
 struct Denials;
 
 impl IntoResponses for Denials {
@@ -193,7 +193,7 @@ impl IntoResponses for Denials {
     }
 }
 
-/// The bus, and who commands.
+/// Returns the status of the bus, and the lease.
 #[utoipa::path(
     get,
     path = "/api/status",
@@ -204,20 +204,23 @@ async fn status(State(agent): State<Agent>, Extension(caller): Extension<Caller>
     Json(agent.status(&caller))
 }
 
-/// What was sent.
+/// Command that was sent.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 struct SentObject {
-    /// `stop`.
+    /// Command: `stop`.
     sent: String,
-    /// Number of the last event before it: what came of it follows.
+    /// Number of the last event before the Stop; its results are reported as later events.
     last_event: u64,
-    /// Its number: `last_halt` until the next.
+    /// Number of the Stop: value of `last_halt` until the next one.
     halt: u64,
 }
 
-/// Stops all boards: their control loops ahead of all else, then their applications. No lease is needed.
+/// Stops the control loops of all boards ahead of all other frames, then their applications.
 ///
-/// An update that goes on is not ended: a board whose flash is half written could do nothing afterwards. Everything else is.
+/// No lease is needed.
+///
+/// A running update continues, because a board with half-written flash could not work afterwards. All other requests
+/// end.
 #[utoipa::path(
     post,
     path = "/api/stop",
@@ -229,7 +232,7 @@ struct SentObject {
     )
 )]
 async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObject>, Problem> {
-    // Who it is does not matter, but for going on later.
+    // The identity of the client matters only for its later requests.
     let client = match asker.caller.role {
         Role::Operator => agent.client(&asker).ok(),
         Role::Viewer => None,
@@ -239,7 +242,7 @@ async fn stop(State(agent): State<Agent>, asker: Asker) -> Result<Json<SentObjec
     let facts = json!({ "command": "stop", "from": asker.caller.peer.to_string(), "by": by, "lost": lost });
     match client {
         Some(_) => agent.gate.note("halt", facts),
-        // One that shows no lease can ask without end.
+        // A client without a lease can send such requests without limit.
         None => agent.gate.note_repeated("halt", asker.caller.peer, facts),
     }
     if let Some(lost) = lost {

@@ -1,4 +1,4 @@
-//! Updates: images that are uploaded, checked, written and read back.
+//! Updates: images are uploaded, checked, written and read back.
 use agent_kit::api::{Body, Problem, Refusals};
 use agent_kit::gate::Asker;
 use agent_kit::halt::{AskedAfter, KnownHalt};
@@ -26,17 +26,17 @@ use crate::jobs::Done;
 use crate::owner::fault;
 use crate::work::Kind;
 
-/// A board that is to be updated.
+/// Board to update.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetRequest {
-    /// Its number.
+    /// Number of the board.
     board: u8,
-    /// Number of its bootloader, which it must have; missing: whoever has that number.
+    /// Number that its bootloader must have; missing: any bootloader.
     flash_number: Option<u16>,
 }
 
-/// Form of an image.
+/// Format of an image.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum ImageFormat {
@@ -48,7 +48,7 @@ pub(super) enum ImageFormat {
     Srec,
 }
 
-/// What addresses of records count.
+/// Unit of the addresses in records.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum Unit {
@@ -58,44 +58,45 @@ pub(super) enum Unit {
     Word,
 }
 
-/// An update.
+/// Update of boards.
 #[derive(Clone, Debug, serde::Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct UpdateRequest {
-    /// The boards.
+    /// Boards to update.
     #[schema(min_items = 1, max_items = 31)]
     boards: Vec<TargetRequest>,
-    /// The image, as base64.
+    /// Image, as base64.
     image: String,
-    /// What the other cycle carries, as base64, where the profile's plan sends two images.
+    /// Image of the other cycle, as base64, if the profile's plan sends two images.
     second: Option<String>,
-    /// Form of the images; missing: seen by their content. Text and records are never taken for raw bytes.
+    /// Format of the images; missing: detected from their content. Text and records are never read as raw bytes.
     format: Option<ImageFormat>,
-    /// What their addresses count; missing: seen by their records.
+    /// Unit of their addresses; missing: detected from their records.
     addresses: Option<Unit>,
-    /// Gaps between records are filled with FF.
+    /// `true`: fill gaps between records with FF.
     #[serde(default)]
     fill_gaps: bool,
-    /// Flash date, as `2009-06-01`; missing: today, and a board that shows the program keeps its date.
+    /// Flash date, as `2009-06-01`; missing: today, but a board that already shows the program keeps its date.
     date: Option<String>,
     /// Program ID that the boards must show at the end.
     expect_program_id: Option<u16>,
-    /// All boards at once, by broadcast.
+    /// `true`: update all boards at once, by broadcast.
     #[serde(default)]
     group: bool,
-    /// Start the application at the end.
+    /// `true`: start the application at the end.
     #[serde(default)]
     start: bool,
-    /// Only the checks.
+    /// `true`: run only the checks.
     #[serde(default)]
     dry_run: bool,
-    /// Also when boards run, another PC is on the bus, or the board shows the program already.
+    /// `true`: update even if boards run, another PC is on the bus, or the board already shows the program.
     #[serde(default)]
     force: bool,
-    /// Also when the board shows the program already; lifts no check.
+    /// `true`: update even if the board already shows the program; all checks still apply.
     #[serde(default)]
     rewrite: bool,
-    /// What cannot be verified is as good as what was: also a board that shows the program, of whose flash nothing is known.
+    /// `true`: accept a result that cannot be verified, also of a board that shows the program but whose flash contents
+    /// are not known.
     #[serde(default)]
     accept_unverified: bool,
 }
@@ -123,7 +124,7 @@ fn image(text: &str, request: &UpdateRequest) -> Result<UpdateImage, Problem> {
     Ok(image.into())
 }
 
-/// What helps against a file that is no image. It never leads past a check of what the file holds.
+/// Returns the next step for a file that is not a valid image. The step never skips a check of the contents.
 fn advice(error: &ImageError) -> &'static str {
     match error.advice() {
         ImageAdvice::None => "",
@@ -140,7 +141,7 @@ fn advice(error: &ImageError) -> &'static str {
     }
 }
 
-/// The flash date: as asked, else today (UTC); 0 where no header carries it.
+/// Returns the flash date: the requested one, else today (UTC); 0 if no header contains a date.
 fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Problem> {
     let wrong = |text: &str| {
         usage(
@@ -190,7 +191,7 @@ fn options(request: &UpdateRequest, profile: &Profile) -> Result<UpdateOptions, 
     })
 }
 
-/// Reads a request; what is long is parsed beside the threads that serve.
+/// Reads a request; long images are parsed outside the threads that serve requests.
 async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Problem> {
     let (parts, body) = request.into_parts();
     let body = Bytes::from_request(Request::from_parts(parts.clone(), body), &()).await;
@@ -204,7 +205,7 @@ async fn read(request: Request, profile: Profile) -> Result<UpdateOptions, Probl
     parsed.await.unwrap_or_else(|_| Err(fault()))
 }
 
-/// What an update that did not end well ended with.
+/// Returns the problem of an update that failed.
 fn failed(report: &UpdateReport) -> Option<Problem> {
     let kind = report.failure()?;
     let failures: Vec<_> =
@@ -228,7 +229,9 @@ fn failed(report: &UpdateReport) -> Option<Problem> {
     Some(Problem::new(code, message, next).kind(kind).with(facts))
 }
 
-/// Programs boards: checked, transferred twice, verified by reading back. Never two at once.
+/// Programs boards: the image is checked, transferred twice, and verified by reading back.
+///
+/// One update runs at a time.
 #[utoipa::path(
     post,
     path = "/api/updates",
@@ -242,7 +245,7 @@ pub(super) async fn update(
     after: AskedAfter,
     request: Request,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    // Before the images are read.
+    // Checked before the images are read.
     agent.commander(&asker)?;
     let Ok(room) = agent.images.clone().acquire_owned().await else { return Err(fault()) };
     let profile = agent.shared.picture().profile;

@@ -1,4 +1,4 @@
-//! What is asked of the owner of a bus: something that is soon over, or a job.
+//! Requests to the owner of a bus: short ones, and jobs.
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -11,11 +11,11 @@ use crate::happening::Happening;
 use crate::jobs::{Done, Job, Stage};
 use crate::work::{Asked, Cancelled, Kind, Work};
 
-/// What has waited so long for its turn is not done: a request gets no answer after ten seconds, and has to be over by then.
+/// Longest wait for a turn; after it the request is refused, because its HTTP request times out after ten seconds.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 impl Shared {
-    /// Has the owner do something soon, and waits for it: a command, or a question of somebody who looks.
+    /// Runs a short function in the owner's thread and waits for it: a command, or a question that needs no lease.
     pub async fn call<T: Send + 'static>(
         &self,
         asked: Option<Asked>,
@@ -26,18 +26,18 @@ impl Shared {
         let only_ends = asked.is_some_and(|asked| !asked.moves);
         let begun = Instant::now();
         let act = move |hands: Result<&mut Hands, Problem>| {
-            // Nothing moves for a program that has given up, perhaps long ago.
+            // A request of a client that has given up must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
             }
-            // Its answer would be too late, though it were done.
+            // Its answer would be too late, even if it ran.
             let hands = hands.and_then(|hands| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
                     Err(Problem::new("busy", "its turn did not come in time: it is not done", "ask again"))
                 }
                 false => Ok(hands),
             });
-            // Who has gone needs no answer.
+            // A client that has disconnected needs no answer.
             let _ = answer.send(hands.and_then(|hands| {
                 let done = act(hands);
                 hands.settle();
@@ -71,7 +71,7 @@ impl Shared {
                 Ok((done, error)) => (Some(done), error),
                 Err(error) => (None, Some(error)),
             };
-            // What was brought about before it was cancelled is its result all the same.
+            // Results from before a cancellation are kept.
             let stage = match &error {
                 None => Stage::Finished,
                 Some(error) if error.code == CANCELLED || error.code == STOPPED => Stage::Cancelled,
@@ -83,7 +83,7 @@ impl Shared {
         Ok(job)
     }
 
-    /// Cancels a job: what it has to undo on the boards it still does. False: it is over.
+    /// Cancels a job, which still undoes its steps on the boards. Returns `false` if it has ended.
     pub fn cancel_job(&self, number: u64) -> bool {
         match self.queue.cancel_job(number) {
             Some(Cancelled::Current) => true,
@@ -96,13 +96,13 @@ impl Shared {
     }
 }
 
-/// What should never happen has.
+/// Returns the problem for a fault of the agent itself.
 pub(crate) fn fault() -> Problem {
     Problem::new("fault", "the agent has a fault", "look at what the agent printed")
         .kind(host_kit::ErrorKind::Fault)
 }
 
-/// A job that has not ended: where it does so by a fault of the agent, that is its end.
+/// Job that has not ended; if this is dropped because of a fault of the agent, the job ends as failed.
 struct Unfinished {
     shared: Arc<Shared>,
     number: u64,

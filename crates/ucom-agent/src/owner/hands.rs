@@ -1,4 +1,4 @@
-//! What is done with the bus: turns, one thing after the other, and what is known of the boards by it.
+//! Work on the bus: turns, one after the other, and the knowledge about boards that results from them.
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -19,15 +19,15 @@ use crate::work::Work;
 
 /// Longest wait of a turn.
 const TURN: Duration = Duration::from_millis(5);
-/// Before anything is asked the bus is listened to: another PC may be its master (D-08).
+/// Listening time before the first question, because another PC may be master of the bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
-/// A board that gave no names is not asked again so soon for those who only look.
+/// Time for which a board that returned no names is not asked again by requests without the lease.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
 
-/// The session, and what belongs to it.
+/// Session of the bus, with its data.
 pub(crate) struct Hands {
     pub session: Session,
-    /// What updates wrote to boards.
+    /// Records of the images that updates wrote to boards.
     pub records: FlashRecords,
     shared: Arc<Shared>,
     pub(super) local: Rc<RefCell<Local>>,
@@ -48,7 +48,7 @@ impl DerefMut for Hands {
 }
 
 impl Hands {
-    /// Those of a session on this link.
+    /// Creates a session on this link.
     pub(super) fn new(shared: Arc<Shared>, config: Config, link: Link) -> Self {
         let Config { profile, signals, cache, cleanup, inventory } = config;
         let local = Rc::default();
@@ -59,7 +59,7 @@ impl Hands {
         Self { session, records, shared, local }
     }
 
-    /// Does what is asked for until the bus is gone or the agent ends.
+    /// Serves requests until the bus is lost or the agent ends.
     pub(super) fn serve(&mut self) -> Result<(), SessionError> {
         let start = Instant::now();
         let mut looked = false;
@@ -68,7 +68,7 @@ impl Hands {
             if !looked && start.elapsed() >= LISTEN {
                 looked = true;
                 if self.driver.master.competing_master().is_none() {
-                    // Who is there is asked again whenever somebody wants to know; a bus that is gone is seen in the next turn.
+                    // The scan is repeated on request; a lost bus is detected in the next turn.
                     let _ = self.driver.run(Request::Scan);
                 }
             }
@@ -77,7 +77,7 @@ impl Hands {
             {
                 self.work(work);
                 self.turn()?;
-                // Also while questions come without end.
+                // Also if questions arrive without pause.
                 self.rest();
             }
             self.rest();
@@ -85,7 +85,7 @@ impl Hands {
         Ok(())
     }
 
-    /// Lets the bus go on for a moment. The leases are looked at, too: see [`Hand`].
+    /// Runs one turn of the bus. Also checks the leases: see [`Hand`].
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
         let events = self.session.look().into_iter().map(|notice| {
@@ -96,23 +96,22 @@ impl Hands {
         Ok(())
     }
 
-    /// Heartbeats go out for who commands, too.
+    /// Keeps the heartbeats going while a client holds the lease.
     fn rest(&mut self) {
         let commands = self.shared.is_commanded();
         self.session.rest(commands);
     }
 
-    /// What was done is in the picture, what has happened is written down, and it goes on no more: before who asked for it knows that it is
-    /// done.
+    /// Publishes the snapshot and the events of a request and marks it as ended, before its client receives the answer.
     pub(super) fn settle(&mut self) {
         self.local.borrow_mut().published = None;
-        // A bus that is gone is seen in the next turn.
+        // A lost bus is detected in the next turn.
         let _ = self.driver.turn(Duration::ZERO);
         self.shared.queue.done();
     }
 
     fn work(&mut self, work: Work) {
-        // What is asked in the background must not find a board busy.
+        // Questions in the background must not keep a board busy.
         self.quiet();
         self.local.borrow_mut().job = work.job;
         match work.asked.and_then(|asked| self.shared.too_late(asked)) {
@@ -123,15 +122,15 @@ impl Hands {
             None => (work.act)(Ok(self)),
         }
         self.local.borrow_mut().job = None;
-        // What nobody waits for any more, and what was not begun, has settled nothing.
+        // Requests that were abandoned or not begun have not called `settle`.
         self.shared.queue.done();
     }
 
-    /// An error of the session; where a Stop or the agent's end was its cause, that.
+    /// Returns the problem for an error of the session; a Stop or the agent's end takes precedence if it was the cause.
     pub fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {
-                // The agent is there, and so is the bus: it is the board that is not.
+                // Agent and bus are available, only the board is not.
                 (
                     ErrorKind::NoLink,
                     SessionError::Procedure(_) | SessionError::NoBoards | SessionError::NoNumbers { .. },
@@ -143,7 +142,8 @@ impl Hands {
         self.shared.why_cancelled()
     }
 
-    /// Names and meanings of a board's values, for somebody who only looks. A board that gave no names is left alone for a while: commands wait meanwhile.
+    /// Returns names and meanings of a board's values, for requests without the lease. A board that returned no names
+    /// is not asked again for 3 s, because commands wait meanwhile.
     pub fn known_to_viewers(&mut self, board: u8) -> Result<Arc<Known>, Problem> {
         if let Some((at, problem)) = self.local.borrow().nameless.get(&board)
             && at.elapsed() < LEFT_ALONE
@@ -161,7 +161,7 @@ impl Hands {
         })
     }
 
-    /// What is known of the values of a board.
+    /// Returns the known values of a board.
     pub fn values_of(&self, known: &Arc<Known>) -> Values {
         let (master, board) = (&self.driver.master, known.board);
         let outputs = self.held.borrow().snapshots.get(&board).cloned();
@@ -173,7 +173,7 @@ impl Hands {
         }
     }
 
-    /// Stops what this agent has started.
+    /// Stops the boards that this agent has started.
     pub(super) fn leave(&mut self) {
         let started = self.started();
         if !started.is_empty() {

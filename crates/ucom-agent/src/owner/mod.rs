@@ -1,4 +1,4 @@
-//! The owner of a bus: one thread with a session on it, for all clients.
+//! Owner of a bus: one thread with a session on it, for all clients.
 mod ask;
 mod hands;
 mod operator;
@@ -17,35 +17,36 @@ pub(crate) use ask::fault;
 pub(crate) use hands::Hands;
 pub(crate) use shared::Shared;
 
-/// What is known of the boards beforehand.
+/// Configuration of the boards that is known beforehand.
 #[derive(Clone, Debug, Default)]
 pub struct Config {
-    /// How they read the protocol.
+    /// Profile of the protocol on these boards.
     pub profile: Profile,
-    /// What their words mean.
+    /// Meaning of their words.
     pub signals: SignalTable,
-    /// Where names are remembered.
+    /// Cache for the names of values.
     pub cache: Cache,
-    /// What would be left undone if the process ended now, for those who end it.
+    /// List of clean-up steps that are open if the process ends now, for the code that ends it.
     pub cleanup: CleanupList,
-    /// The inventory file, which has what updates wrote to boards; `None`: the agent remembers it for as long as it runs.
+    /// Inventory file with the images that updates wrote to boards; `None`: the agent keeps these records while it
+    /// runs.
     pub inventory: Option<PathBuf>,
 }
 
-/// The thread that owns a bus.
+/// Thread that owns a bus.
 pub struct Owner {
     pub(crate) shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Owner {
-    /// Opens the bus of this URL, and asks who is there unless another PC is its master.
+    /// Opens the bus of this URL. Scans for boards unless another PC is master of the bus.
     ///
     /// # Errors
     ///
-    /// The URL is none, or the bus cannot be opened.
+    /// The URL is invalid, or the bus cannot be opened.
     pub fn open(url: &str, config: Config) -> Result<Self, SessionError> {
-        // Heartbeats and Stops of its thread wait for no disk.
+        // Heartbeats and Stops of its thread must not wait for the disk.
         let config = Config { cache: config.cache.in_memory(), ..config };
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         let link = Link::on(Box::new(Prompt(bus)), url);
@@ -55,13 +56,13 @@ impl Owner {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Looks whether the bus is gone, and why.
+    /// Returns a function that returns the reason why the bus was lost, if it was.
     pub fn lost(&self) -> impl Fn() -> Option<String> + Send + use<> {
         let shared = self.shared.clone();
         move || shared.lost()
     }
 
-    /// Stops what runs, and lets the bus go.
+    /// Stops the running boards and releases the bus.
     pub fn end(mut self) {
         self.join();
     }
@@ -81,7 +82,7 @@ impl Drop for Owner {
     }
 }
 
-/// The bus is gone when this is, also where its thread has panicked.
+/// Marks the bus as lost on drop, also after a panic of its thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {

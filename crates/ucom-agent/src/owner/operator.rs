@@ -1,4 +1,4 @@
-//! The operator of the session: what happens on the bus becomes events and a picture, also in the middle of a procedure.
+//! Operator of the session: publishes events of the bus and snapshots, also in the middle of a procedure.
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -14,43 +14,43 @@ use super::shared::Shared;
 use crate::happening::Happening;
 use crate::picture::{Picture, Values};
 
-/// How often the picture is made anew.
+/// Interval between snapshots.
 const PICTURE: Duration = Duration::from_millis(40);
-/// Another PC that has sent nothing for so long is gone, µs.
+/// Silence after which another PC counts as disconnected, µs.
 const COMPETING_US: u64 = 3_000_000;
 
-/// So long a Stop is repeated, µs.
+/// Time for which a Stop is repeated, µs.
 const SERIES_US: u64 = 60_000;
-/// How often progress within a cycle is written down, µs.
+/// Interval between progress events within a cycle, µs.
 const PROGRESS_US: u64 = 200_000;
 
 /// Job, boards, attempt and cycle of an update.
 type Step = (u64, Vec<u8>, u32, u32);
 
-/// What the owner's thread remembers, also in the middle of a procedure.
+/// State of the owner's thread, also in the middle of a procedure.
 #[derive(Default)]
 pub(super) struct Local {
-    /// Boards that gave no names when somebody asked who only looks: when, and why.
+    /// Boards that returned no names to a request without the lease: time and reason.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
-    /// Stops that have been sent, and when the last one began to be.
+    /// Number of Stops that were sent; the next field is the time of the last one.
     pub halts_sent: u64,
     pub halted_us: Option<u64>,
-    /// Job, boards, attempt and cycle of the last progress that was written down, and when, µs.
+    /// Job, boards, attempt and cycle of the last progress event, and its time, µs.
     pub progress: Option<(Step, u64)>,
-    /// The Stop at the agent's end is on the bus.
+    /// `true` if the Stop at the agent's end was sent.
     pub end_sent: bool,
     pub job: Option<u64>,
-    /// When another PC was last news.
+    /// Time of the last event about another PC, µs.
     pub competing_us: Option<u64>,
     pub now_us: u64,
-    /// When the picture was made; `None`: it is to be made anew at once.
+    /// Time of the last snapshot; `None`: a new one is due at once.
     pub published: Option<Instant>,
-    /// What has happened and is written down behind the next picture: who reads of it finds it there.
+    /// Events that are written after the next snapshot, so that their readers find the new state there.
     pub happened: Vec<Happening>,
 }
 
-/// The operator of the session.
+/// Operator of the session.
 pub(super) struct Hand {
     pub shared: Arc<Shared>,
     pub held: Rc<RefCell<Held>>,
@@ -74,12 +74,12 @@ impl Operator for Hand {
     fn happened(&self, event: &Event, text: Option<String>) {
         let mut local = self.local.borrow_mut();
         let now_us = local.now_us;
-        // What it is to those who supervise is an event of each turn.
+        // Changes of the supervision are reported in each turn.
         let _ = self.held.borrow_mut().see(event, now_us);
         let job = local.job;
         let mut write = Vec::new();
         match event {
-            // It is in the picture.
+            // The snapshot contains it.
             Event::Snapshot { .. } => {}
             Event::Supervision { board, change } => {
                 let (board, change) = match change {
@@ -129,20 +129,20 @@ impl Operator for Hand {
     }
 
     fn turned(&self, master: &mut Master, link: &mut Link) {
-        // Whatever goes on and waits: nobody keeps a lease from lapsing.
+        // In each turn, so that a running or waiting request never prevents the lapse of a lease.
         drop(self.shared.leases());
         let mut local = self.local.borrow_mut();
         local.now_us = link.now_us();
         self.shared.show_halts();
         let halts = self.shared.halts();
-        // One that comes meanwhile has the repetitions of the one before, then its own: a flood of Stops does not fill the bus.
+        // A Stop during the repetitions of an earlier one is sent after them, so that many Stops do not fill the bus.
         let repeated = local.halted_us.is_some_and(|at| local.now_us.saturating_sub(at) < SERIES_US);
         if local.halts_sent < halts && !repeated {
             (local.halts_sent, local.halted_us) = (halts, Some(local.now_us));
             master.stop_at_once(local.now_us, None);
         }
         if self.shared.has_ended() && !local.end_sent {
-            // What goes on has to undo something, perhaps on boards that do not answer: nothing runs on meanwhile.
+            // A running request may still undo steps on boards that do not answer: the boards are stopped first.
             local.end_sent = true;
             let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
             master.stop_at_once(local.now_us, Some(&started));

@@ -1,4 +1,4 @@
-//! What the owner of a bus and those who ask it share: the boards as last seen, who commands, and who has stopped the boards.
+//! State that the owner of a bus shares with its callers: boards as last seen, lease and Stops.
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -15,17 +15,17 @@ use crate::jobs::Jobs;
 use crate::picture::Picture;
 use crate::work::{Asked, Queue};
 
-/// For so long after somebody else's Stop nothing is begun that moves.
+/// Hold-off after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
 
-/// Stops that come within this time of one are one event together.
+/// Time within which several Stops become one event.
 const TOGETHER: Duration = Duration::from_millis(100);
 
-/// Codes of what was cancelled, and of what a Stop has ended.
+/// Error codes of a cancelled request, and of a request that a Stop has ended.
 pub(super) const CANCELLED: &str = "cancelled";
 pub(super) const STOPPED: &str = "stopped";
 
-/// A Stop: who asked for it, with the key of a lease or without, and when.
+/// Stop: its requester, with a lease or without, and its time.
 #[derive(Clone)]
 struct Halt {
     by: String,
@@ -33,15 +33,15 @@ struct Halt {
     at: Instant,
 }
 
-/// The Stops that were asked for.
+/// Requested Stops.
 #[derive(Default)]
 struct Halts {
     count: u64,
-    /// When one was last an event, and how many have come since.
+    /// Time of the last event; the next field is the number of Stops since then.
     shown: Option<Instant>,
     more: u64,
     last: Option<Halt>,
-    /// The last one by somebody else than who asked for the last one.
+    /// Last Stop of a client other than the client of `last`.
     last_by_another: Option<Halt>,
 }
 
@@ -55,19 +55,19 @@ impl Halts {
         }
     }
 
-    /// Who asked for the last one.
+    /// Returns the requester of the last Stop.
     fn last_by(&self) -> &str {
         self.last.as_ref().map_or("", |halt| halt.by.as_str())
     }
 
-    /// Somebody else than this client has just stopped the boards.
+    /// Returns a Stop of another client within the hold-off.
     fn keeps_calm(&self, client: ClientId) -> Option<&Halt> {
         let others = |halt: &&Halt| halt.client != Some(client) && halt.at.elapsed() < CALM;
         self.last.iter().chain(&self.last_by_another).find(others)
     }
 }
 
-/// What the owner and those who ask it share.
+/// State that the owner shares with its callers.
 pub(crate) struct Shared {
     start: Instant,
     picture: Mutex<Arc<Picture>>,
@@ -79,19 +79,19 @@ pub(crate) struct Shared {
     pub journal: Journal,
     pub jobs: Jobs,
     leases: Mutex<Leases<Policy>>,
-    /// Who commanded when it was last looked.
+    /// Lease holder at the last check.
     holder: Mutex<Option<String>>,
-    /// This agent has started boards: before anything is sent to them, and until they are stopped.
+    /// `true` from before the first frame to a started board until all started boards are stopped.
     pub(super) runs: Arc<AtomicBool>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // A panic of another thread leaves no half-done state behind that matters more than a Stop.
+    // If another thread panicked, an incomplete state matters less than a Stop.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
-    /// Of a bus that nothing is known of but how its boards read the protocol.
+    /// Returns the state of an unknown bus with this profile of the protocol.
     pub(super) fn new(profile: Profile) -> Self {
         Self {
             start: Instant::now(),
@@ -109,31 +109,30 @@ impl Shared {
         }
     }
 
-    /// Time of the agent.
+    /// Returns the time of the agent.
     pub fn now(&self) -> Duration {
         self.start.elapsed()
     }
 
-    /// The boards as last seen.
+    /// Returns the snapshot of the boards.
     pub fn picture(&self) -> Arc<Picture> {
         lock(&self.picture).clone()
     }
 
-    /// Announces each new picture.
+    /// Returns a receiver that announces each new snapshot.
     pub fn changes(&self) -> watch::Receiver<()> {
         self.changed.subscribe()
     }
 
-    /// Why the bus is gone; `None` while it is there.
+    /// Returns the reason why the bus was lost; `None` while it is available.
     pub fn lost(&self) -> Option<String> {
         lock(&self.lost).clone()
     }
 
-    /// Stops all boards, ahead of all else, and sees to it that they have stopped.
-    /// Returns its number.
+    /// Stops all boards ahead of all other requests, and checks that they have stopped. Returns the number of the Stop.
     pub fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
         let number = {
-            // Both at once: what goes on ends, and what takes its turn now finds the Stop.
+            // Under one lock: the current request ends, and a request whose turn comes now sees the Stop.
             let mut halts = lock(&self.halts);
             self.queue.cancel_by_stop();
             halts.add(by, client);
@@ -149,21 +148,21 @@ impl Shared {
         number
     }
 
-    /// How many Stops were asked for until now: the number of the last.
+    /// Returns the number of requested Stops, which is the number of the last one.
     pub fn halts(&self) -> u64 {
         lock(&self.halts).count
     }
 
-    /// Something goes on or waits that this client asked for, and that moves.
+    /// Returns `true` while a request of this client that may move boards is running or waiting.
     pub fn moves_for(&self, client: ClientId) -> bool {
         self.queue.moves_for(client)
     }
 
-    /// What this client asks for now. Where something may move by it, it was asked for behind the Stop of the number `after`.
+    /// Returns a new request of this client. A request that may move boards names the last Stop before it in `after`.
     ///
     /// # Errors
     ///
-    /// Something may, and another Stop has come since, whoever asked for that; or somebody else has just stopped the boards.
+    /// The request may move boards, and a newer Stop exists, or another client stopped the boards within the last 3 s.
     pub fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
         if let Some(AskedAfter(after)) = after {
@@ -177,8 +176,8 @@ impl Shared {
         Ok(Asked { client, halt: halts.count, moves: after.is_some() })
     }
 
-    /// The leases, and the time. One that has lapsed by then has ended, and what it moved follows its policy: before somebody else
-    /// takes it.
+    /// Returns the leases and the present time. A lease that has lapsed is ended first and its policy applied, before
+    /// another client can take it.
     pub fn leases(&self) -> (MutexGuard<'_, Leases<Policy>>, Duration) {
         let (mut leases, now) = (lock(&self.leases), self.now());
         let lapsed = leases.lapse(now);
@@ -196,24 +195,24 @@ impl Shared {
     }
 }
 
-/// The owner's side.
+/// Functions for the owner.
 impl Shared {
-    /// Has the owner end.
+    /// Tells the owner to end.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Relaxed);
     }
 
-    /// The owner is to end.
+    /// Returns `true` if the owner must end.
     pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Relaxed)
     }
 
-    /// What goes on is to end.
+    /// Returns `true` if the current request must end.
     pub(super) fn is_cancelled(&self) -> bool {
         self.has_ended() || self.queue.is_cancelled()
     }
 
-    /// Writes the Stops down that are no event yet: the first one at once, others together.
+    /// Writes the events of new Stops: the first one at once, further ones together.
     pub(super) fn show_halts(&self) {
         let mut halts = lock(&self.halts);
         if halts.more > 0 && halts.shown.is_none_or(|at| at.elapsed() >= TOGETHER) {
@@ -224,7 +223,8 @@ impl Shared {
         }
     }
 
-    /// Why something is not done any more whose turn has come: a Stop came before it, or its client commands no more.
+    /// Returns the reason why a request can no longer run at its turn: a Stop came before, or its client has lost the
+    /// lease.
     pub(super) fn too_late(&self, asked: Asked) -> Option<Problem> {
         {
             let halts = lock(&self.halts);
@@ -239,7 +239,7 @@ impl Shared {
         })
     }
 
-    /// Why something was cancelled.
+    /// Returns the reason of a cancellation.
     pub(super) fn why_cancelled(&self) -> Problem {
         match &lock(&self.halts).last {
             Some(halt) if halt.at.elapsed() < CALM => stopped(&halt.by),
@@ -247,19 +247,19 @@ impl Shared {
         }
     }
 
-    /// Somebody has the lease.
+    /// Returns `true` if a client holds the lease.
     pub(super) fn is_commanded(&self) -> bool {
         lock(&self.leases).lease().is_some()
     }
 
-    /// Shows a new picture, then what has happened: who reads of it finds it there.
+    /// Publishes a snapshot and then events, so that readers of the events find the new state.
     pub(super) fn publish(&self, picture: Picture, happened: Vec<Happening>) {
         *lock(&self.picture) = Arc::new(picture);
         happened.into_iter().for_each(|event| self.journal.write(event));
         self.changed.send_replace(());
     }
 
-    /// The bus is gone, and why; what waits is not done.
+    /// Marks the bus as lost, with the reason; waiting requests are refused.
     pub(super) fn close(&self, why: String) {
         *lock(&self.lost) = Some(why.clone());
         self.queue.close();
@@ -268,7 +268,7 @@ impl Shared {
     }
 }
 
-/// Somebody has cancelled it.
+/// Returns the problem for a cancelled request.
 pub(super) fn cancelled() -> Problem {
     Problem::new(CANCELLED, "it was cancelled", "ask for it again")
 }

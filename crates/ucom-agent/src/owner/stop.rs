@@ -1,4 +1,4 @@
-//! What follows a Stop when its frames are on the bus: each board is asked.
+//! Checks after a Stop: each board is asked after the frames of the Stop were sent.
 use std::collections::BTreeSet;
 
 use ucom::Status;
@@ -9,14 +9,15 @@ use super::Hands;
 use crate::happening::Happening;
 
 impl Hands {
-    /// Asks each board after a Stop, and stops its application: those that answer, and those that may run and do not.
+    /// Asks each board after a Stop and stops its application: boards that answer, and boards that may run but do not
+    /// answer.
     pub(super) fn see_to_stop(&mut self) {
         let was_master = self.driver.master.is_master();
         let mut wanted = self.may_run();
         let mut not_stopped = Vec::new();
         match self.driver.numbers_to_stop(&Boards::All) {
             Ok(found) => wanted.extend(found),
-            // Without a number no board runs.
+            // A board without a number does not run.
             Err(SessionError::NoBoards | SessionError::NoNumbers { .. }) => {}
             Err(error) => not_stopped.push(error.to_string()),
         }
@@ -34,10 +35,11 @@ impl Hands {
             }
             Err(error) => not_stopped.push(error.to_string()),
         }
-        // The others count as started until they are stopped.
+        // The other boards count as started until they are stopped.
         confirmed.iter().for_each(|board| self.runs_no_more(Some(*board)));
         if !was_master {
-            // A Stop makes nobody the master: who has not confirmed it becomes safe without heartbeats, unless the master sends its own.
+            // A Stop makes no agent the master. A board without a confirmation becomes safe without heartbeats, unless
+            // the master sends its own.
             self.driver.master.end_session();
         }
         let boards = confirmed.into_iter().collect();
@@ -45,7 +47,8 @@ impl Hands {
         self.settle();
     }
 
-    /// Boards that may run: this agent has started them, or they were last seen so. One that has begun anew does not.
+    /// Returns the boards that may run: this agent has started them, or they were started or ran when last seen. A
+    /// board that has rebooted does not run.
     fn may_run(&mut self) -> BTreeSet<u8> {
         let (boards, now_us) = (self.driver.master.boards(), self.driver.now_us());
         for (number, _) in boards.iter().filter(|(_, board)| board.rebooted) {

@@ -3,148 +3,157 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description A joint that is not there. */
+        /** @description Absent joint. */
         AbsentJoint: {
             /**
              * Format: u-int8
-             * @description Which, 1 to 6 from the base.
+             * @description Number of the joint, 1 to 6 from the base.
              */
             joint: number;
             /**
              * Format: double
-             * @description Where the model has it, rad.
+             * @description Position of the joint in the model, rad.
              */
             position_rad: number;
         };
-        /** @description The joints that are not there. */
+        /** @description Joints that are set absent. */
         AbsentObject: {
-            /** @description Each at most once; empty: all joints are there. */
+            /** @description Joints, each at most once; empty: all joints are there. */
             absent: components["schemas"]["AbsentJoint"][];
         };
-        /** @description The arm that the controller has in use. */
+        /** @description Arm in use by the controller. */
         ArmObject: {
-            /** @description Hash of all that decides how the arm moves. */
+            /** @description Hash of all parameters that decide how the arm moves. */
             hash: string;
-            /** @description Its name. */
+            /** @description Name of the arm. */
             name: string;
-            /** @description As an arm file, TOML: what `jtc arm pull` writes. */
+            /** @description Arm file in TOML, as `jtc arm pull` writes it. */
             text: string;
         };
-        /** @description An arm for the controller. */
+        /** @description Arm to send to the controller. */
         ArmRequest: {
-            /** @description Keep it over a loss of power: the arm has no torque then, and the controller is in Init behind it. */
+            /**
+             * @description `true`: store the arm in non-volatile memory. The arm has no torque meanwhile, and the controller stays in Init
+             *     afterwards.
+             */
             store?: boolean;
-            /** @description The text of an arm file (TOML), or of a robot description (URDF) in which nothing but the arm moves. */
+            /** @description Text of an arm file (TOML), or of a robot description (URDF) in which only the arm has movable joints. */
             text: string;
         };
-        /** @description Which limit a motion uses up, from when to when. */
+        /** @description Limiting constraint of a motion during an interval. */
         BoundObject: {
             /**
              * Format: double
-             * @description s from the start.
+             * @description Start of the interval, s from the start.
              */
             from_s: number;
             /**
              * Format: u-int8
-             * @description Which joint, 1 to 6 from the base.
+             * @description Number of the joint, 1 to 6 from the base.
              */
             joint: number;
-            /** @description `velocity`, `acceleration`, `jerk`, `torque`, `stop` (room to stop in time), `friction` (its table) or `given time`. */
+            /**
+             * @description Limit: `velocity`, `acceleration`, `jerk`, `torque`, `stop` (margin to stop in time), `friction` (its table) or
+             *     `given time`.
+             */
             limit: string;
             /**
              * Format: double
-             * @description s from the start.
+             * @description End of the interval, s from the start.
              */
             to_s: number;
         };
-        /** @description What a check found. */
+        /** @description Result of a check. */
         CheckObject: {
-            /** @description What was checked, in short: the digest of the trajectory. */
+            /** @description Digest of the checked trajectory. */
             digest: string;
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             duration_s: number;
             margin?: components["schemas"]["MarginObject"] | null;
-            /** @description Nothing forbids to run it from its first point. */
+            /** @description `true` if the trajectory can run from its first point. */
             passed: boolean;
-            /** @description What is wrong, worst first. */
+            /** @description Problems, worst first. */
             problems: components["schemas"]["ProblemObject"][];
         };
-        /** @description Nodes whose errors are cleared. */
+        /** @description Nodes whose errors to clear. */
         ClearRequest: {
-            /** @description The gripper. */
+            /** @description `true` for the gripper. */
             gripper?: boolean;
             /** @description Joints, 1 to 6 from the base. */
             joints?: number[];
         };
-        /** @description What the controller reports. */
+        /** @description Status of the controller. */
         ControllerObject: {
             /**
-             * @description What is wrong, the most particular first, with the joint of each: also what its drive reports. `GET /api/explain/{code}` takes them as
-             *     they are.
+             * @description Causes of the errors, the most specific first, each with its joint; includes the errors of its drive.
+             *     `GET /api/explain/{code}` accepts these texts.
              */
             causes: string[];
             /**
-             * @description Where the joints are commanded to be, rad, from the base; missing where the agent does not know: no trajectory that was sent through
-             *     it is executed.
+             * @description Commanded joint positions, rad, from the base; missing if the agent does not know them: no trajectory that was
+             *     sent through the agent is being executed.
              */
             commanded_rad?: number[] | null;
-            /** @description Joints from 1 whose encoder had jumped at the last held stop: no trajectory is executed until their drives were reset; missing: none. */
+            /**
+             * @description Joints whose encoder had jumped at the last held stop, counted from 1: no trajectory is executed until their
+             *     drives are reset; missing: none.
+             */
             encoder_jumped?: number[];
-            /** @description Names of their pages, in the same order: `GET /api/explain/{code}`. */
+            /** @description Names of the pages about these errors, in the same order: `GET /api/explain/{code}`. */
             error_codes: string[];
-            /** @description Errors now. */
+            /** @description Current errors. */
             errors: string[];
-            /** @description Errors since they were cleared last. */
+            /** @description Errors since the last clearing. */
             errors_occurred: string[];
             held_stop?: components["schemas"]["HeldStopObject"] | null;
             /** @description Joints, from the base. */
             joints: components["schemas"]["JointObject"][];
-            /** @description What helps now; empty where nothing is wrong. */
+            /** @description Next step; empty without a problem. */
             next: string;
             /**
              * Format: u-int32
-             * @description The 1 ms point of the trajectory that the controller is at.
+             * @description Current 1 ms point of the trajectory.
              */
             point: number;
             /** @description State, in the words of the protocol. */
             state: string;
-            /** @description What becomes of the trajectory. */
+            /** @description State of the trajectory. */
             trajectory: string;
         };
-        /** @description What was found. */
+        /** @description Result of a diagnosis. */
         DoctorObject: {
-            /** @description Worst first. */
+            /** @description Findings, worst first. */
             findings: components["schemas"]["FindingObject"][];
-            /** @description Nothing is a problem. */
+            /** @description `true` if no finding is a problem. */
             healthy: boolean;
             /**
              * Format: double
-             * @description How long was listened, s.
+             * @description Listening time, s.
              */
             listened_s: number;
             /**
              * Format: u-int64
-             * @description Statuses that came meanwhile.
+             * @description Number of statuses received in this time.
              */
             statuses: number;
         };
-        /** @description Why something was not done. */
+        /** @description Reason why a request was refused or failed. */
         ErrorObject: {
             /**
              * Format: u-int8
-             * @description Board of a chain.
+             * @description Number of a board of a chain.
              */
             board?: number | null;
             /** @description Usual cause. */
             cause?: string | null;
-            /** @description Short name, for programs. */
+            /** @description Short name of the error, for programs. */
             code: string;
             /**
              * Format: u-int8
-             * @description Joint of an arm, 1 to 6 from the base.
+             * @description Number of a joint of an arm, 1 to 6 from the base.
              */
             joint?: number | null;
             /**
@@ -152,179 +161,179 @@ export interface components {
              * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description Sentence for people: request, place, value and limit. */
+            /** @description Message for people: request, place, value and limit. */
             message: string;
             /** @description Next step. */
             next: string;
             /**
              * Format: u-int32
-             * @description Point of the trajectory, from 0; in motion the 1 ms point.
+             * @description Index of a point of the trajectory, from 0; in motion the 1 ms point.
              */
             point?: number | null;
             /**
              * Format: double
-             * @description Value that was found, in the unit of the message.
+             * @description Measured or requested value, in the unit of the message.
              */
             value?: number | null;
         };
-        /** @description An event. */
+        /** @description Event with its number and time. */
         EventObject: {
-            /** @description What has happened. */
+            /** @description Event. */
             event: components["schemas"]["Happening"];
             /**
              * Format: u-int64
-             * @description Counts up from 1 as long as this agent runs.
+             * @description Number of the event; counts up from 1 as long as this agent runs.
              */
             number: number;
             /**
              * Format: double
-             * @description When, s since 1970 by the agent's clock.
+             * @description Time of the event by the agent's clock, s since 1970.
              */
             unix_s: number;
         };
         /** @description Events. */
         EventsObject: {
-            /** @description Which agent this is, by a number that it was given at its start: another one counts its events anew. */
+            /** @description Number that identifies this run of the agent; another run counts its events from 1. */
             agent: string;
-            /** @description Oldest first. */
+            /** @description Events, oldest first. */
             events: components["schemas"]["EventObject"][];
             /**
              * Format: u-int64
-             * @description The number to ask on from.
+             * @description Number to use as `after` in the next request.
              */
             last: number;
-            /** @description Some that were asked for are not kept any more. */
+            /** @description `true` if some requested events were dropped from the journal. */
             missed: boolean;
         };
-        /** @description A finding. */
+        /** @description Finding of a diagnosis. */
         FindingObject: {
-            /** @description What helps; empty where nothing is to be done. */
+            /** @description Next step; empty if no action is needed. */
             next: string;
             /** @description `problem`, `warning` or `good`. */
             severity: string;
-            /** @description What it is. */
+            /** @description Observation. */
             what: string;
-            /** @description What usually causes it; empty where nothing is known. */
+            /** @description Usual cause; empty if no cause is known. */
             why: string;
         };
-        /** @description A pose of the flange in the frame of the base. */
+        /** @description Pose of the flange in the frame of the base. */
         FlangeObject: {
             /** @description Roll, pitch, yaw about the fixed axes x, y, z, as in a URDF, rad. */
             rpy_rad: number[];
-            /** @description x, y, z, m. */
+            /** @description Position x, y, z, m. */
             xyz_m: number[];
         };
-        /** @description Where a frame is. */
+        /** @description Position and orientation of a frame. */
         FrameObject: {
             /** @description Roll, pitch, yaw, rad. */
             origin_rpy_rad: number[];
-            /** @description x, y, z, m. */
+            /** @description Origin x, y, z, m. */
             origin_xyz_m: number[];
         };
-        /** @description What the controller was given. */
+        /** @description Parameters that were sent to the controller. */
         GivenObject: {
-            /** @description Hash of the arm, where all of it was read back and nothing differs. */
+            /** @description Hash of the arm, if all parameters were read back without a difference. */
             hash?: string | null;
-            /** @description The controller has the arm's name. */
+            /** @description `true` if the controller has the name of the arm. */
             named: boolean;
-            /** @description Friction, gains and model, as far as they were confirmed. */
+            /** @description Friction, gains and model, as far as the controller confirmed them. */
             parts: components["schemas"]["PartObject"][];
-            /** @description So many settings have changed. */
+            /** @description Number of settings that have changed. */
             settings: number;
             /**
              * Format: u-int32
-             * @description Its number in the memory that lasts.
+             * @description Number of the arm in the non-volatile memory.
              */
             stored_number?: number | null;
         };
-        /** @description What has happened. */
+        /** @description Event of an arm or a job. */
         Happening: {
-            /** @description Its name; missing: nobody commands. */
+            /** @description Name of the holder; missing: no client holds the lease. */
             holder?: string | null;
             /** @enum {string} */
             kind: "lease";
         } | {
-            /** @description Who it was. */
+            /** @description Name of the client that requested it. */
             by: string;
             /** @description `stop` or `pause`. */
             command: string;
             /** @enum {string} */
             kind: "halt";
         } | {
-            /** @description Errors now. */
+            /** @description Current errors. */
             errors: string[];
             /** @enum {string} */
             kind: "state";
             /** @description State, in the words of the protocol. */
             state: string;
-            /** @description What becomes of the trajectory. */
+            /** @description State of the trajectory. */
             trajectory: string;
         } | {
             /** @enum {string} */
             kind: "lost";
-            /** @description Why. */
+            /** @description Reason. */
             why: string;
         } | {
-            /** @description Who asked for it. */
+            /** @description Name of the client that requested it. */
             client: string;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "begun";
-            /** @description What it does. */
+            /** @description Description of the job. */
             what: string;
         } | {
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "note";
-            /** @description In words. */
+            /** @description Text of the note. */
             text: string;
         } | {
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             duration_s: number;
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "checked";
             /** @description `approach` or `motion`. */
             phase: string;
-            /** @description Points. */
+            /** @description Number of points. */
             points: number;
-            /** @description What does not forbid to run it. */
+            /** @description Warnings, which do not prevent a run. */
             warnings: string[];
         } | {
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "uploading";
             /** @description `approach` or `motion`. */
             phase: string;
-            /** @description Of so many. */
+            /** @description Number of segments of the motion. */
             segments: number;
-            /** @description Segments that the controller has. */
+            /** @description Number of segments that the controller has. */
             segments_done: number;
         } | {
-            /** @description Bytes on the line. */
+            /** @description Number of bytes on the line. */
             bytes: number;
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
@@ -333,40 +342,40 @@ export interface components {
             phase: string;
             /**
              * Format: u-int32
-             * @description Segments that were sent again.
+             * @description Number of repeated segments.
              */
             retries: number;
             /**
              * Format: double
-             * @description How long that took, s.
+             * @description Duration of the upload, s.
              */
             time_s: number;
         } | {
-            /** @description Bytes of its frame. */
+            /** @description Length of its frame, bytes. */
             bytes: number;
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "given";
-            /** @description Which part. */
+            /** @description Name of the parameter. */
             parameter: string;
             /**
              * Format: double
-             * @description How long that took, s.
+             * @description Duration, s.
              */
             time_s: number;
         } | {
             /**
              * Format: double
-             * @description s, at full speed.
+             * @description Duration at full speed, s.
              */
             duration_s: number;
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
@@ -376,7 +385,7 @@ export interface components {
         } | {
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
@@ -385,27 +394,27 @@ export interface components {
             phase: string;
             /**
              * Format: u-int32
-             * @description The 1 ms point that the controller is at.
+             * @description Current 1 ms point of the trajectory.
              */
             point: number;
         } | {
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "finished";
             /**
              * Format: u-int32
-             * @description How many motions of this job were finished, approaches not counted.
+             * @description Number of finished motions of this job, without approaches.
              */
             runs: number;
         } | {
             error?: components["schemas"]["ErrorObject"] | null;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
@@ -413,31 +422,32 @@ export interface components {
             /** @description `finished`, `stopped` or `failed`. */
             outcome: string;
         };
-        /** @description A held stop: the controller has brought the arm to rest and holds it. */
+        /** @description Held stop: the controller has brought the arm to rest and holds its position. */
         HeldStopObject: {
-            /** @description Name of its page: `GET /api/explain/{code}`. */
+            /** @description Name of the page about it: `GET /api/explain/{code}`. */
             code: string;
             /**
              * Format: u-int8
-             * @description Joint from 1 that the cause was found at first; missing: at none in particular.
+             * @description First joint with the cause, counted from 1; missing: no particular joint.
              */
             joint?: number | null;
             /**
-             * @description Kind of the cause: `overload`, `push`, `position-error`, `position-over-limit`, `velocity-over-limit`, `acceleration-over-limit`,
-             *     `friction-table-value-missing`, `unstable`, `encoder-jump`, `speed-scale`, `approach`, `gains`, `shove`; later versions may have others.
+             * @description Kind of the cause: `overload`, `push`, `position-error`, `position-over-limit`, `velocity-over-limit`,
+             *     `acceleration-over-limit`, `friction-table-value-missing`, `unstable`, `encoder-jump`, `speed-scale`,
+             *     `approach`, `gains`, `shove`; later versions may have others.
              */
             kind: string;
             /**
              * Format: float
-             * @description Limit of the value; missing where there is none.
+             * @description Limit of the value; missing without a limit.
              */
             limit?: number | null;
             /**
              * Format: u-int8
-             * @description Number of the kind, as Modbus has it.
+             * @description Number of the kind, as in the Modbus registers.
              */
             number: number;
-            /** @description What removes the cause, in words. */
+            /** @description Remedy in words. */
             remedy: string;
             /**
              * Format: double
@@ -446,118 +456,121 @@ export interface components {
             since_s: number;
             /** @description Cause in words. */
             text: string;
-            /** @description Unit of value and limit; empty where they have none. */
+            /** @description Unit of value and limit; empty if they have no unit. */
             unit: string;
             /**
              * Format: float
-             * @description Value that was found; missing where the kind has none.
+             * @description Value that caused the stop; missing if the kind has no value.
              */
             value?: number | null;
         };
-        /** @description Who the controller is. */
+        /** @description Identity of the controller. */
         InfoObject: {
             /** @description Name of the arm in use. */
             arm: string;
-            /** @description The board. */
+            /** @description Board of the controller. */
             board: string;
-            /** @description Why it started last. */
+            /** @description Cause of the last start. */
             boot_cause: string;
             /**
              * Format: u-int32
-             * @description How often it has started.
+             * @description Number of starts.
              */
             boots: number;
-            /** @description Its defaults are those of an arm that is stored in it, not those of the built-in arm. */
+            /** @description `true` if its defaults are those of a stored arm, not those of the built-in arm. */
             defaults_stored: boolean;
             /**
              * Format: u-int8
-             * @description Version of the extensions of its protocol; 0: it has none, and nothing else is known.
+             * @description Version of the protocol extensions; 0: the controller has none, and nothing else is known.
              */
             extension: number;
             /** @description Version of the firmware. */
             firmware: string;
-            /** @description Hash of all that decides how the arm moves. */
+            /** @description Hash of all parameters that decide how the arm moves. */
             hash: string;
             /**
              * Format: u-int32
-             * @description Records lost because too many waited.
+             * @description Number of records lost because too many waited.
              */
             lost_records: number;
-            /** @description Parameters that it has not been given. */
+            /** @description Parameters that the controller has not received. */
             missing: string[];
             reactions?: components["schemas"]["ReactionsObject"] | null;
-            /** @description Its git revision. */
+            /** @description Git revision of the firmware. */
             revision: string;
             /**
              * Format: double
-             * @description Since then, s.
+             * @description Time since the last start, s.
              */
             uptime_s: number;
         };
-        /** @description A job: something that takes its time. */
+        /** @description Job: a request that takes longer than its answer. */
         JobObject: {
-            /** @description Who asked for it. */
+            /** @description Name of the client that requested it. */
             client: string;
             error?: components["schemas"]["ErrorObject"] | null;
             given?: components["schemas"]["GivenObject"] | null;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             number: number;
-            /** @description Where the report of its last motion is, a page; missing where it has moved nothing, or later ones have taken its place. */
+            /**
+             * @description Address of the report of its last motion, a page; missing if nothing moved, or if later reports have replaced
+             *     it.
+             */
             report?: string | null;
             result?: components["schemas"]["ResultObject"] | null;
             /**
              * Format: u-int32
-             * @description Motions that were finished, approaches not counted.
+             * @description Number of finished motions, without approaches.
              */
             runs: number;
             /** @description `running`, `finished`, `stopped` or `failed`. */
             stage: string;
-            /** @description What it does. */
+            /** @description Description of the job. */
             what: string;
         };
-        /** @description Rates of the joints. */
+        /** @description Joint rates of a jog. */
         JogRequest: {
-            /** @description rad/s, base to wrist. They hold for 200 ms: send them again in time, and zeros at the end. */
+            /** @description Joint rates, rad/s, base to wrist. Rates act for 200 ms: send them again in time, and zeros at the end. */
             rates_rad_s: number[];
         };
-        /** @description What the controller reports of a joint. */
+        /** @description Status of a joint. */
         JointObject: {
-            /** @description Names of their pages, in the same order. */
+            /** @description Names of the pages about these errors, in the same order. */
             error_codes: string[];
-            /** @description Errors that the controller has found at it. */
+            /** @description Errors of this joint that the controller has detected. */
             errors: string[];
             /**
              * Format: u-int8
-             * @description 1 to 6, from the base.
+             * @description Number of the joint, 1 to 6 from the base.
              */
             joint: number;
             /**
              * Format: float
-             * @description rad; missing where it is not known.
+             * @description Position, rad; missing if it is not known.
              */
             position_rad?: number | null;
             /** @description State of its drive. */
             state: string;
             /**
              * Format: u-int8
-             * @description °C; missing alike.
+             * @description Temperature, °C; missing if it is not known.
              */
             temperature_c?: number | null;
             /**
              * Format: float
-             * @description N·m; missing alike.
+             * @description Torque, N·m; missing if it is not known.
              */
             torque_nm?: number | null;
             /**
              * Format: float
-             * @description rad/s; missing alike.
+             * @description Velocity, rad/s; missing if it is not known.
              */
             velocity_rad_s?: number | null;
         };
-        /** @description Figures of a joint. */
+        /** @description Results for a joint. */
         JointPlan: {
             /**
              * Format: double
@@ -566,7 +579,7 @@ export interface components {
             acceleration_peak_rad_s2: number;
             /**
              * Format: u-int8
-             * @description Which, 1 to 6 from the base.
+             * @description Number of the joint, 1 to 6 from the base.
              */
             joint: number;
             /**
@@ -590,14 +603,14 @@ export interface components {
              */
             velocity_peak_rad_s: number;
         };
-        /** @description Figures of a joint. */
+        /** @description Results for a joint. */
         JointResult: {
             /**
              * Format: double
              * @description Largest absolute error, mrad.
              */
             max_error_mrad?: number | null;
-            /** @description As in the arm file. */
+            /** @description Name of the joint in the arm file. */
             name: string;
             /**
              * Format: double
@@ -616,116 +629,119 @@ export interface components {
             rms_error_mrad?: number | null;
             /**
              * Format: double
-             * @description The limit, N·m.
+             * @description Torque limit, N·m.
              */
             torque_limit_nm?: number | null;
         };
-        /** @description Where a plan is kept. */
+        /** @description Place for a planned trajectory. */
         KeepRequest: {
-            /** @description What people are to call it: the first 64 characters. */
+            /** @description Name for people: the first 64 characters. */
             name: string;
-            /** @description In place of nothing: where the number has a trajectory already the plan is refused, and nothing is replaced. */
+            /** @description `true`: refuse the plan if the number is taken, and replace nothing. */
             new?: boolean;
             /**
              * Format: u-int16
-             * @description Its number, in place of what has it.
+             * @description Number of the trajectory; it replaces a trajectory with the same number.
              */
             number: number;
         };
-        /** @description A client that may command, or waits for it. */
+        /** @description Client that holds the lease or waits for it. */
         LeaseGrant: {
-            /** @description It commands; else it waits until the one who does lets it go. */
+            /** @description `true` if the client holds the lease; otherwise it waits until the holder releases it. */
             held: boolean;
-            /** @description Goes with each request of this client, in the header `Lease-Key`. Nobody else is to know it. */
+            /** @description Secret key, which this client sends with each request in the header `Lease-Key`. */
             key: string;
             /**
              * Format: double
-             * @description How long it lasts without a request, s.
+             * @description Duration of the lease without a request, s.
              */
             lasts_s: number;
-            /** @description What becomes of a motion when it has lapsed. */
+            /** @description Policy for a motion after the lease has lapsed. */
             policy: components["schemas"]["Policy"];
         };
-        /** @description Who commands. */
+        /** @description Lease, and its holder. */
         LeaseObject: {
             /**
              * Format: u-int64
-             * @description For how long, ms.
+             * @description Time since the holder took the lease, ms.
              */
             age_ms: number;
-            /** @description Its name. */
+            /** @description Name of the holder. */
             holder: string;
             /**
              * Format: u-int64
-             * @description How long it lasts without renewal, ms; missing: as long as the client is connected.
+             * @description Time until the lease lapses without renewal, ms; missing: it lasts while the client is connected.
              */
             left_ms?: number | null;
-            /** @description Who has asked for it. */
+            /** @description Name of the client that waits for the lease. */
             wanted_by?: string | null;
         };
-        /** @description Who wants to command. */
+        /** @description Request for the lease. */
         LeaseRequest: {
-            /** @description Where another client commands: ask it for the lease, and wait for it. One waits at a time, which shows by PUT that it is there. */
+            /**
+             * @description `true`: if another client holds the lease, ask for it and wait. One client waits at a time, and shows by PUT
+             *     requests that it is alive.
+             */
             ask?: boolean;
             /**
              * Format: double
-             * @description How long the lease lasts without a request of this client, s.
+             * @description Duration of the lease without a request of this client, s.
              */
             lasts_s?: number;
-            /** @description What people are to call it: the first 64 characters. */
+            /** @description Name of the client for people: the first 64 characters. */
             name: string;
-            /** @description What becomes of a motion when it has lapsed. */
+            /** @description Policy for a motion after the lease has lapsed. */
             policy?: components["schemas"]["Policy"];
         };
-        /** @description How a lease is. */
+        /** @description State of a lease. */
         LeaseState: {
-            /** @description This client commands. */
+            /** @description `true` if this client holds the lease. */
             held: boolean;
-            /** @description Who asks for the lease. */
+            /** @description Name of the client that waits for the lease. */
             wanted_by?: string | null;
         };
         /**
          * Format: binary
-         * @description A recording in MCAP with the log in it, as `jtc log fetch` writes it.
+         * @description MCAP recording with the log, as `jtc log fetch` writes it.
          */
         LogFile: string;
-        /** @description A joint in the log. */
+        /** @description Values of a joint in the log. */
         LogJoint: {
-            /** @description Commanded, rad. */
+            /** @description Commanded position, rad. */
             commanded_rad: (number | null)[];
-            /** @description Commanded minus measured, of the same time, rad. */
+            /** @description Commanded minus measured position at the same time, rad. */
             error_rad: (number | null)[];
-            /** @description Measured, rad. */
+            /** @description Measured position, rad. */
             position_rad: (number | null)[];
-            /** @description Commanded on the bus, N·m. */
+            /** @description Torque commanded on the bus, N·m. */
             torque_nm: (number | null)[];
-            /** @description Measured, rad/s. */
+            /** @description Measured velocity, rad/s. */
             velocity_rad_s: (number | null)[];
         };
-        /** @description What the flight recorder does. */
+        /** @description State of the flight recorder. */
         LogStatusObject: {
             /**
              * Format: u-int32
-             * @description Blocks of 1 KiB that it has begun since the start of the controller, those counted that are gone.
+             * @description Number of blocks of 1 KiB begun since the start of the controller, including overwritten ones.
              */
             blocks: number;
-            /** @description In words: it records, or why it has stopped. */
+            /** @description State in words: it records, or the reason why it has stopped. */
             state: string;
         };
-        /** @description What the log holds, tick by tick: 1000 rows a second, in columns of the same length. A value that is not known is null. */
+        /** @description Values of the log per tick: 1000 rows a second, in columns of the same length. A value that is not known is null. */
         LogValues: {
-            /** @description Base to wrist. */
+            /** @description Joints, base to wrist. */
             joints: components["schemas"]["LogJoint"][];
             /** @description State of the controller in the last row. */
             state: string;
-            /** @description Time of each row, s, 0 at the last one. */
+            /** @description Time of each row, s; 0 at the last row. */
             times_s: number[];
         };
-        /** @description The smallest share of a torque limit that a motion leaves unused, and where. */
+        /** @description Smallest unused part of a torque limit in a motion, and its place. */
         MarginObject: {
             /**
              * Format: u-int8
-             * @description Joint that has the least left, 1 to 6 from the base.
+             * @description Number of the joint with the smallest margin, 1 to 6 from the base.
              */
             joint: number;
             /**
@@ -735,26 +751,26 @@ export interface components {
             limit_nm: number;
             /**
              * Format: double
-             * @description What is left, % of the limit.
+             * @description Margin, % of the limit.
              */
             percent: number;
             /**
              * Format: double
-             * @description Bearing temperature of its friction, °C.
+             * @description Bearing temperature for which the friction was computed, °C.
              */
             temperature_c: number;
             /**
              * Format: double
-             * @description When, s from the start.
+             * @description Time, s from the start.
              */
             time_s: number;
             /**
              * Format: double
-             * @description Torque by the model there, N·m.
+             * @description Torque of the model at that time, N·m.
              */
             torque_nm: number;
         };
-        /** @description A joint: where it is, and its limits. */
+        /** @description Joint: its frame and its limits. */
         ModelJoint: {
             /**
              * Format: double
@@ -763,14 +779,14 @@ export interface components {
             acceleration_max_rad_s2: number;
             /**
              * Format: u-int8
-             * @description Which, 1 to 6 from the base.
+             * @description Number of the joint, 1 to 6 from the base.
              */
             joint: number;
-            /** @description Its name. */
+            /** @description Name of the joint. */
             name: string;
-            /** @description How it is turned there: roll, pitch, yaw about fixed axes, as in a URDF, rad. */
+            /** @description Orientation of its frame there: roll, pitch, yaw about fixed axes, as in a URDF, rad. */
             origin_rpy_rad: number[];
-            /** @description Where its frame is in that of the joint before it, at position 0: x, y, z, m. */
+            /** @description Origin of its frame in the frame of the joint before it, at position 0: x, y, z, m. */
             origin_xyz_m: number[];
             /**
              * Format: double
@@ -793,92 +809,92 @@ export interface components {
              */
             velocity_max_rad_s: number;
         };
-        /** @description A link. */
+        /** @description Link of the arm. */
         ModelLink: {
             /** @description Centre of mass, m. */
             com_xyz_m: number[];
             /**
              * Format: double
-             * @description kg.
+             * @description Mass, kg.
              */
             mass_kg: number;
-            /** @description Its name. */
+            /** @description Name of the link. */
             name: string;
         };
-        /** @description The arm in use. */
+        /** @description Arm in use. */
         ModelObject: {
             /** @description The flange, which does not move, in the frame of joint 6. */
             flange: components["schemas"]["FrameObject"];
             /** @description Acceleration of gravity in the frame of the base, m/s². */
             gravity_m_s2: number[];
-            /** @description Hash of all that decides how the arm moves; missing where the agent's arm lacks a part of that. */
+            /** @description Hash of all parameters that decide how the arm moves; missing if the agent's arm lacks one of them. */
             hash?: string | null;
             /** @description Joints, from the base. Each rotates about the z axis of its frame. */
             joints: components["schemas"]["ModelJoint"][];
-            /** @description Links: the base, and behind each joint the one that it moves, in whose frame its numbers are. */
+            /** @description Links: the base, then for each joint the link that it moves. Values are in the frame of that joint. */
             links: components["schemas"]["ModelLink"][];
-            /** @description Its name. */
+            /** @description Name of the arm. */
             name: string;
-            /** @description Whose it is. */
+            /** @description Source of the arm. */
             source: components["schemas"]["ModelSource"];
         };
         /**
-         * @description Whose arm it is.
+         * @description Source of an arm model.
          * @enum {string}
          */
         ModelSource: "controller" | "agent";
-        /** @description A move from where the arm stands, to one of the three places. */
+        /** @description Move from the current position to one of the three targets. */
         MoveRequest: {
-            /** @description The controller cannot be asked for its limits, and those that are built into it are safe for this arm. */
+            /** @description `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm. */
             accept_device_limits?: boolean;
-            /** @description The flange keeps to a straight line. */
+            /** @description `true`: the flange moves on a straight line. */
             line?: boolean;
             /**
              * Format: double
-             * @description Torque to leave for masses and friction that the model does not know, % of each limit.
+             * @description Torque margin for masses and friction that the model does not know, % of each limit.
              */
             margin_percent?: number;
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: double
-             * @description % of what the limits allow; missing: 10, and 25 where the controller is a simulator.
+             * @description Speed, % of the limits; missing: 10, and 25 with a simulated controller.
              */
             speed_percent?: number | null;
             to_flange?: components["schemas"]["FlangeObject"] | null;
-            /** @description A named pose, of those that `GET /api/poses` lists. */
+            /** @description Name of a target pose that `GET /api/poses` lists. */
             to_pose?: string | null;
-            /** @description Joint positions, rad, base to wrist. */
+            /** @description Target joint positions, rad, base to wrist. */
             to_rad?: number[] | null;
         };
-        /** @description A page about a code. */
+        /** @description Page about a code. */
         PageObject: {
-            /** @description Other pages that fit what was asked for. */
+            /** @description Names of other pages that match the request. */
             also?: string[];
-            /** @description Name of the code, unique: as in `error_codes` of the status. */
+            /** @description Name of the code, unique; as in `error_codes` of the status. */
             code: string;
-            /** @description What it means, what usually causes it, what to do, the next command: as `jtc explain` prints it. */
+            /** @description Text of the page, as `jtc explain` prints it: meaning, usual cause, remedy and next command. */
             text: string;
-            /** @description As it stands on a screen. */
+            /** @description Title for display. */
             title: string;
         };
-        /** @description A part that the controller confirmed. */
+        /** @description Parameter frame that the controller confirmed. */
         PartObject: {
-            /** @description Bytes of its frame. */
+            /** @description Length of its frame, bytes. */
             bytes: number;
-            /** @description Which. */
+            /** @description Name of the parameter. */
             parameter: string;
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             time_s: number;
             /**
              * Format: u-int32
-             * @description How often it was sent on purpose: a friction table twice.
+             * @description Number of intended transmissions; a friction table is sent twice.
              */
             times: number;
         };
-        /** @description What an arm carries at its flange. */
+        /** @description Payload at the flange. */
         PayloadObject: {
             /** @description Centre of mass in the frame of the flange, m. */
             com_m: number[];
@@ -886,141 +902,152 @@ export interface components {
             inertia_kg_m2?: number[];
             /**
              * Format: double
-             * @description kg; 0: nothing.
+             * @description Mass, kg; 0: no payload.
              */
             mass_kg: number;
         };
-        /** @description A motion that passed the check. */
+        /** @description Motion that passed the check. */
         PlanObject: {
-            /** @description What binds when, in the order of time. */
+            /** @description Limiting constraints, in the order of time. */
             binding: components["schemas"]["BoundObject"][];
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             duration_s: number;
-            /** @description Figures of each joint, from the base. */
+            /** @description Results for each joint, from the base. */
             joints: components["schemas"]["JointPlan"][];
             kept?: components["schemas"]["TrajectoryObject"] | null;
             margin?: components["schemas"]["MarginObject"] | null;
-            /** @description What was changed or is to be known, in words. */
+            /** @description Changes and hints in words. */
             notes: string[];
-            /** @description Points. */
+            /** @description Number of points. */
             points: number;
             /**
              * Format: u-int16
-             * @description ms between two points.
+             * @description Time between two points, ms.
              */
             step_ms: number;
-            /** @description The trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`. */
+            /** @description Trajectory as a file, for `PUT /api/trajectories/{number}` and `jtc traj run`. */
             text: string;
-            /** @description What does not forbid to run it; a torque margin below 10 % is among it. */
+            /** @description Warnings, which do not prevent a run; a torque margin below 10 % is one of them. */
             warnings: string[];
-            /** @description When the motion is nearest to each waypoint, s. */
+            /** @description Time at which the motion is nearest to each waypoint, s. */
             waypoint_times_s: number[];
-            /** @description Waypoints. */
+            /** @description Number of waypoints. */
             waypoints: number;
         };
-        /** @description Waypoints, and how the arm is to go through them. */
+        /** @description Waypoints, and options of the path through them. */
         PlanRequest: {
             /**
              * Format: double
-             * @description How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there.
+             * @description Distance from a waypoint within which the corner between two lines or arcs may be rounded, m; 0: the arm stops
+             *     there.
              */
             blend_m?: number;
             /**
              * Format: double
-             * @description How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each.
+             * @description Distance from a waypoint within which its corner may be rounded, rad of the joint that is furthest; 0: the arm
+             *     stops at each waypoint.
              */
             blend_rad?: number;
-            /** @description Their numbers are degrees. */
+            /** @description `true` if the angles are in degrees. */
             degrees?: boolean;
             keep?: components["schemas"]["KeepRequest"] | null;
-            /** @description The flange keeps to a straight line on each leg of which the waypoints do not say how the arm moves. */
+            /** @description `true`: the flange moves on a straight line on each leg for which the waypoints do not specify the type of path. */
             line?: boolean;
             /**
              * Format: double
-             * @description Torque to leave for masses and friction that the model does not know, % of each limit.
+             * @description Torque margin for masses and friction that the model does not know, % of each limit.
              */
             margin_percent?: number;
-            /** @description Let the acceleration change within 20 ms instead of 100 ms: faster, and harder on gears and load. */
+            /**
+             * @description `true`: the acceleration may change within 20 ms instead of 100 ms, which is faster and harder on gears and
+             *     load.
+             */
             no_jerk_limit?: boolean;
             payload?: components["schemas"]["PayloadObject"] | null;
             /**
              * Format: double
-             * @description % of what the limits allow.
+             * @description Speed, % of the limits.
              */
             speed_percent?: number;
             /**
              * Format: double
-             * @description Lowest bearing temperature at which it will be run, °C: cold bearings take more torque.
+             * @description Lowest bearing temperature of a run, °C; cold bearings need more torque.
              */
             temperature_c?: number;
-            /** @description Waypoints in a form that `jtc plan` takes: CSV with the columns q1 to q6, or x, y, z with an orientation, or pose; or JSON. At most 500. */
+            /**
+             * @description Waypoints in a format that `jtc plan` accepts: CSV with the columns q1 to q6, or x, y, z with an orientation, or
+             *     pose; or JSON. At most 500.
+             */
             waypoints: string;
         };
-        /** @description A trajectory to draw. */
+        /** @description Trajectory for a plot. */
         PointsObject: {
-            /** @description What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it. */
+            /**
+             * @description Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
+             *     `POST /api/runs` accepts it.
+             */
             digest: string;
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             duration_s: number;
-            /** @description What people call it. */
+            /** @description Name for people. */
             name: string;
             /**
              * Format: u-int16
-             * @description Its number.
+             * @description Number of the trajectory.
              */
             number: number;
-            /** @description Where the joints are at each of them, from the base, rad. */
+            /** @description Joint positions at these times, from the base, rad. */
             positions_rad: number[][];
             /** @description Times of the points, s. */
             times_s: number[];
         };
         /**
-         * @description What becomes of a motion when the client that commanded it goes, or shows no more that it is there.
+         * @description Policy for a motion when the client that commanded it disconnects or falls silent.
          * @enum {string}
          */
         Policy: "continue" | "pause" | "stop";
         /**
-         * @description Where a pose is kept.
+         * @description Place where a pose is kept.
          * @enum {string}
          */
         PoseFrom: "arm file" | "agent";
-        /** @description A named pose. */
+        /** @description Named pose. */
         PoseObject: {
-            /** @description Where it is kept. */
+            /** @description Place where the pose is kept. */
             from: components["schemas"]["PoseFrom"];
-            /** @description Its name. */
+            /** @description Name of the pose. */
             name: string;
-            /** @description Where the joints are, from the base, rad. */
+            /** @description Joint positions, from the base, rad. */
             positions_rad: number[];
-            /** @description Why no motion leads there, in words; missing where one may. */
+            /** @description Reason why no motion can lead to the pose, in words; missing if a motion is possible. */
             warning?: string | null;
         };
-        /** @description Where a pose is. */
+        /** @description Position of a pose. */
         PoseRequest: {
-            /** @description rad, from the base; missing: where the arm stands now. */
+            /** @description Joint positions, rad, from the base; missing: the current position of the arm. */
             positions_rad?: number[] | null;
         };
-        /** @description A thing that is wrong with a trajectory. */
+        /** @description Problem of a trajectory. */
         ProblemObject: {
             /**
              * Format: u-int8
-             * @description Which joint; missing: the trajectory as a whole.
+             * @description Number of the joint; missing: the trajectory as a whole.
              */
             joint?: number | null;
             /**
              * Format: double
-             * @description Its limit.
+             * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description In words, with value, limit and place. */
+            /** @description Message with value, limit and place. */
             message: string;
-            /** @description Point, from 0, where it is worst. */
+            /** @description Index of the worst point, from 0. */
             point: number;
             /**
              * Format: double
@@ -1029,121 +1056,127 @@ export interface components {
             time_s: number;
             /**
              * Format: double
-             * @description Worst value; missing where it is no number.
+             * @description Worst value; missing if it is not a number.
              */
             value?: number | null;
-            /** @description It does not forbid to run the trajectory. */
+            /** @description `true` if the problem does not prevent a run. */
             warning: boolean;
         };
-        /** @description What a controller does about what it has found. */
+        /** @description Reactions of a controller to disturbances. */
         ReactionsObject: {
-            /** @description Joints from 1 whose encoder has jumped: no trajectory is executed until their drives were reset. */
+            /** @description Joints whose encoder has jumped, counted from 1: no trajectory is executed until their drives are reset. */
             encoder_jumped: number[];
             /**
              * Format: double
-             * @description Time for which this run has been held back because a torque was at its limit, s.
+             * @description Time for which this run was slowed down because a torque was at its limit, s.
              */
             held_back_s: number;
             last_held_stop?: components["schemas"]["HeldStopObject"] | null;
             /**
              * Format: float
-             * @description Rate of path time, path seconds per second; 0 where no trajectory is executed.
+             * @description Rate of path time, path seconds per second; 0 if no trajectory is executed.
              */
             path_rate: number;
-            /** @description Joints from 1 that yield to a push, or lower a load. */
+            /** @description Joints that yield to a push or lower a load, counted from 1. */
             yields: number[];
         };
-        /** @description The way back to a held arm. */
+        /** @description Options of a recovery. */
         RecoverRequest: {
-            /** @description The controller uses other limits than this arm has, and they are safe for it. */
+            /** @description `true`: the limits of the controller differ from those of this arm, and are safe for it. */
             accept_device_limits?: boolean;
-            /** @description The text of an arm file, or of a robot description: the controller is given its friction, gains and model. Not beside `defaults`. */
+            /**
+             * @description Text of an arm file or a robot description: its friction, gains and model are sent to the controller. Not
+             *     together with `defaults`.
+             */
             arm?: string | null;
-            /** @description Where the controller has not been given its arm: let it use its defaults, the stored arm where there is one. */
+            /**
+             * @description `true`: a controller without arm parameters uses its defaults, which are those of the stored arm if there is
+             *     one.
+             */
             defaults?: boolean;
         };
-        /** @description A page that opens in a browser, and needs nothing else. */
+        /** @description Page that a browser opens without other files. */
         ReportPage: string;
-        /** @description Nodes that start anew. */
+        /** @description Nodes to restart. */
         ResetRequest: {
-            /** @description All joints and the gripper. */
+            /** @description `true` for all joints and the gripper. */
             all?: boolean;
-            /** @description Also where the arm has torque: somebody supports it, or it may fall. */
+            /** @description `true`: restart also under torque. The arm must be supported, or it may fall. */
             arm_may_fall?: boolean;
-            /** @description The gripper. */
+            /** @description `true` for the gripper. */
             gripper?: boolean;
             /** @description Joints, 1 to 6 from the base. */
             joints?: number[];
         };
-        /** @description Figures of a motion. */
+        /** @description Results of a motion. */
         ResultObject: {
             /**
              * Format: double
-             * @description While the trajectory was executed, s.
+             * @description Duration of the execution, s.
              */
             executed_s: number;
             /** @description Joints, from the base. */
             joints: components["schemas"]["JointResult"][];
         };
         /**
-         * @description What a client may do.
+         * @description Permissions of a client.
          * @enum {string}
          */
         Role: "viewer" | "operator";
-        /** @description A run of a trajectory that is kept. */
+        /** @description Run of a kept trajectory. */
         RunRequest: {
-            /** @description The controller cannot be asked for its limits, and those that are built into it are safe for this arm. */
+            /** @description `true`: the controller cannot be asked for its limits, and its built-in limits are safe for this arm. */
             accept_device_limits?: boolean;
             /**
-             * @description Where the arm stands elsewhere it is moved to the first point, at `speed_percent` of the limits and at half of them at most. Without
-             *     `speed_percent` at 10 % of the limits, and at 25 % where the controller is a simulator.
+             * @description `true`: first move the arm to the first point, if it stands elsewhere. The speed is `speed_percent` of the
+             *     limits, at most 50 %; without `speed_percent` 10 %, and 25 % with a simulated controller.
              */
             approach?: boolean;
-            /** @description Digest of the trajectory that was looked at: where the number has another one by now nothing is sent. */
+            /** @description Digest of the trajectory that the client saw: the run is refused if the number has another trajectory by now. */
             digest?: string | null;
             policy?: components["schemas"]["Policy"] | null;
             /**
              * Format: u-int32
-             * @description How often it is run.
+             * @description Number of runs.
              */
             repeat?: number;
             /**
              * Format: double
-             * @description % of the trajectory's own speed; missing: 100.
+             * @description Speed, % of the trajectory's own speed; missing: 100.
              */
             speed_percent?: number | null;
             /**
              * Format: u-int16
-             * @description Its number.
+             * @description Number of the trajectory.
              */
             trajectory: number;
         };
-        /** @description A command that was handed to the line. */
+        /** @description Command that was handed to the line. */
         SentObject: {
             /**
              * Format: u-int64
-             * @description Its number: `last_halt` until the next.
+             * @description Number of the command: value of `last_halt` until the next one.
              */
             halt: number;
-            /** @description What was sent: `stop` or `pause`. */
+            /** @description Command: `stop` or `pause`. */
             sent: string;
         };
-        /** @description A setting that is to have another value. */
+        /** @description New value of a setting. */
         SettingChange: {
             /**
              * Format: u-int8
-             * @description Which joint, from the base; missing for a setting of the arm.
+             * @description Number of the joint, from the base; missing for a setting of the arm.
              */
             joint?: number | null;
-            /** @description Its name, with its unit. */
+            /** @description Name of the setting, with its unit. */
             name: string;
             /**
              * Format: double
-             * @description The value; switches are 0 or 1.
+             * @description Value; switches are 0 or 1.
              */
             value: number;
         };
-        /** @description A setting as the controller has it. */
+        /** @description Setting of the controller. */
         SettingObject: {
             /**
              * Format: double
@@ -1152,7 +1185,7 @@ export interface components {
             high: number;
             /**
              * Format: u-int8
-             * @description Which joint, 1 to 6 from the base; missing: it is one of the arm.
+             * @description Number of the joint, 1 to 6 from the base; missing: a setting of the whole arm.
              */
             joint?: number | null;
             /**
@@ -1160,52 +1193,53 @@ export interface components {
              * @description Lowest value.
              */
             low: number;
-            /** @description What it is. */
+            /** @description Meaning of the setting. */
             meaning: string;
-            /** @description Its name, with its unit. */
+            /** @description Name of the setting, with its unit. */
             name: string;
-            /** @description It is stored with the arm, and in its hash. */
+            /** @description `true` if it is stored with the arm and included in its hash. */
             of_arm: boolean;
-            /** @description Its unit; empty where it has none. */
+            /** @description Unit; empty if it has none. */
             unit: string;
             /**
              * Format: double
-             * @description The value; switches are 0 or 1.
+             * @description Value; switches are 0 or 1.
              */
             value: number;
-            /** @description When it may be changed. */
+            /** @description Condition under which it may be changed. */
             when: components["schemas"]["When"];
-            /** @description Whole numbers only. */
+            /** @description `true` if only whole numbers are possible. */
             whole: boolean;
         };
-        /** @description Settings that are to have other values: all of them, or none. */
+        /** @description Settings to change: all of them, or none. */
         SettingsRequest: {
-            /** @description Each at most once. */
+            /** @description Settings, each at most once. */
             settings: components["schemas"]["SettingChange"][];
         };
-        /** @description % of the speed of the trajectory. */
+        /** @description Speed, % of the speed of the trajectory. */
         SpeedObject: {
             /**
              * Format: u-int8
-             * @description 5 to 100.
+             * @description Speed, 5 to 100 %.
              */
             percent: number;
         };
-        /** @description The controller, as its last status has it. */
+        /** @description Last status of the controller. */
         StatusObject: {
             /**
              * Format: u-int64
-             * @description Time since the last status, ms; missing before the first. Old values are not those of now.
+             * @description Age of the last status, ms; missing before the first one. Values of an old status are not current.
              */
             age_ms?: number | null;
-            /** @description Which agent this is, by a number that it was given at its start. */
+            /** @description Number that identifies this run of the agent. */
             agent: string;
             /**
              * Format: u-int64
-             * @description Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+             * @description Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
+             *     even at a steady rate.
              */
             at_ms: number;
-            /** @description How many clients are on the line. */
+            /** @description Number of clients on the line. */
             clients: number;
             controller?: components["schemas"]["ControllerObject"] | null;
             /**
@@ -1215,61 +1249,67 @@ export interface components {
             last_event: number;
             /**
              * Format: u-int64
-             * @description Number of the last Stop or Pause: `asked_after` of what is asked for now.
+             * @description Number of the last Stop or Pause: value of `asked_after` for new requests.
              */
             last_halt: number;
             lease?: components["schemas"]["LeaseObject"] | null;
-            /** @description Why the port is gone; missing while it is there. */
+            /** @description Reason why the port was lost; missing while it is available. */
             lost?: string | null;
             /** @description Name of the port. */
             port: string;
-            /** @description What the caller may do. */
+            /** @description Role of the caller. */
             role: components["schemas"]["Role"];
-            /** @description No arm moves: the controller is simulated. */
+            /** @description `true` if the controller is simulated: no real arm moves. */
             simulated: boolean;
         };
         /** @description On or off. */
         Switch: {
-            /** @description True: on. */
+            /** @description `true`: on. */
             on: boolean;
         };
-        /** @description A trajectory that is kept. */
+        /** @description Kept trajectory. */
         TrajectoryObject: {
-            /** @description What is executed of it, in short, 16 hexadecimal digits: it is another one for other points or another step. `POST /api/runs` takes it. */
+            /**
+             * @description Digest of points and step, 16 hexadecimal digits; other points or another step give another digest.
+             *     `POST /api/runs` accepts it.
+             */
             digest: string;
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             duration_s: number;
-            /** @description What people call it. */
+            /** @description Name for people. */
             name: string;
-            /** @description What was derived or left out when it was read. */
+            /** @description Notes about values that were derived or left out when it was read. */
             notes: string[];
             /**
              * Format: u-int16
-             * @description Its number.
+             * @description Number of the trajectory.
              */
             number: number;
-            /** @description Points. */
+            /** @description Number of points. */
             points: number;
             /**
              * Format: u-int16
-             * @description ms between two points.
+             * @description Time between two points, ms.
              */
             step_ms: number;
         };
-        /** @description A trajectory to keep. */
+        /** @description Trajectory to keep. */
         TrajectoryRequest: {
-            /** @description Its numbers are degrees. */
+            /** @description `true` if the angles are in degrees. */
             degrees?: boolean;
-            /** @description What people are to call it: the first 64 characters. */
+            /** @description Name for people: the first 64 characters. */
             name: string;
-            /** @description A file's text in any form that jtc traj run takes but recordings: CSV with a time column and joints, JSON, or a ROS JointTrajectory. */
+            /**
+             * @description Text of a file in any format that jtc traj run accepts, except recordings: CSV with a time column and joints,
+             *     JSON, or a ROS JointTrajectory.
+             */
             text: string;
         };
         /**
-         * @description When a setting may be changed.
+         * @description Condition under which a setting may be changed.
          * @enum {string}
          */
         When: "unpowered" | "standing" | "always";

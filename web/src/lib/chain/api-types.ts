@@ -3,82 +3,82 @@ export type paths = Record<string, never>;
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
-        /** @description A board after a command, as it answered. */
+        /** @description Board as it answered after a command. */
         AnswerObject: {
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
-            /** @description When its application was flashed. */
+            /** @description Flash date of its application. */
             flash_date?: string | null;
-            /** @description What it does: `exloader`, `programming`, `started`, `running`. */
+            /** @description State: `exloader`, `programming`, `started`, `running`. */
             state: string;
-            /** @description The bits of its status that are set. */
+            /** @description Names of the status bits that are set. */
             status: string[];
         };
-        /** @description A board as last seen. */
+        /** @description Board as last seen. */
         BoardObject: {
-            /** @description Its outputs are enabled, as it last reported. */
+            /** @description `true` if its outputs were enabled in its last report. */
             active: boolean;
-            /** @description It has an application. */
+            /** @description `true` if it has an application. */
             application: boolean;
-            /** @description Its description of itself. */
+            /** @description Description that the board reports. */
             description?: string | null;
             /**
              * Format: u-int64
-             * @description Errors that it has reported.
+             * @description Number of errors that it has reported.
              */
             errors: number;
-            /** @description When that was flashed. */
+            /** @description Flash date of the application. */
             flash_date?: string | null;
             /**
              * Format: u-int16
-             * @description Number of its bootloader: who it is; missing before it has answered.
+             * @description Number of its bootloader, which identifies the board; missing before its first answer.
              */
             flash_number?: number | null;
             /**
              * Format: u-int64
-             * @description Frames of it in the last second.
+             * @description Number of its frames in the last second.
              */
             frames_per_s: number;
-            /** @description Its heartbeats: `alive`, `late`, `lost`, or `none` where none is expected. */
+            /** @description State of its heartbeats: `alive`, `late`, `lost`, or `none` if no heartbeats are expected. */
             heartbeat: string;
             /**
              * Format: double
-             * @description Since the last heartbeat, s.
+             * @description Age of the last heartbeat, s.
              */
             heartbeat_age_s?: number | null;
-            /** @description The last of them. */
+            /** @description Last error that it has reported. */
             last_error?: string | null;
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             number: number;
             offers?: components["schemas"]["OffersObject"] | null;
             /**
              * Format: u-int16
-             * @description Program ID of that.
+             * @description Program ID of the application.
              */
             program_id?: number | null;
-            /** @description `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`. */
+            /** @description State: `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`. */
             state: string;
-            /** @description The bits of its status that are set. */
+            /** @description Names of the status bits that are set. */
             status: string[];
         };
-        /** @description Who is there. */
+        /** @description Boards of the chain. */
         ChainObject: {
             /** @description Boards with a number. */
             boards: components["schemas"]["FoundObject"][];
-            /** @description What is worth a word; empty: nothing is odd. */
+            /** @description Unusual observations; empty: none. */
             findings: string[];
         };
-        /** @description How the CAN controller of this computer gets on with the bus. */
+        /** @description State of this computer's CAN controller. */
         ControllerObject: {
-            /** @description It has left the bus. */
+            /** @description `true` if it is bus-off. */
             bus_off: boolean;
-            /** @description It is error passive. */
+            /** @description `true` if it is error passive. */
             passive: boolean;
             /**
              * Format: u-int16
@@ -92,24 +92,24 @@ export interface components {
             tec?: number | null;
             /**
              * Format: u-int64
-             * @description How often it has.
+             * @description Number of bus-off events.
              */
             times_bus_off: number;
         };
-        /** @description Why something was not done. */
+        /** @description Reason why a request was refused or failed. */
         ErrorObject: {
             /**
              * Format: u-int8
-             * @description Board of a chain.
+             * @description Number of a board of a chain.
              */
             board?: number | null;
             /** @description Usual cause. */
             cause?: string | null;
-            /** @description Short name, for programs. */
+            /** @description Short name of the error, for programs. */
             code: string;
             /**
              * Format: u-int8
-             * @description Joint of an arm, 1 to 6 from the base.
+             * @description Number of a joint of an arm, 1 to 6 from the base.
              */
             joint?: number | null;
             /**
@@ -117,86 +117,86 @@ export interface components {
              * @description Limit of the value.
              */
             limit?: number | null;
-            /** @description Sentence for people: request, place, value and limit. */
+            /** @description Message for people: request, place, value and limit. */
             message: string;
             /** @description Next step. */
             next: string;
             /**
              * Format: u-int32
-             * @description Point of the trajectory, from 0; in motion the 1 ms point.
+             * @description Index of a point of the trajectory, from 0; in motion the 1 ms point.
              */
             point?: number | null;
             /**
              * Format: double
-             * @description Value that was found, in the unit of the message.
+             * @description Measured or requested value, in the unit of the message.
              */
             value?: number | null;
         };
-        /** @description An event. */
+        /** @description Event with its number and time. */
         EventObject: {
-            /** @description What has happened. */
+            /** @description Event. */
             event: components["schemas"]["Happening"];
             /**
              * Format: u-int64
-             * @description Counts up from 1 as long as this agent runs.
+             * @description Number of the event; counts up from 1 as long as this agent runs.
              */
             number: number;
             /**
              * Format: double
-             * @description When, s since 1970 by the agent's clock.
+             * @description Time of the event by the agent's clock, s since 1970.
              */
             unix_s: number;
         };
         /** @description Events. */
         EventsObject: {
-            /** @description Which agent this is, by a number that it was given at its start: another one counts its events anew. */
+            /** @description Number that identifies this run of the agent; another run counts its events from 1. */
             agent: string;
-            /** @description Oldest first. */
+            /** @description Events, oldest first. */
             events: components["schemas"]["EventObject"][];
             /**
              * Format: u-int64
-             * @description The number to ask on from.
+             * @description Number to use as `after` in the next request.
              */
             last: number;
-            /** @description Some that were asked for are not kept any more. */
+            /** @description `true` if some requested events were dropped from the journal. */
             missed: boolean;
         };
-        /** @description A board that is expected at its place. */
+        /** @description Expected board at its place. */
         ExpectedBoard: {
             /**
              * Format: u-int8
-             * @description Its place, which is its number.
+             * @description Place of the board, which becomes its number.
              */
             board: number;
             /**
              * Format: u-int16
-             * @description Number of its bootloader: who it is.
+             * @description Number of its bootloader, which identifies the board.
              */
             flash_number: number;
         };
-        /** @description What a doctor found. */
+        /** @description Finding of a diagnosis. */
         FindingObject: {
-            /** @description What helps; may be empty. */
+            /** @description Next step; may be empty. */
             next: string;
-            /** @description `problem`, `warning` or `good`. */
+            /** @description Severity: `problem`, `warning` or `good`. */
             severity: string;
-            /** @description What was found. */
+            /** @description Observation. */
             what: string;
-            /** @description What probably is the cause; may be empty. */
+            /** @description Probable cause; may be empty. */
             why: string;
         };
-        /** @description A board as it answered. */
+        /** @description Board as it answered. */
         FoundObject: {
-            /** @description Its description of itself. */
+            /** @description Description that the board reports. */
             description?: string | null;
             /**
              * Format: u-int16
-             * @description Number of its bootloader: who it is.
+             * @description Number of its bootloader, which identifies the board.
              */
             flash_number: number;
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             number: number;
             /**
@@ -204,68 +204,68 @@ export interface components {
              * @description Program ID of its application.
              */
             program_id?: number | null;
-            /** @description The bits of its status that are set. */
+            /** @description Names of the status bits that are set. */
             status: string[];
         };
-        /** @description A value as it is given. */
+        /** @description Value in a request. */
         GivenValue: boolean | number | string;
-        /** @description What has happened. */
+        /** @description Event of the chain or a job. */
         Happening: {
-            /** @description Its name; missing: nobody commands. */
+            /** @description Name of the holder; missing: no client holds the lease. */
             holder?: string | null;
             /** @enum {string} */
             kind: "lease";
         } | {
-            /** @description Who it was. */
+            /** @description Name of the client that requested it. */
             by: string;
             /** @enum {string} */
             kind: "halt";
             /**
              * Format: u-int64
-             * @description So many Stops, within a tenth of a second, of which this was the last; missing: one.
+             * @description Number of Stops within a tenth of a second that end with this one; missing: a single Stop.
              */
             times?: number | null;
         } | {
-            /** @description Boards that have confirmed it. */
+            /** @description Numbers of boards that have confirmed it. */
             boards: number[];
             /** @enum {string} */
             kind: "stopped";
-            /** @description Boards that may still run, each with the reason: also those that ran and from which nothing is received any more. */
+            /** @description Boards that may still run, each with the reason; includes boards that ran and are silent now. */
             not_stopped: string[];
         } | {
             /**
              * Format: u-int8
-             * @description Its number; missing: a board that is not known.
+             * @description Number of the board; missing: a board that is not known.
              */
             board?: number | null;
-            /** @description `late`, `lost`, `back`, or `rebooted`: it has no number any more. */
+            /** @description Change: `late`, `lost`, `back`, or `rebooted`, after which the board has no number. */
             change: string;
             /** @enum {string} */
             kind: "heartbeat";
         } | {
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
-            /** @description `left-loop`, `stopped-by-policy` or `in-loop`. */
+            /** @description Change: `left-loop`, `stopped-by-policy` or `in-loop`. */
             change: string;
             /** @enum {string} */
             kind: "loop";
         } | {
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
             /** @enum {string} */
             kind: "state";
-            /** @description `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`. */
+            /** @description State: `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`. */
             state: string;
         } | {
             /**
              * Format: u-int8
-             * @description Its number; 0: one without a number.
+             * @description Number of the board; 0: a board without a number.
              */
             board: number;
             /**
@@ -275,292 +275,296 @@ export interface components {
             code: number;
             /** @enum {string} */
             kind: "board_error";
-            /** @description What it means. */
+            /** @description Meaning of the error. */
             meaning: string;
-            /** @description Its name. */
+            /** @description Name of the error. */
             name: string;
         } | {
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
             /** @enum {string} */
             kind: "text";
-            /** @description The text. */
+            /** @description Text of the message. */
             text: string;
         } | {
             /** @enum {string} */
             kind: "note";
-            /** @description In words. */
+            /** @description Text of the note. */
             text: string;
         } | {
             /** @enum {string} */
             kind: "lost";
-            /** @description Why. */
+            /** @description Reason. */
             why: string;
         } | {
-            /** @description Who asked for it. */
+            /** @description Name of the client that requested it. */
             client: string;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "begun";
-            /** @description What it does. */
+            /** @description Description of the job. */
             what: string;
         } | {
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "job_note";
-            /** @description In words. */
+            /** @description Text of the note. */
             text: string;
         } | {
             /**
              * Format: u-int32
-             * @description Which attempt.
+             * @description Number of the attempt.
              */
             attempt: number;
-            /** @description Boards that get the image now. */
+            /** @description Numbers of boards that receive the image now. */
             boards: number[];
             /**
              * Format: u-int64
-             * @description Bytes of both cycles that were taken.
+             * @description Number of accepted bytes of both cycles.
              */
             bytes: number;
             /**
              * Format: u-int32
-             * @description 1: checked, 2: written.
+             * @description Cycle; 1: checked, 2: written.
              */
             cycle: number;
             /**
              * Format: u-int64
-             * @description The job.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "progress";
             /**
              * Format: u-int64
-             * @description Of so many.
+             * @description Number of bytes of both cycles.
              */
             total: number;
         } | {
             error?: components["schemas"]["ErrorObject"] | null;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             job: number;
             /** @enum {string} */
             kind: "ended";
-            /** @description `finished`, `cancelled` or `failed`. */
+            /** @description Outcome: `finished`, `cancelled` or `failed`. */
             outcome: string;
         };
         /**
-         * @description Form of an image.
+         * @description Format of an image.
          * @enum {string}
          */
         ImageFormat: "bin" | "hex" | "srec";
-        /** @description How the chain is numbered. */
+        /** @description Options of the numbering. */
         InitRequest: {
-            /** @description Boards that are expected at their places: others are an error. Empty: whoever is there. */
+            /** @description Expected boards at their places; other boards are an error. Empty: any boards. */
             expected?: components["schemas"]["ExpectedBoard"][];
         };
-        /** @description A job, while it goes on and afterwards. */
+        /** @description Job, while it runs and afterwards. */
         JobObject: {
             chain?: components["schemas"]["ChainObject"] | null;
-            /** @description Who asked for it. */
+            /** @description Name of the client that requested it. */
             client: string;
             error?: components["schemas"]["ErrorObject"] | null;
-            /** @description Of a doctor: what was found, the worst first. */
+            /** @description Findings of a doctor, worst first. */
             findings?: components["schemas"]["FindingObject"][] | null;
             /**
              * Format: u-int64
-             * @description Its number.
+             * @description Number of the job.
              */
             number: number;
             run?: components["schemas"]["RunObject"] | null;
-            /** @description `running`, `finished`, `cancelled` or `failed`. */
+            /** @description Stage: `running`, `finished`, `cancelled` or `failed`. */
             stage: string;
             update?: components["schemas"]["UpdateObject"] | null;
-            /** @description What it does. */
+            /** @description Description of the job. */
             what: string;
         };
-        /** @description A client that may command, or waits for it. */
+        /** @description Client that holds the lease or waits for it. */
         LeaseGrant: {
-            /** @description It commands; else it waits until the one who does lets it go. */
+            /** @description `true` if the client holds the lease; otherwise it waits until the holder releases it. */
             held: boolean;
-            /** @description Goes with each request of this client, in the header `Lease-Key`. Nobody else is to know it. */
+            /** @description Secret key, which this client sends with each request in the header `Lease-Key`. */
             key: string;
             /**
              * Format: double
-             * @description How long it lasts without a request, s.
+             * @description Duration of the lease without a request, s.
              */
             lasts_s: number;
-            /** @description What becomes of running boards when it has lapsed. */
+            /** @description Policy for running boards after the lease has lapsed. */
             policy: components["schemas"]["Policy"];
         };
-        /** @description Who commands. */
+        /** @description Lease, and its holder. */
         LeaseObject: {
             /**
              * Format: u-int64
-             * @description Since when, ms.
+             * @description Time since the holder took the lease, ms.
              */
             age_ms: number;
-            /** @description Its name. */
+            /** @description Name of the holder. */
             holder: string;
             /**
              * Format: u-int64
-             * @description Until it lapses, ms.
+             * @description Time until the lease lapses without renewal, ms.
              */
             left_ms: number;
-            /** @description Who asks for it. */
+            /** @description Name of the client that waits for the lease. */
             wanted_by?: string | null;
         };
-        /** @description Who wants to command. */
+        /** @description Request for the lease. */
         LeaseRequest: {
-            /** @description Where another client commands: ask it for the lease, and wait for it. */
+            /** @description `true`: if another client holds the lease, ask for it and wait. */
             ask?: boolean;
             /**
              * Format: double
-             * @description How long the lease lasts without a request of this client, s.
+             * @description Duration of the lease without a request of this client, s.
              */
             lasts_s?: number;
-            /** @description What people are to call it: the first 64 characters. */
+            /** @description Name of the client for people: the first 64 characters. */
             name: string;
-            /** @description What becomes of running boards when it has lapsed. */
+            /** @description Policy for running boards after the lease has lapsed. */
             policy?: components["schemas"]["Policy"];
         };
-        /** @description How a lease is. */
+        /** @description State of a lease. */
         LeaseState: {
-            /** @description This client commands. */
+            /** @description `true` if this client holds the lease. */
             held: boolean;
-            /** @description Who asks for the lease. */
+            /** @description Name of the client that waits for the lease. */
             wanted_by?: string | null;
         };
-        /** @description A value of an input or a parameter. */
+        /** @description Value of an input or a parameter. */
         NamedValue: {
             /**
              * Format: u-int8
-             * @description The board; missing: each of those that are to run.
+             * @description Number of the board; missing: each board to run.
              */
             board?: number | null;
-            /** @description Its name. */
+            /** @description Name of the input or parameter. */
             name: string;
-            /** @description The value. */
+            /** @description New value. */
             value: components["schemas"]["GivenValue"];
         };
-        /** @description Names of what a board's application has. */
+        /** @description Names of the values of a board's application. */
         OffersObject: {
-            /** @description The description of the application. */
+            /** @description Description of the application. */
             description: string;
-            /** @description Controller inputs. */
+            /** @description Names of controller inputs. */
             inputs: string[];
-            /** @description Sensor outputs. */
+            /** @description Names of sensor outputs. */
             outputs: string[];
-            /** @description Parameters. */
+            /** @description Names of parameters. */
             parameters: string[];
         };
-        /** @description Whether outputs are enabled. */
+        /** @description State of the outputs. */
         OutputsRequest: {
-            /** @description True: enabled, where the control loop runs. */
+            /** @description `true`: enable the outputs, which needs a running control loop. */
             active: boolean;
         };
         /**
-         * @description What becomes of running boards when the client that commanded them shows no more that it is there.
+         * @description Policy for running boards when the client that commanded them falls silent.
          * @enum {string}
          */
         Policy: "continue" | "stop";
-        /** @description Who reported after a reset. */
+        /** @description Boards that reported after a reset. */
         ResetObject: {
-            /** @description Low bytes of the boards' flash numbers. Their numbers are gone: `POST /api/init` gives new ones. */
+            /** @description Low bytes of the boards' flash numbers. The boards have no numbers now: `POST /api/init` assigns new ones. */
             reports: number[];
         };
         /**
-         * @description What a client may do.
+         * @description Permissions of a client.
          * @enum {string}
          */
         Role: "viewer" | "operator";
-        /** @description What runs. */
+        /** @description Running boards. */
         RunObject: {
-            /** @description The boards. */
+            /** @description Boards that run. */
             boards: components["schemas"]["RunningObject"][];
             /**
              * Format: double
-             * @description Load that they make on the bus, by forecast, %.
+             * @description Predicted bus load of these boards, %.
              */
             load_percent: number;
         };
-        /** @description What is to run. */
+        /** @description Boards to run, with their values. */
         RunRequest: {
-            /** @description Outputs are enabled at the end. */
+            /** @description `true`: enable the outputs at the end. */
             active?: boolean;
-            /** @description Numbers of the boards; empty: all that answer. */
+            /** @description Numbers of the boards; empty: all boards that answer. */
             boards?: number[];
-            /** @description Inputs that differ from the boards' initial ones. */
+            /** @description Inputs that differ from the boards' initial values. */
             inputs?: components["schemas"]["NamedValue"][];
-            /** @description Parameters. */
+            /** @description Parameters to write. */
             parameters?: components["schemas"]["NamedValue"][];
         };
-        /** @description A board that runs. */
+        /** @description Running board. */
         RunningObject: {
-            /** @description Its outputs are enabled. */
+            /** @description `true` if its outputs are enabled. */
             active: boolean;
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
         };
-        /** @description What was sent. */
+        /** @description Command that was sent. */
         SentObject: {
             /**
              * Format: u-int64
-             * @description Its number: `last_halt` until the next.
+             * @description Number of the Stop: value of `last_halt` until the next one.
              */
             halt: number;
             /**
              * Format: u-int64
-             * @description Number of the last event before it: what came of it follows.
+             * @description Number of the last event before the Stop; its results are reported as later events.
              */
             last_event: number;
-            /** @description `stop`. */
+            /** @description Command: `stop`. */
             sent: string;
         };
-        /** @description The bus, and who commands. */
+        /** @description Status of the bus, and the lease. */
         StatusObject: {
             /**
              * Format: u-int64
-             * @description How old this is, ms.
+             * @description Age of this status, ms.
              */
             age_ms: number;
-            /** @description Which agent this is, by a number that it was given at its start. */
+            /** @description Number that identifies this run of the agent. */
             agent: string;
             /**
              * Format: u-int64
-             * @description Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+             * @description Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
+             *     even at a steady rate.
              */
             at_ms: number;
-            /** @description Boards that are known. */
+            /** @description Number of known boards. */
             boards: number;
-            /** @description The bus. */
+            /** @description Name of the bus. */
             bus: string;
-            /** @description Another PC commands on this bus. */
+            /** @description `true` if another PC commands on this bus. */
             competing_master: boolean;
             controller?: components["schemas"]["ControllerObject"] | null;
             /**
              * Format: u-int64
-             * @description Frames that are not of this protocol.
+             * @description Number of frames that do not belong to this protocol.
              */
             foreign_frames: number;
-            /** @description This agent sends heartbeats: who has the lease has commanded something, or boards that it has started are not stopped. */
+            /**
+             * @description `true` if this agent sends heartbeats: the lease holder has sent a command, or boards that the agent has started
+             *     are not stopped.
+             */
             is_master: boolean;
             /**
              * Format: u-int64
@@ -569,7 +573,7 @@ export interface components {
             last_event: number;
             /**
              * Format: u-int64
-             * @description Number of the last Stop, 0 before the first: `asked_after` of what is asked for now.
+             * @description Number of the last Stop, 0 before the first: value of `asked_after` for new requests.
              */
             last_halt: number;
             lease?: components["schemas"]["LeaseObject"] | null;
@@ -578,185 +582,200 @@ export interface components {
              * @description Load of the bus over the last second, %.
              */
             load_percent: number;
-            /** @description Why the bus is gone; missing while it is there. */
+            /** @description Reason why the bus was lost; missing while it is available. */
             lost?: string | null;
             /**
              * Format: u-int64
-             * @description Frames that were received, and sent.
+             * @description Number of received frames, without foreign ones.
              */
             received: number;
-            /** @description What the caller may do. */
+            /** @description Role of the caller. */
             role: components["schemas"]["Role"];
             /**
              * Format: u-int64
-             * @description Frames that this agent has sent.
+             * @description Number of frames that this agent has sent.
              */
             sent: number;
-            /** @description Numbers that two boards have, in words. */
+            /** @description Numbers that two boards share, in words. */
             shared_numbers: string[];
-            /** @description Nothing moves: the boards are simulated. */
+            /** @description `true` if the boards are simulated: nothing moves. */
             simulated: boolean;
         };
-        /** @description A board that is to be updated. */
+        /** @description Board to update. */
         TargetRequest: {
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
             /**
              * Format: u-int16
-             * @description Number of its bootloader, which it must have; missing: whoever has that number.
+             * @description Number that its bootloader must have; missing: any bootloader.
              */
             flash_number?: number | null;
         };
         /**
-         * @description What addresses of records count.
+         * @description Unit of the addresses in records.
          * @enum {string}
          */
         Unit: "byte" | "word";
-        /** @description What became of an update. */
+        /** @description Result of an update. */
         UpdateObject: {
-            /** @description Each board. */
+            /** @description Results for each board. */
             boards: components["schemas"]["UpdatedObject"][];
             /**
              * Format: u-int64
-             * @description Bytes of both cycles.
+             * @description Number of bytes of both cycles.
              */
             bytes: number;
-            /** @description Nothing was sent but questions. */
+            /** @description `true` if only questions were sent. */
             dry_run: boolean;
             /**
              * Format: u-int16
-             * @description Program ID that the boards must show; missing: nobody knows.
+             * @description Program ID that the boards must show; missing: not known.
              */
             program_id?: number | null;
-            /** @description Why nobody knows it. */
+            /** @description Reason why it is not known. */
             unverifiable?: string | null;
         };
-        /** @description An update. */
+        /** @description Update of boards. */
         UpdateRequest: {
-            /** @description What cannot be verified is as good as what was: also a board that shows the program, of whose flash nothing is known. */
+            /**
+             * @description `true`: accept a result that cannot be verified, also of a board that shows the program but whose flash contents
+             *     are not known.
+             */
             accept_unverified?: boolean;
             addresses?: components["schemas"]["Unit"] | null;
-            /** @description The boards. */
+            /** @description Boards to update. */
             boards: components["schemas"]["TargetRequest"][];
-            /** @description Flash date, as `2009-06-01`; missing: today, and a board that shows the program keeps its date. */
+            /** @description Flash date, as `2009-06-01`; missing: today, but a board that already shows the program keeps its date. */
             date?: string | null;
-            /** @description Only the checks. */
+            /** @description `true`: run only the checks. */
             dry_run?: boolean;
             /**
              * Format: u-int16
              * @description Program ID that the boards must show at the end.
              */
             expect_program_id?: number | null;
-            /** @description Gaps between records are filled with FF. */
+            /** @description `true`: fill gaps between records with FF. */
             fill_gaps?: boolean;
-            /** @description Also when boards run, another PC is on the bus, or the board shows the program already. */
+            /** @description `true`: update even if boards run, another PC is on the bus, or the board already shows the program. */
             force?: boolean;
             format?: components["schemas"]["ImageFormat"] | null;
-            /** @description All boards at once, by broadcast. */
+            /** @description `true`: update all boards at once, by broadcast. */
             group?: boolean;
-            /** @description The image, as base64. */
+            /** @description Image, as base64. */
             image: string;
-            /** @description Also when the board shows the program already; lifts no check. */
+            /** @description `true`: update even if the board already shows the program; all checks still apply. */
             rewrite?: boolean;
-            /** @description What the other cycle carries, as base64, where the profile's plan sends two images. */
+            /** @description Image of the other cycle, as base64, if the profile's plan sends two images. */
             second?: string | null;
-            /** @description Start the application at the end. */
+            /** @description `true`: start the application at the end. */
             start?: boolean;
         };
-        /** @description What became of a board in an update. */
+        /** @description Result of an update for one board. */
         UpdatedObject: {
             /**
              * Format: u-int32
-             * @description How often it was tried.
+             * @description Number of attempts.
              */
             attempts: number;
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
             error?: components["schemas"]["ErrorObject"] | null;
             /**
              * Format: u-int16
-             * @description Who it is.
+             * @description Number of its bootloader, which identifies the board.
              */
             flash_number?: number | null;
-            /** @description `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`. */
+            /**
+             * @description Outcome: `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`,
+             *     `verified` or `running`.
+             */
             outcome: string;
             /**
              * Format: u-int16
-             * @description Program ID that was read back.
+             * @description Program ID read back after the update.
              */
             program_id_after?: number | null;
             /**
              * Format: u-int16
-             * @description Program ID that it had, and that was read back.
+             * @description Program ID read back before the update.
              */
             program_id_before?: number | null;
             /**
              * Format: double
-             * @description s.
+             * @description Duration, s.
              */
             time_s: number;
             /**
-             * @description The board shows the Program ID and date of the image, and the agent or its inventory has it that exactly this image was
-             *     written to this address: now, or before.
+             * @description `true` if the board shows Program ID and date of the image, and the records of the agent or its inventory show
+             *     that exactly this image was written to this address, now or before.
              */
             verified: boolean;
         };
-        /** @description A value. */
+        /** @description Value of a signal. */
         ValueObject: {
-            /** @description Its place in the buffer. */
+            /** @description Index in the buffer. */
             index: number;
             /**
              * Format: double
-             * @description Greatest value, alike.
+             * @description Largest value, in its unit, if the signal table has one.
              */
             max?: number | null;
             /**
              * Format: double
-             * @description Least value, in its unit, where the signal table has one.
+             * @description Smallest value, in its unit, if the signal table has one.
              */
             min?: number | null;
-            /** @description Its name. */
+            /** @description Name of the signal. */
             name: string;
-            /** @description For people, with its unit. */
+            /** @description Value with its unit, for people. */
             text?: string | null;
-            /** @description Its unit, where the signal table has one. */
+            /** @description Unit of the signal, if the signal table has one. */
             unit?: string | null;
-            /** @description The number in its unit, true or false, or a word as text, by the signal table; missing where it is not known. */
+            /**
+             * @description Value by the signal table: a number in its unit, `true` or `false`, or a word as text; missing if it is not
+             *     known.
+             */
             value?: unknown;
         };
-        /** @description What an input or a parameter is to be. */
+        /** @description New value of an input or a parameter. */
         ValueRequest: {
-            /** @description The value. */
+            /** @description New value. */
             value: components["schemas"]["GivenValue"];
         };
         /** @description Values of a board. */
         ValuesObject: {
             /**
              * Format: double
-             * @description Since its outputs came, s; missing before the first.
+             * @description Age of its outputs, s; missing before the first ones.
              */
             age_s?: number | null;
             /**
              * Format: u-int8
-             * @description Its number.
+             * @description Number of the board.
              */
             board: number;
             /**
-             * @description Controller inputs as last set, or as the board began with them; without a value where this agent has neither set nor read them
-             *     since the application started.
+             * @description Controller inputs as last set, or with their initial values. Without a value if this agent has neither set nor
+             *     read them since the application started.
              */
             inputs: components["schemas"]["ValueObject"][];
-            /** @description Sensor outputs; empty before the first. */
+            /** @description Sensor outputs; empty before the first ones. */
             outputs: components["schemas"]["ValueObject"][];
-            /** @description Parameters as this agent believes them to be: boards have no way to read them back. */
+            /**
+             * @description Parameters as last written by this agent. Without a value if it has not written them since the application
+             *     started: boards cannot report their parameters.
+             */
             parameters: components["schemas"]["ValueObject"][];
-            /** @description These are not the outputs of now: they are older than half a second, or the board is late or lost, or has left its control loop. */
+            /**
+             * @description `true` if the outputs are not current: they are older than half a second, or the board is late or lost, or has
+             *     left its control loop.
+             */
             stale: boolean;
         };
     };

@@ -1,11 +1,11 @@
-//! What can be subscribed to, and what a client has subscribed to.
+//! Channels, and the subscriptions of a client.
 use std::collections::BTreeMap;
 
 use jtc_host::recording::Topic;
 
 use super::protocol::{Channel, Service, Shape, Subscription};
 
-/// The channel with words: what the others have as numbers.
+/// Number of the channel with the status as text; the other channels carry numbers.
 pub const STATUS: u32 = Topic::ALL.len() as u32 + 1;
 const STATUS_SCHEMA: &str = r#"{
   "type": "object",
@@ -23,16 +23,16 @@ const STATUS_SCHEMA: &str = r#"{
   }
 }"#;
 
-/// Services by number.
+/// Numbers of the services.
 pub const STOP: u32 = 1;
 pub const PAUSE: u32 = 2;
 
-/// The topic of a channel; `None` for the one with words, and for those that there are not.
+/// Returns the topic of a channel; `None` for the text channel and for unknown channels.
 pub fn topic(channel: u32) -> Option<Topic> {
     Topic::ALL.get((channel as usize).checked_sub(1)?).copied()
 }
 
-/// All channels.
+/// Returns all channels.
 pub fn channels() -> Vec<Channel<'static>> {
     let numbered = (1..).zip(Topic::ALL).map(|(id, topic)| {
         let (schema_name, schema) = topic.schema();
@@ -49,7 +49,7 @@ pub fn channels() -> Vec<Channel<'static>> {
     numbered.chain([status]).collect()
 }
 
-/// Stop and Pause.
+/// Returns the services Stop and Pause.
 pub fn services() -> Vec<Service<'static>> {
     let shape =
         |schema_name, schema| Shape { encoding: "json", schema_name, schema_encoding: "jsonschema", schema };
@@ -66,19 +66,19 @@ pub fn services() -> Vec<Service<'static>> {
     vec![service(STOP, "stop"), service(PAUSE, "pause")]
 }
 
-/// A subscription: its channel, and whether what does not change is to be sent yet.
+/// Subscription: its channel, and `true` if constant data must still be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Subscribed {
     channel: u32,
     latched: bool,
 }
 
-/// Subscriptions of a client, one of each channel at most.
+/// Subscriptions of a client, at most one per channel.
 #[derive(Default)]
 pub struct Subscriptions(BTreeMap<u32, Subscribed>);
 
 impl Subscriptions {
-    /// One more; the error is for people.
+    /// Adds a subscription; the error is a message for people.
     pub fn add(&mut self, Subscription { id, channel_id: channel }: &Subscription) -> Result<(), String> {
         if topic(*channel).is_none() && *channel != STATUS {
             return Err(format!("subscription {id} is not taken: there is no channel {channel}"));
@@ -95,12 +95,12 @@ impl Subscriptions {
         Ok(())
     }
 
-    /// One less.
+    /// Removes a subscription.
     pub fn remove(&mut self, id: u32) {
         self.0.remove(&id);
     }
 
-    /// Those of the description that have not had it.
+    /// Returns the subscriptions of constant data that have not received it yet.
     pub fn take_latched(&mut self) -> Vec<u32> {
         let due = |(id, subscribed): (&u32, &mut Subscribed)| {
             std::mem::take(&mut subscribed.latched).then_some(*id)
@@ -108,7 +108,7 @@ impl Subscriptions {
         self.0.iter_mut().filter_map(due).collect()
     }
 
-    /// Those of what changes: subscription and channel.
+    /// Returns the subscriptions of changing data: subscription and channel.
     pub fn live(&self) -> Vec<(u32, u32)> {
         let live =
             self.0.iter().filter(|(_, subscribed)| topic(subscribed.channel) != Some(Topic::Description));

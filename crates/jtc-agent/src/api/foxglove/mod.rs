@@ -1,7 +1,9 @@
-//! The arm live in Foxglove, Lichtblick and PlotJuggler: the Foxglove WebSocket protocol, with the messages of recordings.
+//! Live data for Foxglove, Lichtblick and PlotJuggler: the Foxglove WebSocket protocol, with the messages of
+//! recordings.
 //!
-//! A reader gets the latest values 25 times a second at most. Pings show how far it has read: where one has not come back yet nothing more
-//! is sent, so that a slow one loses messages and never lags behind the arm, and one that does not read at all is put out.
+//! A client gets the latest values at most 25 times a second. Pings show how far the client has read. While a ping is
+//! unanswered no values are sent, so a slow client loses messages but always sees recent data. A client that does not
+//! read at all is disconnected.
 mod channels;
 mod protocol;
 
@@ -31,27 +33,27 @@ use self::channels::{PAUSE, STATUS, STOP, Subscriptions};
 use self::protocol::{Call, FromClient, NAMES, ToClient};
 use super::{Agent, Caller};
 
-/// Longest message of a client.
+/// Longest message of a client, bytes.
 const MESSAGE_MAX: usize = 64 << 10;
-/// Messages that a client may send, in a second and at once.
+/// Largest number of messages that a client may send: per second, and in one burst.
 const MESSAGES_PER_S: f64 = 50.0;
 const MESSAGES_AT_ONCE: f64 = 500.0;
-/// Answers that may wait for a client.
+/// Largest number of answers that wait for a client.
 const ANSWERS_MAX: usize = 64;
-/// How often values are sent, at most.
+/// Shortest interval between values.
 const PERIOD: Duration = Duration::from_millis(40);
-/// How often words are sent at least.
+/// Longest interval between text messages.
 const QUIET: Duration = Duration::from_millis(500);
-/// How often is looked how far a client has read.
+/// Interval at which the progress of a client is checked.
 const PING_TIME: Duration = Duration::from_millis(200);
-/// One that has not read for so long gets nothing for now,
+/// Time without reading after which a client gets no data for now.
 const LATE: Duration = Duration::from_millis(400);
-/// and is put out after this time.
+/// Time without reading after which a client is disconnected.
 const GONE: Duration = Duration::from_secs(10);
-/// How long a client may leave a message untaken.
+/// Longest time in which a client may leave a message unread.
 const SEND_TIME: Duration = Duration::from_secs(5);
 
-/// A request with these headers asks for this protocol.
+/// Returns `true` if these headers request this protocol.
 pub(super) fn is_asked(headers: &HeaderMap) -> bool {
     headers
         .get_all(header::SEC_WEBSOCKET_PROTOCOL)
@@ -61,7 +63,7 @@ pub(super) fn is_asked(headers: &HeaderMap) -> bool {
         .any(|name| NAMES.contains(&name.trim()))
 }
 
-/// `GET /api/foxglove`, and `GET /` where this protocol is asked for.
+/// Serves `GET /api/foxglove`, and `GET /` for requests of this protocol.
 pub(super) async fn foxglove(
     State(agent): State<Agent>,
     Extension(caller): Extension<Caller>,
@@ -78,12 +80,12 @@ pub(super) async fn foxglove(
     sockets.serve(caller.role, upgrade, async move |socket| serve(&agent, &caller, socket).await)
 }
 
-/// What both directions of a socket have.
+/// State that both directions of a socket share.
 struct Shared {
     wanted: Mutex<Wanted>,
-    /// Something is to be sent at once.
+    /// Notification that a message must be sent at once.
     wake: Notify,
-    /// The last ping that came back.
+    /// Number of the last ping that came back.
     read: AtomicU64,
 }
 
@@ -98,7 +100,7 @@ impl Shared {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// False when the client does not take what it has asked for.
+    /// Queues an answer. Returns `false` if the client does not read its answers.
     fn answer(&self, message: Message) -> bool {
         let mut wanted = self.lock();
         wanted.answers.push_back(message);
@@ -114,14 +116,14 @@ impl Shared {
 async fn serve(agent: &Agent, caller: &Caller, socket: WebSocket) {
     let shared = Shared { wanted: Mutex::default(), wake: Notify::new(), read: AtomicU64::new(0) };
     let (to, from) = socket.split();
-    // Neither waits for the other: a Stop is taken also from a client that does not read.
+    // The directions do not wait for each other, so a Stop is accepted also from a client that does not read.
     tokio::select! {
         () = receive(agent, caller, &shared, from) => {}
         () = Sender { agent, caller, shared: &shared, to, pinged: 0, pinged_at: Instant::now() }.run() => {}
     }
 }
 
-/// What the client asks for, until it goes or asks for too much.
+/// Handles the messages of the client until it disconnects or exceeds its limits.
 async fn receive(agent: &Agent, caller: &Caller, shared: &Shared, mut from: SplitStream<WebSocket>) {
     let (mut allowance, mut at) = (MESSAGES_AT_ONCE, Instant::now());
     while let Some(Ok(message)) = from.next().await {
@@ -144,7 +146,7 @@ async fn receive(agent: &Agent, caller: &Caller, shared: &Shared, mut from: Spli
     }
 }
 
-/// A text message. False when the client is put out.
+/// Handles a text message. Returns `false` if the client is disconnected.
 fn ask(shared: &Shared, text: &str) -> bool {
     match serde_json::from_str(text) {
         Ok(FromClient::Subscribe { subscriptions }) => subscriptions.iter().all(|subscription| {
@@ -164,7 +166,7 @@ fn ask(shared: &Shared, text: &str) -> bool {
     }
 }
 
-/// A binary message: Stop and Pause, of those who may.
+/// Handles a binary message: Stop and Pause, if the client may send them.
 fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     let Some(call) = Call::parse(bytes) else {
         return shared.warn("not done: this server takes no messages on channels".to_owned());
@@ -192,23 +194,23 @@ fn call(agent: &Agent, caller: &Caller, shared: &Shared, bytes: &[u8]) -> bool {
     })
 }
 
-/// The direction to the client.
+/// Direction to the client.
 struct Sender<'a> {
     agent: &'a Agent,
     caller: &'a Caller,
     shared: &'a Shared,
     to: SplitSink<WebSocket, Message>,
-    /// The last ping, and when that was.
+    /// Number of the last ping, and its time.
     pinged: u64,
     pinged_at: Instant,
 }
 
-/// The client is gone, or is put out.
+/// Marks a client that has disconnected, or is disconnected by the agent.
 struct Gone;
 
 impl Sender<'_> {
     async fn run(mut self) {
-        // What it ends with is its end.
+        // Any error only ends the connection.
         let _ = self.deliver().await;
     }
 
@@ -249,7 +251,7 @@ impl Sender<'_> {
         }
     }
 
-    /// What every client is sent first.
+    /// Sends the first messages, which every client gets.
     async fn greet(&mut self) -> Result<(), Gone> {
         let services: &[&str] = if self.caller.looks_only { &[] } else { &["services"] };
         let simulated = if self.agent.simulated { " (SIMULATED)" } else { "" };
@@ -268,7 +270,7 @@ impl Sender<'_> {
         self.text(&ToClient::AdvertiseServices { services: channels::services() }).await
     }
 
-    /// Answers, and the description for who has just asked for it.
+    /// Sends answers, and the description to new subscriptions.
     async fn answer(&mut self, writer: &mut MessageWriter) -> Result<(), Gone> {
         let (answers, latched) = {
             let mut wanted = self.shared.lock();
@@ -288,7 +290,7 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// What the controller reported at a time of the line, to all subscriptions; where it is not new, words alone.
+    /// Sends the values of a status, with its time of the line, to all subscriptions; for an old status only the text.
     async fn values(
         &mut self,
         writer: &mut MessageWriter,
@@ -334,7 +336,7 @@ impl Sender<'_> {
         words.to_string().into_bytes()
     }
 
-    /// The client has read what it was sent; false: not yet.
+    /// Returns `true` if the client has read all data up to the last ping.
     fn has_read(&self) -> Result<bool, Gone> {
         if self.shared.read.load(Ordering::Relaxed) >= self.pinged {
             return Ok(true);
@@ -345,7 +347,7 @@ impl Sender<'_> {
         }
     }
 
-    /// Behind what was sent: when it comes back that was read.
+    /// Sends a ping after the data: when it comes back, the client has read the data.
     async fn ping(&mut self) -> Result<(), Gone> {
         let back = self.shared.read.load(Ordering::Relaxed) >= self.pinged;
         if !back || self.pinged_at.elapsed() < PING_TIME {
@@ -367,7 +369,7 @@ impl Sender<'_> {
     }
 }
 
-/// So long ago, ns since 1970.
+/// Returns the time that lies `ago` in the past, ns since 1970.
 fn unix_ns(ago: Duration) -> u64 {
     u64::try_from(host_kit::unix_time().saturating_sub(ago).as_nanos()).unwrap_or(u64::MAX)
 }

@@ -1,15 +1,15 @@
-//! Messages of the Foxglove WebSocket protocol, version 1: text messages are JSON with an `op`, binary ones begin with a byte that
-//! says what they are; numbers are little-endian.
+//! Messages of the Foxglove WebSocket protocol, version 1. Text messages are JSON with an `op`; binary messages begin
+//! with a byte for their type. Numbers are little-endian.
 use std::collections::BTreeMap;
 
-/// Names of the protocol in the handshake: it has two.
+/// Names of the protocol in the handshake; it has two.
 pub const NAMES: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 
 /// Text messages to a client.
 #[derive(serde::Serialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 pub enum ToClient<'a> {
-    /// The first one.
+    /// First message.
     ServerInfo {
         name: &'a str,
         capabilities: &'a [&'a str],
@@ -17,19 +17,19 @@ pub enum ToClient<'a> {
         metadata: BTreeMap<&'a str, String>,
         session_id: &'a str,
     },
-    /// Something to know; 0: information, 1: warning, 2: error.
+    /// Message for people; level 0: information, 1: warning, 2: error.
     Status { level: u8, message: String },
-    /// Channels that can be subscribed to.
+    /// Channels that a client can subscribe to.
     Advertise { channels: Vec<Channel<'a>> },
-    /// Services that can be called.
+    /// Services that a client can call.
     AdvertiseServices { services: Vec<Service<'a>> },
-    /// A call was not done.
+    /// Failed call of a service.
     ServiceCallFailure { service_id: u32, call_id: u32, message: String },
 }
 
 impl ToClient<'_> {
     pub fn text(&self) -> String {
-        // Made of strings and numbers.
+        // The message contains only strings and numbers, so this cannot fail.
         serde_json::to_string(self).unwrap_or_default()
     }
 }
@@ -55,7 +55,7 @@ pub struct Service<'a> {
     pub response: Shape<'a>,
 }
 
-/// What a service is sent, or returns.
+/// Format of a request or a response of a service.
 #[derive(serde::Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Shape<'a> {
@@ -75,7 +75,7 @@ pub enum FromClient {
     Unsubscribe {
         subscription_ids: Vec<u32>,
     },
-    /// What the server has not announced that it can do.
+    /// Request for a capability that the server has not announced.
     #[serde(other)]
     Other,
 }
@@ -87,7 +87,7 @@ pub struct Subscription {
     pub channel_id: u32,
 }
 
-/// A message on a channel, for one subscription.
+/// Returns a message on a channel, for one subscription.
 pub fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(13 + payload.len());
     bytes.push(1);
@@ -97,7 +97,7 @@ pub fn data(subscription: u32, stamp_ns: u64, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A call of a service.
+/// Call of a service.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Call<'a> {
     pub service: u32,
@@ -106,7 +106,7 @@ pub struct Call<'a> {
 }
 
 impl<'a> Call<'a> {
-    /// `None` where a binary message is none.
+    /// Returns `None` if a binary message is not a valid call.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (2, rest) = bytes.split_first()? else { return None };
         let (service, rest) = number(rest)?;
@@ -116,7 +116,7 @@ impl<'a> Call<'a> {
         Some(Self { service, call, encoding })
     }
 
-    /// What it returns, in the encoding of the call.
+    /// Returns the response message, in the encoding of the call.
     pub fn answer(&self, payload: &[u8]) -> Vec<u8> {
         let mut bytes = vec![3];
         bytes.extend(self.service.to_le_bytes());
@@ -137,7 +137,7 @@ fn number(bytes: &[u8]) -> Option<(u32, &[u8])> {
 mod tests {
     use super::*;
 
-    /// Worked out by hand from the tables of the protocol's specification.
+    /// Expected bytes computed by hand from the tables of the protocol's specification.
     #[test]
     fn binary_messages_have_the_bytes_of_the_specification() {
         assert_eq!(
@@ -149,7 +149,7 @@ mod tests {
         assert_eq!(call, Call { service: 7, call: 265, encoding: b"json" });
         let answer = [3, 7, 0, 0, 0, 9, 1, 0, 0, 4, 0, 0, 0, b'j', b's', b'o', b'n', b'{', b'}'];
         assert_eq!(call.answer(b"{}"), answer);
-        // What is cut off, of another kind, or longer than it is, is no call.
+        // A message that is cut off, of another type, or too long is not a valid call.
         for n in 0..17 {
             assert_eq!(Call::parse(&bytes[..n]), None, "{n}");
         }

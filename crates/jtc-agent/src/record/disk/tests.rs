@@ -1,4 +1,4 @@
-//! A disk that is slow, small or full.
+//! Tests with a slow, small or full disk.
 use std::sync::Mutex;
 use std::sync::mpsc::channel;
 
@@ -21,7 +21,7 @@ fn finished() -> Ending {
     Ending { outcome: "finished".into(), ..Ending::default() }
 }
 
-/// A writer, and what it reports.
+/// Returns a writer, and the receiver of its notices.
 fn writer(shelf: Shelf) -> (Writer, Receiver<Notice>) {
     let (notices, reported) = channel();
     let notify = Box::new(move |notice| notices.send(notice).expect("it is awaited"));
@@ -35,7 +35,7 @@ fn files(dir: &tempfile::TempDir) -> Vec<PathBuf> {
     all
 }
 
-/// A disk that takes nothing holds nobody up, and what is lost is counted; what ends a recording finds its place.
+/// A blocked disk delays nothing and lost samples are counted; the end of a recording always finds a place.
 #[test]
 fn what_finds_no_room_is_counted() {
     let (mut disk, messages) = Disk::new();
@@ -52,8 +52,8 @@ fn what_finds_no_room_is_counted() {
     assert_eq!(*lost, 100_005 - samples as u64);
 }
 
-/// Every file that was made stays within the limit together with the others, and a long motion goes on in the next one: no sample is
-/// missing or there twice.
+/// All files together stay within the limit. A long motion continues in the next file, with no sample missing or
+/// doubled.
 #[test]
 fn recordings_stay_within_their_limit() {
     const LIMIT: u64 = 400_000;
@@ -88,7 +88,7 @@ fn recordings_stay_within_their_limit() {
     assert!(warned.len() == 1 && warned[0].contains("3 samples are missing"), "{warned:?}");
 }
 
-/// A full disk is reported once, and recording goes on when there is room, in the middle of a motion, too.
+/// A full disk is reported once, and recording continues when there is space again, also in the middle of a motion.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_reported_once_and_recording_goes_on() {

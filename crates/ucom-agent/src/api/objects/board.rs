@@ -1,4 +1,4 @@
-//! Boards: as last seen, as found by a scan, as they answer a command.
+//! Boards: as last seen, as found by a scan, and as they answer a command.
 use ucom::{Profile, Status};
 use ucom_host::date_text;
 use ucom_host::master::{Board, BoardSeen, Life};
@@ -6,58 +6,58 @@ use utoipa::ToSchema;
 
 use crate::picture::Picture;
 
-/// A board as last seen.
+/// Board as last seen.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct BoardObject {
-    /// Its number.
+    /// Number of the board.
     pub number: u8,
-    /// Number of its bootloader: who it is; missing before it has answered.
+    /// Number of its bootloader, which identifies the board; missing before its first answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
-    /// Its description of itself.
+    /// Description that the board reports.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
-    /// `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
+    /// State: `exloader`, `programming`, `started`, `running`, `lost`, `rebooted` or `?`.
     pub state: String,
-    /// Its heartbeats: `alive`, `late`, `lost`, or `none` where none is expected.
+    /// State of its heartbeats: `alive`, `late`, `lost`, or `none` if no heartbeats are expected.
     pub heartbeat: String,
-    /// Since the last heartbeat, s.
+    /// Age of the last heartbeat, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heartbeat_age_s: Option<f64>,
-    /// The bits of its status that are set.
+    /// Names of the status bits that are set.
     pub status: Vec<String>,
-    /// Its outputs are enabled, as it last reported.
+    /// `true` if its outputs were enabled in its last report.
     pub active: bool,
-    /// It has an application.
+    /// `true` if it has an application.
     pub application: bool,
-    /// Program ID of that.
+    /// Program ID of the application.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id: Option<u16>,
-    /// When that was flashed.
+    /// Flash date of the application.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_date: Option<String>,
-    /// Errors that it has reported.
+    /// Number of errors that it has reported.
     pub errors: u64,
-    /// The last of them.
+    /// Last error that it has reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_error: Option<String>,
-    /// Frames of it in the last second.
+    /// Number of its frames in the last second.
     pub frames_per_s: u64,
-    /// What it offers; missing before its names are known.
+    /// Names of its values; missing until they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub offers: Option<OffersObject>,
 }
 
-/// Names of what a board's application has.
+/// Names of the values of a board's application.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct OffersObject {
-    /// The description of the application.
+    /// Description of the application.
     pub description: String,
-    /// Controller inputs.
+    /// Names of controller inputs.
     pub inputs: Vec<String>,
-    /// Sensor outputs.
+    /// Names of sensor outputs.
     pub outputs: Vec<String>,
-    /// Parameters.
+    /// Names of parameters.
     pub parameters: Vec<String>,
 }
 
@@ -66,12 +66,12 @@ fn bits(status: Status) -> Vec<String> {
 }
 
 impl BoardObject {
-    /// All boards of a picture.
+    /// Returns all boards of a snapshot.
     pub(crate) fn all(picture: &Picture) -> Vec<Self> {
         picture.boards.iter().map(|(number, board)| Self::of(picture, number, board)).collect()
     }
 
-    /// One of them.
+    /// Returns one board of a snapshot.
     pub(crate) fn of(picture: &Picture, number: u8, board: &Board) -> Self {
         let now_us = picture.clock_us();
         let info = board.info;
@@ -102,20 +102,20 @@ impl BoardObject {
     }
 }
 
-/// A board as it answered.
+/// Board as it answered.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct FoundObject {
-    /// Its number.
+    /// Number of the board.
     pub number: u8,
-    /// Number of its bootloader: who it is.
+    /// Number of its bootloader, which identifies the board.
     pub flash_number: u16,
-    /// Its description of itself.
+    /// Description that the board reports.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub description: Option<String>,
     /// Program ID of its application.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id: Option<u16>,
-    /// The bits of its status that are set.
+    /// Names of the status bits that are set.
     pub status: Vec<String>,
 }
 
@@ -131,16 +131,16 @@ impl FoundObject {
     }
 }
 
-/// A board after a command, as it answered.
+/// Board as it answered after a command.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct AnswerObject {
-    /// Its number.
+    /// Number of the board.
     pub board: u8,
-    /// What it does: `exloader`, `programming`, `started`, `running`.
+    /// State: `exloader`, `programming`, `started`, `running`.
     pub state: String,
-    /// The bits of its status that are set.
+    /// Names of the status bits that are set.
     pub status: Vec<String>,
-    /// When its application was flashed.
+    /// Flash date of its application.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_date: Option<String>,
 }

@@ -1,77 +1,79 @@
-//! The bus, and who commands.
+//! Status of the bus, and the lease.
 use agent_kit::access::Role;
 use utoipa::ToSchema;
 
 use crate::picture::Picture;
 
-/// The bus, and who commands.
+/// Status of the bus, and the lease.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct StatusObject {
-    /// Nothing moves: the boards are simulated.
+    /// `true` if the boards are simulated: nothing moves.
     pub simulated: bool,
-    /// The bus.
+    /// Name of the bus.
     pub bus: String,
-    /// Time of this agent when this was made: since it began, ms. Who reads that it is long ago receives late, however steadily.
+    /// Time of this object since the start of the agent, ms. A client can detect from it that statuses arrive late,
+    /// even at a steady rate.
     pub at_ms: u64,
-    /// Why the bus is gone; missing while it is there.
+    /// Reason why the bus was lost; missing while it is available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lost: Option<String>,
-    /// How old this is, ms.
+    /// Age of this status, ms.
     pub age_ms: u64,
-    /// Boards that are known.
+    /// Number of known boards.
     pub boards: usize,
     /// Load of the bus over the last second, %.
     pub load_percent: f64,
-    /// Frames that were received, and sent.
+    /// Number of received frames, without foreign ones.
     pub received: u64,
-    /// Frames that this agent has sent.
+    /// Number of frames that this agent has sent.
     pub sent: u64,
-    /// Frames that are not of this protocol.
+    /// Number of frames that do not belong to this protocol.
     pub foreign_frames: u64,
-    /// This agent sends heartbeats: who has the lease has commanded something, or boards that it has started are not stopped.
+    /// `true` if this agent sends heartbeats: the lease holder has sent a command, or boards that the agent has started
+    /// are not stopped.
     pub is_master: bool,
-    /// Another PC commands on this bus.
+    /// `true` if another PC commands on this bus.
     pub competing_master: bool,
-    /// Numbers that two boards have, in words.
+    /// Numbers that two boards share, in words.
     pub shared_numbers: Vec<String>,
-    /// What the CAN adapter reports; missing where it reports nothing.
+    /// Report of the CAN adapter; missing if it reports no state.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub controller: Option<ControllerObject>,
-    /// Who commands; missing where nobody does.
+    /// Lease; missing if no client holds it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lease: Option<LeaseObject>,
-    /// What the caller may do.
+    /// Role of the caller.
     pub role: Role,
-    /// Which agent this is, by a number that it was given at its start.
+    /// Number that identifies this run of the agent.
     pub agent: String,
     /// Number of the last event.
     pub last_event: u64,
-    /// Number of the last Stop, 0 before the first: `asked_after` of what is asked for now.
+    /// Number of the last Stop, 0 before the first: value of `asked_after` for new requests.
     pub last_halt: u64,
 }
 
-/// Who commands.
+/// Lease, and its holder.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct LeaseObject {
-    /// Its name.
+    /// Name of the holder.
     pub holder: String,
-    /// Since when, ms.
+    /// Time since the holder took the lease, ms.
     pub age_ms: u64,
-    /// Until it lapses, ms.
+    /// Time until the lease lapses without renewal, ms.
     pub left_ms: u64,
-    /// Who asks for it.
+    /// Name of the client that waits for the lease.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wanted_by: Option<String>,
 }
 
-/// How the CAN controller of this computer gets on with the bus.
+/// State of this computer's CAN controller.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ControllerObject {
-    /// It has left the bus.
+    /// `true` if it is bus-off.
     pub bus_off: bool,
-    /// How often it has.
+    /// Number of bus-off events.
     pub times_bus_off: u64,
-    /// It is error passive.
+    /// `true` if it is error passive.
     pub passive: bool,
     /// Transmit error counter.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,7 +84,7 @@ pub struct ControllerObject {
 }
 
 impl StatusObject {
-    /// What a picture shows; what it does not show is empty.
+    /// Returns the status of a snapshot; values that the snapshot does not contain are empty.
     pub(crate) fn of(picture: &Picture) -> Self {
         let (statistics, now_us) = (&picture.statistics, picture.now_us);
         Self {

@@ -1,4 +1,4 @@
-//! Jobs, and what they brought about.
+//! Jobs and their results.
 use agent_kit::api::Problem;
 use host_kit::{Diagnose as _, Facts, Finding, FrontEnd, Severity};
 use ucom_host::master::update::{UpdateReport, UpdateResult};
@@ -7,25 +7,25 @@ use utoipa::ToSchema;
 use super::FoundObject;
 use crate::jobs::{Done, Job};
 
-/// Who is there.
+/// Boards of the chain.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ChainObject {
     /// Boards with a number.
     pub boards: Vec<FoundObject>,
-    /// What is worth a word; empty: nothing is odd.
+    /// Unusual observations; empty: none.
     pub findings: Vec<String>,
 }
 
-/// What a doctor found.
+/// Finding of a diagnosis.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct FindingObject {
-    /// `problem`, `warning` or `good`.
+    /// Severity: `problem`, `warning` or `good`.
     pub severity: String,
-    /// What was found.
+    /// Observation.
     pub what: String,
-    /// What probably is the cause; may be empty.
+    /// Probable cause; may be empty.
     pub why: String,
-    /// What helps; may be empty.
+    /// Next step; may be empty.
     pub next: String,
 }
 
@@ -42,48 +42,49 @@ impl From<&Finding> for FindingObject {
     }
 }
 
-/// What became of a board in an update.
+/// Result of an update for one board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct UpdatedObject {
-    /// Its number.
+    /// Number of the board.
     pub board: u8,
-    /// Who it is.
+    /// Number of its bootloader, which identifies the board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flash_number: Option<u16>,
-    /// `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`, `verified` or `running`.
+    /// Outcome: `not-started`, `cancelled`, `up-to-date`, `program-up-to-date`, `incomplete`, `unknown`, `written`,
+    /// `verified` or `running`.
     pub outcome: String,
-    /// The board shows the Program ID and date of the image, and the agent or its inventory has it that exactly this image was
-    /// written to this address: now, or before.
+    /// `true` if the board shows Program ID and date of the image, and the records of the agent or its inventory show
+    /// that exactly this image was written to this address, now or before.
     pub verified: bool,
-    /// Program ID that it had, and that was read back.
+    /// Program ID read back before the update.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id_before: Option<u16>,
-    /// Program ID that was read back.
+    /// Program ID read back after the update.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id_after: Option<u16>,
-    /// How often it was tried.
+    /// Number of attempts.
     pub attempts: u32,
-    /// s.
+    /// Duration, s.
     pub time_s: f64,
-    /// Why it failed.
+    /// Reason of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<Problem>,
 }
 
-/// What became of an update.
+/// Result of an update.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct UpdateObject {
-    /// Nothing was sent but questions.
+    /// `true` if only questions were sent.
     pub dry_run: bool,
-    /// Program ID that the boards must show; missing: nobody knows.
+    /// Program ID that the boards must show; missing: not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub program_id: Option<u16>,
-    /// Why nobody knows it.
+    /// Reason why it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unverifiable: Option<String>,
-    /// Bytes of both cycles.
+    /// Number of bytes of both cycles.
     pub bytes: u64,
-    /// Each board.
+    /// Results for each board.
     pub boards: Vec<UpdatedObject>,
 }
 
@@ -114,48 +115,48 @@ impl UpdateObject {
     }
 }
 
-/// A board that runs.
+/// Running board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct RunningObject {
-    /// Its number.
+    /// Number of the board.
     pub board: u8,
-    /// Its outputs are enabled.
+    /// `true` if its outputs are enabled.
     pub active: bool,
 }
 
-/// What runs.
+/// Running boards.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct RunObject {
-    /// The boards.
+    /// Boards that run.
     pub boards: Vec<RunningObject>,
-    /// Load that they make on the bus, by forecast, %.
+    /// Predicted bus load of these boards, %.
     pub load_percent: f64,
 }
 
-/// A job, while it goes on and afterwards.
+/// Job, while it runs and afterwards.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct JobObject {
-    /// Its number.
+    /// Number of the job.
     pub number: u64,
-    /// What it does.
+    /// Description of the job.
     pub what: String,
-    /// Who asked for it.
+    /// Name of the client that requested it.
     pub client: String,
-    /// `running`, `finished`, `cancelled` or `failed`.
+    /// Stage: `running`, `finished`, `cancelled` or `failed`.
     pub stage: String,
-    /// Of a scan or of numbering: who is there.
+    /// Boards of the chain, after a scan or a numbering.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chain: Option<ChainObject>,
-    /// Of a doctor: what was found, the worst first.
+    /// Findings of a doctor, worst first.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub findings: Option<Vec<FindingObject>>,
-    /// Of an update: what became of each board.
+    /// Result of an update for each board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub update: Option<UpdateObject>,
-    /// Of a start of control loops: what runs.
+    /// Running boards, after a start of control loops.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run: Option<RunObject>,
-    /// Why it failed.
+    /// Reason of a failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub error: Option<Problem>,
 }

@@ -1,4 +1,4 @@
-//! What the API sends: one type for each object, from which its description is made.
+//! Objects that the API sends. The API description is made from these types.
 mod board;
 mod bus;
 mod job;

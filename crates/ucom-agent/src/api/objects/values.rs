@@ -1,4 +1,4 @@
-//! Values of boards, by name and in units where the signal table has them.
+//! Values of boards by name, with units if the signal table has them.
 use serde_json::Value;
 use ucom_host::files::Signal;
 use ucom_host::master::Life;
@@ -7,55 +7,58 @@ use utoipa::ToSchema;
 
 use crate::picture::{Picture, Values};
 
-/// Outputs that are older are not those of now, µs.
+/// Age after which outputs are stale, µs.
 const OLD_US: u64 = 500_000;
 
 /// Values of a board.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ValuesObject {
-    /// Its number.
+    /// Number of the board.
     pub board: u8,
-    /// Since its outputs came, s; missing before the first.
+    /// Age of its outputs, s; missing before the first ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub age_s: Option<f64>,
-    /// These are not the outputs of now: they are older than half a second, or the board is late or lost, or has left its control loop.
+    /// `true` if the outputs are not current: they are older than half a second, or the board is late or lost, or has
+    /// left its control loop.
     pub stale: bool,
-    /// Sensor outputs; empty before the first.
+    /// Sensor outputs; empty before the first ones.
     pub outputs: Vec<ValueObject>,
-    /// Controller inputs as last set, or as the board began with them; without a value where this agent has neither set nor read them
-    /// since the application started.
+    /// Controller inputs as last set, or with their initial values. Without a value if this agent has neither set nor
+    /// read them since the application started.
     pub inputs: Vec<ValueObject>,
-    /// Parameters as this agent believes them to be: boards have no way to read them back.
+    /// Parameters as last written by this agent. Without a value if it has not written them since the application
+    /// started: boards cannot report their parameters.
     pub parameters: Vec<ValueObject>,
 }
 
-/// A value.
+/// Value of a signal.
 #[derive(Clone, Debug, serde::Serialize, ToSchema)]
 pub struct ValueObject {
-    /// Its name.
+    /// Name of the signal.
     pub name: String,
-    /// Its place in the buffer.
+    /// Index in the buffer.
     pub index: usize,
-    /// The number in its unit, true or false, or a word as text, by the signal table; missing where it is not known.
+    /// Value by the signal table: a number in its unit, `true` or `false`, or a word as text; missing if it is not
+    /// known.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schema(value_type = Option<Value>)]
     pub value: Option<Value>,
-    /// For people, with its unit.
+    /// Value with its unit, for people.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub text: Option<String>,
-    /// Its unit, where the signal table has one.
+    /// Unit of the signal, if the signal table has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<String>,
-    /// Least value, in its unit, where the signal table has one.
+    /// Smallest value, in its unit, if the signal table has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min: Option<f64>,
-    /// Greatest value, alike.
+    /// Largest value, in its unit, if the signal table has one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max: Option<f64>,
 }
 
 impl ValueObject {
-    /// A word of a signal.
+    /// Returns the value of a signal from its word.
     pub(crate) fn of(name: &str, index: usize, signal: Option<&Signal>, word: Option<u16>) -> Self {
         let value = |word: u16| signal.map_or_else(|| Value::from(word as i16), |signal| signal.json(word));
         let unit = signal.filter(|signal| signal.known && !signal.unit.is_empty());

@@ -17,18 +17,18 @@ pub struct Diagnosis {
 }
 
 impl Diagnosis {
-    /// A kind, a short name, and what helps.
+    /// Creates a diagnosis from kind, short name and next step.
     pub fn new(kind: ErrorKind, code: &'static str, next: impl Into<Next>) -> Self {
         Self { kind, code, next: next.into() }
     }
 }
 
-/// An error that people and programs can act on.
+/// Error with the information that users and programs need to act.
 pub trait Diagnose: Error {
-    /// Kind, name and what helps.
+    /// Returns kind, name and next step.
     fn diagnosis(&self) -> Diagnosis;
 
-    /// Returns where the error is, its value and its limit.
+    /// Returns the place of the error, its value and its limit.
     fn facts(&self) -> Facts {
         Facts::default()
     }
@@ -38,7 +38,7 @@ pub trait Diagnose: Error {
         self.diagnosis().kind
     }
 
-    /// A short name for programs.
+    /// Returns a short name for programs.
     fn code(&self) -> &'static str {
         self.diagnosis().code
     }

@@ -1,4 +1,4 @@
-//! Where an error is, its value and its limit: the parts of its message that programs read.
+//! Place of an error, its value and its limit: the parts of its message that programs read.
 
 /// Facts of an error. A part is `None` if it does not apply.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,11 +1,11 @@
-//! The one carrier of a failure. Commands, agents and the Python package render it.
+//! The common type of a failure. Commands, agents and the Python package render it.
 
 use crate::{Diagnose, Diagnosis, ErrorKind, Facts, Next};
 
-/// Reason why something was not done.
+/// Reason why a request was not done.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
-    /// Kind: a command makes its exit code of it, an agent its HTTP status, Python its exception.
+    /// Kind: a command turns it into its exit code, an agent into its HTTP status, Python into its exception.
     pub kind: ErrorKind,
     /// Short name for programs.
     pub code: &'static str,
@@ -13,23 +13,23 @@ pub struct Failure {
     pub message: String,
     /// Next step; empty if no step helps.
     pub next: Next,
-    /// Where the failure is, its value and its limit.
+    /// Place of the failure, its value and its limit.
     pub facts: Box<Facts>,
 }
 
 impl Failure {
-    /// Makes a failure without a next step and without facts.
+    /// Creates a failure without a next step and without facts.
     pub fn new(kind: ErrorKind, code: &'static str, message: impl ToString) -> Self {
         Self { kind, code, message: message.to_string(), next: Next::default(), facts: Box::default() }
     }
 
-    /// Takes everything that an error of a library knows.
+    /// Creates a failure from all information of a library's error.
     pub fn of(error: &impl Diagnose) -> Self {
         let Diagnosis { kind, code, next } = error.diagnosis();
         Self::new(kind, code, error).next(next).with(error.facts())
     }
 
-    /// Makes a failure about wrong usage or unreadable input.
+    /// Creates a failure about wrong usage or unreadable input.
     pub fn usage(message: impl ToString) -> Self {
         Self::new(ErrorKind::Usage, "usage", message)
     }
@@ -44,12 +44,12 @@ impl Failure {
         Self { facts: Box::new(facts), ..self }
     }
 
-    /// Makes a failure whose reason stands in the printed result already. Only its kind counts; it has no code.
+    /// Creates a failure whose reason is already in the printed result. Only its kind counts; it has no code.
     pub fn shown(kind: ErrorKind) -> Self {
         Self::new(kind, "", "")
     }
 
-    /// Returns `true` if the printed result has the reason already.
+    /// Returns `true` if the printed result already has the reason.
     pub fn is_shown(&self) -> bool {
         self.code.is_empty()
     }

@@ -1,24 +1,24 @@
-//! What a doctor finds: how bad it is, what it is, the likely cause, and the next command.
+//! Findings of a doctor: severity, description, likely cause, and next command.
 use std::fmt;
 
 use serde::Serialize;
 
 use crate::Next;
 
-/// How bad a finding is, the worst first.
+/// Severity of a finding, the worst first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// Nothing works until it is gone.
+    /// A fault that prevents any operation.
     Problem,
-    /// It works, but not as it should.
+    /// An operation with a defect.
     Warning,
-    /// As it should be.
+    /// Correct state.
     Good,
 }
 
 impl Severity {
-    /// The mark before a line of a list: `✗`, `!` or `✓`.
+    /// Returns the mark before a line of a list: `✗`, `!` or `✓`.
     pub const fn mark(self) -> char {
         match self {
             Self::Problem => '✗',
@@ -28,16 +28,16 @@ impl Severity {
     }
 }
 
-/// One finding.
+/// Finding of a doctor.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity of the finding.
     pub severity: Severity,
-    /// What was found.
+    /// Description of the finding.
     pub what: String,
-    /// What probably is the cause; may be empty.
+    /// Probable cause; may be empty.
     pub why: String,
-    /// The next command or act; empty when there is nothing to do.
+    /// Next command or action; empty if no action is needed.
     pub next: Next,
 }
 
@@ -54,12 +54,12 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Findings in the making.
+/// Collected findings.
 #[derive(Clone, Debug, Default)]
 pub struct Findings(Vec<Finding>);
 
 impl Findings {
-    /// Adds one.
+    /// Adds a finding.
     pub fn add(
         &mut self,
         severity: Severity,
@@ -70,27 +70,27 @@ impl Findings {
         self.0.push(Finding { severity, what: what.into(), why: why.into(), next: next.into() });
     }
 
-    /// Adds what has to be gone before anything works.
+    /// Adds a fault that prevents any operation.
     pub fn problem(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Problem, what, why, next);
     }
 
-    /// Adds what is not as it should be.
+    /// Adds an operation with a defect.
     pub fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Warning, what, why, next);
     }
 
-    /// Adds what is as it should be.
+    /// Adds a correct state.
     pub fn good(&mut self, what: impl Into<String>) {
         self.add(Severity::Good, what, "", "");
     }
 
-    /// Whether one of them has to be gone before anything works.
+    /// Returns `true` if a finding prevents any operation.
     pub fn has_problem(&self) -> bool {
         self.0.iter().any(|finding| finding.severity == Severity::Problem)
     }
 
-    /// All of them, the worst first and else in the order in which they were added.
+    /// Returns all findings, the worst first, otherwise in the order in which they were added.
     pub fn worst_first(mut self) -> Vec<Finding> {
         self.0.sort_by_key(|finding| finding.severity);
         self.0

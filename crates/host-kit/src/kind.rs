@@ -1,6 +1,6 @@
-//! Kinds of failure: what a caller can act on without knowing each error.
+//! Kinds of failure, on which a caller can act without knowing each error.
 
-/// What kind of failure an error or a report is, the less grave first.
+/// Kind of failure of an error or a report, from the least to the most serious.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ErrorKind {
     /// Wrong usage or unreadable input.
@@ -11,6 +11,6 @@ pub enum ErrorKind {
     Device,
     /// No port or bus, or no answer.
     NoLink,
-    /// Something went wrong on the way, or was cancelled there.
+    /// An error or a cancellation during the operation.
     Fault,
 }

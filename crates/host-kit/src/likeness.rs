@@ -1,11 +1,12 @@
-//! Names that look like each other, for what a person typed with a slip of the hand.
+//! Similarity of names, for “did you mean …?” hints after a typing error.
 
-/// How much two names look alike, 0 to 1: that of Jaro and Winkler, who weigh what they begin with.
+/// Returns the similarity of two names, 0 to 1, by Jaro and Winkler, who give more weight to the beginning.
 pub fn likeness(a: &str, b: &str) -> f64 {
     strsim::jaro_winkler(a, b)
 }
 
-/// The known name that looks most like `name`, where one is as much like it as `least`, 0 to 1; small and capital letters are one.
+/// Returns the known name that is most similar to `name`, if its similarity is at least `least`, 0 to 1; upper and
+/// lower case are equal.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
     let name = name.to_lowercase();
     let all = known.into_iter().map(|known| (likeness(&known.to_lowercase(), &name), known));

@@ -1,21 +1,23 @@
-//! Reading MCAP files, those too whose writer was killed.
+//! Reader of MCAP files, including files whose writer was killed.
 use std::io::{ErrorKind, Read};
 
 use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Longest record that is read, bytes: memory is allocated for the length that a damaged file states, before the bytes are found missing.
+/// Longest record that is read, bytes: memory is allocated for the length that a damaged file states, before the
+/// missing bytes are detected.
 const MAX_RECORD: usize = 1 << 26;
 
-/// Shows channels, messages and metadata of a file, those in chunks too, and returns whether the file was completed. It is read from
-/// its beginning to its end, in small pieces: no more of it than a record is in memory.
-/// Attachments and indices are passed over unread: the library panics at damaged ones. What is wrong behind the data is
-/// no error, as an index stands there.
+/// Shows channels, messages and metadata of a file, those in chunks too, and returns `true` if the file was completed.
+/// Reads the file from beginning to end, in small pieces: memory holds at most one record. Attachments and indices are
+/// skipped unread, because the library panics at damaged ones. Errors after the data are ignored, because an index
+/// stands there.
 ///
 /// # Errors
 ///
-/// The first record that cannot be read, or that `see` refuses; what came before it was shown. An error of `file` itself.
+/// The first record that cannot be read, or that `see` refuses; the records before it were shown. An error of `file`
+/// itself.
 pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,

@@ -1,9 +1,10 @@
-//! Where a program keeps the files of its user.
+//! Folder for the files of a program's user.
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// The folder that an environment variable of the XDG Base Directory Specification names, such as `XDG_CACHE_HOME`, or else `in_home` in the
-/// folder that `HOME` names; `None` where neither is set. An empty variable counts as one that is not set.
+/// Returns the folder that an environment variable of the XDG Base Directory Specification names, such as
+/// `XDG_CACHE_HOME`, or else `in_home` in the folder that `HOME` names; `None` if neither is set. An empty variable
+/// counts as not set.
 pub fn user_folder(variable: &str, in_home: &str) -> Option<PathBuf> {
     folder(|name| std::env::var_os(name), variable, in_home)
 }

@@ -1,14 +1,14 @@
-//! Files that are written whole or not at all.
+//! Atomic file writes.
 use std::fs::{File, OpenOptions, metadata, read_link};
 use std::io::{Result, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file whole, or leaves what was there as it was. Behind a link the file it leads to is written, a file keeps its
-/// mode, and pipes and terminals are written to, not replaced.
+/// Writes a file completely, or leaves the old file unchanged. If the path is a link, its target is written. A file
+/// keeps its mode, and pipes and terminals are written to, not replaced.
 ///
 /// # Errors
 ///
-/// The system's error; nothing is left beside the file then.
+/// The system's error; no temporary file is left.
 pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
     let path = end_of_links(path);
     let before = metadata(&path).ok();
@@ -23,7 +23,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
             beside.as_file().set_permissions(mode)?;
             beside
         }
-        // Without a file before the mode is the one that the system gives to new files.
+        // A new file gets the system's default mode.
         None => builder.make_in(directory, |path| File::options().write(true).create_new(true).open(path))?,
     };
     beside.write_all(content)?;
@@ -32,7 +32,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// Where a chain of links ends; also when nothing is there yet.
+/// Returns the end of a chain of links, even if no file exists there yet.
 fn end_of_links(path: &Path) -> PathBuf {
     let mut at = path.to_path_buf();
     for _ in 0..40 {

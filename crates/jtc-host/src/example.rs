@@ -1,4 +1,4 @@
-//! Files to try, and the page about the forms of files.
+//! Example files, and the page about file formats.
 //!
 //! The trajectories begin and end at the zero pose, in which `jtc sim` starts.
 
@@ -14,10 +14,10 @@ use crate::arm::AVENA_TOML;
 use crate::trajectory::{Point, Trajectory};
 pub use demo::demo_motion;
 
-/// The forms of files, with an example of each.
+/// Page about the file formats, with an example of each.
 pub const FORMS: &str = include_str!("example/forms.md");
 
-/// Faults of a simulated run.
+/// Faults for a simulated run.
 const FAULTS: &str = include_str!("example/faults.toml");
 
 /// Waypoints of a cycle.
@@ -26,7 +26,7 @@ const CYCLE: &str = include_str!("example/cycle.csv");
 /// Waypoints with the flange on lines and an arc.
 const LINES: &str = include_str!("example/lines.csv");
 
-/// Furthest bend of each joint of the examples, rad.
+/// Largest deflection of each joint in the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
 /// Duration, s, and time between points, ms, of the example motion.
 const DURATION_S: f64 = 6.0;
@@ -34,14 +34,14 @@ const STEP_MS: u16 = 10;
 /// Times of the waypoints, s.
 const WAYPOINTS_S: [f64; 9] = [0.0, 0.75, 1.5, 2.25, 3.0, 3.75, 4.5, 5.25, 6.0];
 
-/// A file to try.
+/// Example file.
 #[derive(Clone, Copy, Debug)]
 pub struct Example {
     /// Name of the example.
     pub name: &'static str,
     /// Name of its file.
     pub file: &'static str,
-    /// What it is.
+    /// Description of the example.
     pub what: &'static str,
     /// The command that uses it, with `{}` for the file.
     pub next: &'static str,
@@ -49,18 +49,18 @@ pub struct Example {
 }
 
 impl Example {
-    /// What is in the file.
+    /// Returns the content of the file.
     pub fn text(&self) -> String {
         (self.text)()
     }
 
-    /// The example of that name.
+    /// Returns the example with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         EXAMPLES.iter().find(|example| example.name == name)
     }
 }
 
-/// All of them.
+/// All examples.
 pub const EXAMPLES: [Example; 9] = [
     Example {
         name: "motion",
@@ -127,7 +127,7 @@ pub const EXAMPLES: [Example; 9] = [
     },
 ];
 
-/// Position, velocity and acceleration of `sin⁴` over the duration: at rest at both ends, the acceleration too.
+/// Returns the point of `sin⁴` over the duration: velocity and acceleration are 0 at both ends.
 fn point(t: f64) -> Point {
     // sin⁴x = (3 − 4 cos 2x + cos 4x) / 8
     let (x, w) = (PI * t / DURATION_S, PI / DURATION_S);
@@ -147,7 +147,7 @@ fn motion() -> Trajectory {
     Trajectory { step_ms: STEP_MS, points }
 }
 
-/// Waypoints rounded to what a person would write.
+/// Returns the waypoints of the example motion, for files with rounded numbers.
 fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
     WAYPOINTS_S.into_iter().map(|t| (t, point(t).position))
 }
@@ -155,7 +155,7 @@ fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
 fn row(values: [f64; JOINTS], digits: usize) -> String {
     values
         .map(|v| {
-            // Adding zero makes −0 a plain one.
+            // Adding zero turns −0 into 0.
             let scale = 10f64.powi(digits as i32);
             format!("{:.digits$}", (v * scale).round() / scale + 0.0)
         })
@@ -196,7 +196,7 @@ mod tests {
     use crate::waypoints::WaypointFile;
     use jtc_core::Config;
 
-    /// Each trajectory can be run on the built-in arm from where `jtc sim` starts.
+    /// Each trajectory can run on the built-in arm from the start pose of `jtc sim`.
     #[test]
     fn the_trajectories_pass_the_check_from_the_zero_pose() {
         let arm = Arm::avena();
@@ -219,7 +219,7 @@ mod tests {
         }
     }
 
-    /// The waypoints are planned as they are, and a cycle ends where it begins.
+    /// The waypoints can be planned without changes, and a cycle ends at its first waypoint.
     #[test]
     fn the_waypoints_of_a_cycle_can_be_planned() {
         let arm = Arm::avena();
@@ -253,7 +253,7 @@ mod tests {
         }
     }
 
-    /// Every block of the page is a file that can be read.
+    /// Every code block of the page is a readable file.
     #[test]
     fn the_page_shows_files_that_can_be_read() {
         let arm = Arm::avena();

@@ -1,4 +1,4 @@
-//! Reading files of numbers, and what can be wrong with one: file, line, column and value are always named.
+//! Reading of files with numbers. Errors always name file, line, column and value.
 
 use std::path::{Path, PathBuf};
 
@@ -6,103 +6,103 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Largest file that is read.
 pub const FILE_MAX: u64 = 64 << 20;
-/// Why the numbers of a file that names its units are not read as degrees.
+/// Reason why the numbers of a file that names its units are not read as degrees.
 pub(crate) const UNITS_KNOWN: &str =
     "the units of this file are known: its numbers are not taken as degrees; leave --deg out";
 
-/// Why a file cannot be used.
+/// Reason why a file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
-    /// The operating system refused.
+    /// The operating system refused access.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// Its words.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A larger file than any of these can be.
+    /// The file is larger than every valid file.
     #[error("{}: {bytes} bytes, more than {FILE_MAX}", path.display())]
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// Its size.
+        /// Size of the file, bytes.
         bytes: u64,
     },
-    /// A place in a text is wrong.
+    /// A place in the text is wrong.
     #[error("{}{place}: {problem}", path.display())]
     At {
         /// The file.
         path: PathBuf,
         /// Line, column, field or key.
         place: Place,
-        /// What is wrong there, with the value.
+        /// Problem at this place, with the value.
         problem: String,
     },
-    /// A robot description of which six joints have to be selected as the arm.
+    /// The robot description has more than six joints, and the caller must select the six of the arm.
     #[error("{}: {problem}", path.display())]
     Joints {
         /// The file.
         path: PathBuf,
-        /// Which joints move.
+        /// Joints that move.
         problem: String,
-        /// Six that could be the arm, with commas between them.
+        /// Six joints that could be the arm, separated by commas.
         six: String,
     },
-    /// The joints or the flange that were named are not those of an arm of the robot description.
+    /// The joints or the flange that the caller named do not form an arm in the robot description.
     #[error("{}{place}: {problem}", path.display())]
     Choice {
         /// The file.
         path: PathBuf,
-        /// The joint, where there is one.
+        /// Joint, if the problem is about one joint.
         place: Place,
-        /// What is wrong with it.
+        /// Problem of the selection.
         problem: String,
     },
-    /// A robot description without six rotary joints in a chain: no option makes an arm for this controller of it.
+    /// A robot description without six rotary joints in a chain: with no option can this controller use it.
     #[error("{}: {problem}", path.display())]
     FewJoints {
         /// The file.
         path: PathBuf,
-        /// Which joints there are.
+        /// Joints of the description.
         problem: String,
     },
-    /// The file as a whole is none of the known forms.
+    /// The file is not in one of the known formats.
     #[error("{}: {problem}", path.display())]
     Form {
         /// The file.
         path: PathBuf,
-        /// What was found and what is known.
+        /// Content that was found, and known formats.
         problem: String,
     },
 }
 
-/// A place in a file.
+/// Place in a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
-    /// Line from 1.
+    /// Line, from 1.
     pub line: Option<usize>,
-    /// Column of a table from 1.
+    /// Column of a table, from 1.
     pub column: Option<usize>,
     /// Name of a column, key or element.
     pub name: Option<String>,
 }
 
 impl Place {
-    /// A line.
+    /// Creates a place from a line.
     pub fn line(line: usize) -> Self {
         Self { line: Some(line), ..Self::default() }
     }
-    /// A cell of a table.
+    /// Creates a place from a cell of a table.
     pub fn cell(line: usize, column: usize) -> Self {
         Self { line: Some(line), column: Some(column), name: None }
     }
-    /// A key or element.
+    /// Creates a place from a key or element.
     pub fn name(name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..Self::default() }
     }
-    /// The same place with a name.
+    /// Returns this place with a name.
     pub fn named(self, name: impl Into<String>) -> Self {
         Self { name: Some(name.into()), ..self }
     }
@@ -151,7 +151,7 @@ impl Diagnose for FileError {
 }
 
 impl FileError {
-    /// The same error, about `file`.
+    /// Returns this error with `file` as its file.
     pub fn in_file(mut self, file: &Path) -> Self {
         let (FileError::Io { path, .. }
         | FileError::TooLarge { path, .. }
@@ -178,7 +178,7 @@ impl FileError {
     }
 }
 
-/// The whole text of a file.
+/// Reads the whole text of a file.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     let io = |source| FileError::Io { path: path.to_owned(), source };
     let bytes = std::fs::metadata(path).map_err(io)?.len();
@@ -189,7 +189,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|_| FileError::form("no text (its bytes are no UTF-8)").in_file(path))
 }
 
-/// A number as these files write it (`20.`, `-9.e-6`, ` 1`); never NaN or infinite.
+/// Parses a number as these files write it (`20.`, `-9.e-6`, ` 1`); never returns NaN or infinity.
 pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileError> {
     match text.trim().parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -203,7 +203,7 @@ pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileE
     }
 }
 
-/// A text cut to what an error line can bear.
+/// Shortens a text to at most 40 characters for an error line.
 pub(crate) fn short(text: &str) -> String {
     let text = text.trim();
     if text.chars().count() <= 40 {
@@ -213,7 +213,7 @@ pub(crate) fn short(text: &str) -> String {
     }
 }
 
-/// Rows of comma, semicolon or space separated cells; blank lines and lines that begin with `#` are skipped.
+/// Returns rows of comma, semicolon or space separated cells; blank lines and lines that begin with `#` are skipped.
 pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
     text.trim_start_matches('\u{feff}').lines().enumerate().filter_map(|(i, line)| {
         let line = line.trim();
@@ -225,14 +225,14 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // Where semicolons separate, a comma is in a number, and wrong there.
+    // If semicolons separate the cells, a comma belongs to a number, and is an error.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),
     }
 }
 
-/// Rows of numbers.
+/// Returns rows of numbers.
 pub(crate) fn number_rows(text: &str) -> Result<Vec<(usize, Vec<f64>)>, FileError> {
     rows(text)
         .map(|(line, cells)| {

@@ -1,4 +1,4 @@
-//! One moment of a run, as recordings and reports hold it, from the controller itself or from a status.
+//! A sample of a run, as recordings and reports store it, from the controller itself or from a status.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
@@ -6,7 +6,7 @@ use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
 use crate::trajectory::Trajectory;
 use crate::words;
 
-/// One joint in a [`Sample`]; NaN where the source does not know a value.
+/// Values of a joint in a [`Sample`]; NaN for a value that the source does not know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointSample {
     /// Commanded position, rad.
@@ -42,7 +42,7 @@ pub struct JointSample {
 }
 
 impl JointSample {
-    /// A joint of which nothing is known.
+    /// A joint without any known value.
     pub const UNKNOWN: Self = Self {
         set_position: f64::NAN,
         set_velocity: f64::NAN,
@@ -61,14 +61,14 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Without what a joint that does not answer cannot have sent: a gap, not a joint at 0 rad.
+    /// Returns the sample without the values that a silent joint cannot have sent: a gap, not a joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Position error, rad: as it was recorded, else the commanded minus the measured position of this moment; NaN where one is
-    /// unknown.
+    /// Returns the position error, rad: the recorded one, else the commanded minus the measured position of this
+    /// sample; NaN if a value is unknown.
     pub fn position_error(&self) -> f64 {
         if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
@@ -102,27 +102,27 @@ impl From<&JointTelemetry> for JointSample {
     }
 }
 
-/// The arm and its controller at one time.
+/// State of the arm and its controller at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sample {
-    /// Time since the first sample's clock began, s.
+    /// Time since the start of the first sample's clock, s.
     pub time_s: f64,
     /// State of the controller.
     pub state: Code<ControllerState>,
-    /// What becomes of the trajectory.
+    /// Trajectory execution state.
     pub trajectory: Code<TrajectoryState>,
     /// Index of the current 1 ms point.
     pub point: u32,
     /// Current error word of the controller.
     pub errors: u16,
-    /// Current CAN flags; 0 where the source does not know them.
+    /// Current CAN flags; 0 if the source does not know them.
     pub can_current: u32,
-    /// Base to wrist.
+    /// Joints, base to wrist.
     pub joints: [JointSample; JOINTS],
 }
 
 impl From<&Telemetry> for Sample {
-    /// Time is that of the controller's tick count.
+    /// Converts telemetry; the time is the controller's tick count.
     fn from(t: &Telemetry) -> Self {
         Self {
             time_s: t.tick as f64 * 1e-3,
@@ -133,7 +133,7 @@ impl From<&Telemetry> for Sample {
             can_current: 0,
             joints: std::array::from_fn(|j| {
                 let own = &t.joints[j];
-                // Without torque a joint that is not measured reads as exactly zero.
+                // Without torque, the values of a joint that is not measured are exactly zero.
                 let torque_off = matches!(
                     t.state,
                     ControllerState::Start | ControllerState::Init | ControllerState::Error
@@ -145,15 +145,15 @@ impl From<&Telemetry> for Sample {
     }
 }
 
-/// The numbers of joint `j` (from 0) in a status are measured ones. The controller reports zero for a joint that it does not know:
-/// silent, or not ready.
+/// Returns `true` if the values of joint `j` (from 0) in a status are measured. The controller reports zero for an
+/// unknown joint: silent or not ready.
 pub fn is_measured(status: &Status, j: usize) -> bool {
     let unknown = words::is_silent(status, j) || words::is_awaited(status, j);
     !unknown || status.joints.get(j).is_some_and(|s| s.position != 0.0 || s.velocity != 0.0)
 }
 
 impl Sample {
-    /// The values of a status, received at `time_s`. Commanded values and the torque split are unknown.
+    /// Returns the values of a status received at `time_s`. Commanded values and the torque split are unknown.
     pub fn from_status(time_s: f64, status: &Status) -> Self {
         Self {
             time_s,
@@ -178,14 +178,15 @@ impl Sample {
         }
     }
 
-    /// The controller moves the arm along the trajectory (state Operate, trajectory Execute). Unlike
-    /// [`jtc_wire::Status::is_executing`], which looks at the trajectory alone.
+    /// Returns `true` if the controller moves the arm along the trajectory (state Operate, trajectory Execute). Unlike
+    /// [`jtc_wire::Status::is_executing`], which checks the trajectory alone.
     pub fn is_operating(&self) -> bool {
         self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
     }
 
-    /// The values of a status while `trajectory` is executed: the commanded values are those of the reported point, as the
-    /// controller computes them. The error is that of measurements as many `delay_ticks` old (J-62).
+    /// Returns the values of a status while `trajectory` is executed. The commanded values are those that the
+    /// controller computes for the reported point. The error is the one of measurements that are `delay_ticks` old
+    /// (J-62).
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate
@@ -219,12 +220,12 @@ mod tests {
         let sample = Sample::from_status(0.0, &status);
         assert!(sample.joints[2].position.is_nan() && sample.joints[2].torque.is_nan());
         assert_eq!((sample.joints[0].position, sample.joints[1].position), (0.0, 0.5));
-        // It answers again, and its error is still latched.
+        // The joint answers again, and its error is still latched.
         status.joints[2].position = 0.3;
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 
-    /// What was commanded when the measurement was made is what it is compared with; where that is not known, what is commanded now.
+    /// A measurement is compared with the position commanded at its time; if that is unknown, with the current one.
     #[test]
     fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
         let now = JointTelemetry {
@@ -239,7 +240,7 @@ mod tests {
         let old = JointSample { error: f64::NAN, ..sample };
         assert!((old.position_error() - 0.2).abs() < 1e-12);
         assert!(sample.not_measured().position_error().is_nan());
-        // Of a status it is found on the path.
+        // For a status, the commanded position is taken from the path.
         let point =
             |q: f64, v: f64| Point { position: [q; JOINTS], velocity: [v; JOINTS], ..Point::default() };
         let points = (0..=10).map(|k| point(0.05 * f64::from(k), 0.5)).collect();

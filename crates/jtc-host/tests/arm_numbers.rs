@@ -1,4 +1,4 @@
-//! Every number of an arm file, one at a time: left out, given twice, of the other sign. None of it may go unseen.
+//! Every number of an arm file, one at a time: removed, duplicated, with the opposite sign. Each change must be detected.
 use std::ops::Range;
 
 use jtc_host::arm::{Arm, Source};
@@ -7,13 +7,13 @@ const AVENA: &str = include_str!("../../../arms/avena.toml");
 
 /// A number of the file.
 struct Number {
-    /// Where it is.
+    /// Position in the file.
     at: Range<usize>,
-    /// Key that it belongs to.
+    /// Key of the number.
     key: &'static str,
 }
 
-/// The numbers of the file but that of its form, in their order.
+/// Returns the numbers of the file, except the format version, in order.
 fn numbers() -> Vec<Number> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -36,24 +36,24 @@ fn numbers() -> Vec<Number> {
     all
 }
 
-/// The file with something else in a place of it.
+/// Returns the file with the text in this range replaced.
 fn with(at: Range<usize>, text: &str) -> String {
     [&AVENA[..at.start], text, &AVENA[at.end..]].concat()
 }
 
-/// The line that a number stands in.
+/// Returns the line that contains a number.
 fn line_of(number: &Number) -> Range<usize> {
     let start = AVENA[..number.at.start].rfind('\n').map_or(0, |at| at + 1);
     let end = AVENA[number.at.end..].find('\n').map_or(AVENA.len(), |at| number.at.end + at + 1);
     start..end
 }
 
-/// The file without the number, and without what belongs to it.
+/// Returns the file without the number and its separators.
 fn without(number: &Number) -> String {
     let line = line_of(number);
     let (before, after) = (&AVENA[line.start..number.at.start], &AVENA[number.at.end..line.end]);
     if let Some(pair) = before.rfind("{ ").or(before.rfind(", ")).filter(|_| before.contains('{')) {
-        // A pair of an inline table: with its comma.
+        // A pair of an inline table is removed with its comma.
         let pair = before.rfind(", ").unwrap_or(pair) + 2;
         return with(line.start + pair..number.at.end + after.find([',', ' ']).unwrap_or(0) + 1, "");
     }
@@ -74,7 +74,7 @@ fn a_number_that_is_left_out_is_missed() {
                 let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, not ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
-            // What has a default of its own is listed or known to be one; a rotor inertia is known not to be given.
+            // A missing value with a default is listed as a default or warned about; for a rotor inertia the arm notes that it is missing.
             Ok(arm) => {
                 let default = arm.values().iter().any(|v| v.name == number.key && v.from == Source::Default);
                 let listed = default || arm.warnings.iter().any(|w| w.problem.contains(number.key));
@@ -99,14 +99,14 @@ fn a_number_that_is_given_twice_is_refused() {
     }
 }
 
-/// A sign is a number like another where both are those of an arm; then it is that very value which differs.
+/// A number of opposite sign is rejected, or accepted as a valid value; then exactly that value differs.
 #[test]
 fn a_number_of_the_other_sign_is_refused_or_is_what_differs() {
     let avena = Arm::parse(AVENA).unwrap();
     for number in numbers() {
         let text = &AVENA[number.at.clone()];
         let value: f64 = text.parse().unwrap();
-        // Polynomials are used, not the friction tables: of these no more is asked than axes that rise.
+        // The arm uses polynomials, not the friction tables: for those the reader only requires increasing axes.
         let unused = ["temperature_c", "velocity_rad_s"].contains(&number.key);
         match Arm::parse(&with(number.at.clone(), &(-value).to_string())) {
             Ok(arm) if value != 0.0 && !unused => {

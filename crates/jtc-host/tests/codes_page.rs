@@ -1,4 +1,4 @@
-//! The part of docs/codes.md about the arm has the pages of `jtc explain`. `UPDATE_DOCS=1` writes it again.
+//! The section of docs/codes.md about the arm contains the pages of `jtc explain`. `UPDATE_DOCS=1` rewrites it.
 
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
-//! The torque margin of plans, judged by the inverse dynamics and the friction law alone, at each millisecond that the controller computes.
+//! Torque margin of plans, evaluated by the inverse dynamics and the friction law alone, at each millisecond that the controller computes.
 //!
-//! The shipped arm, and imported ones with the proportions of a UR5 and a Z1. `JTC_TEST_ARMS` names further arm files or robot descriptions,
-//! with `:` between them.
+//! Tests the shipped arm, and imported ones with the proportions of a UR5 and a Z1. `JTC_TEST_ARMS` names further arm
+//! files or robot descriptions, separated by `:`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,7 +15,7 @@ use jtc_host::plan::{self, MARGIN_PCT, PlanError, Planned, Planner, Waypoint};
 use jtc_host::{Arm, Diagnose as _, ErrorKind};
 use proptest::prelude::*;
 
-/// Axis, way from the joint before, mass (kg), distance of its centre (m), torque limit (N·m), friction (N·m).
+/// Axis, offset from the previous joint, mass (kg), distance of its centre (m), torque limit (N·m), friction (N·m).
 type Part = (&'static str, [f64; 3], f64, [f64; 3], f64, f64);
 
 const UR5: [Part; JOINTS] = [
@@ -56,7 +56,7 @@ fn imported(name: &str, parts: &[Part; JOINTS]) -> Arm {
     arm
 }
 
-/// The arms that are planned for.
+/// Arms used in the tests.
 static ARMS: LazyLock<Vec<Arm>> = LazyLock::new(|| {
     let mut arms = vec![Arm::avena(), imported("ur5", &UR5), imported("z1", &Z1)];
     let further = std::env::var("JTC_TEST_ARMS").unwrap_or_default();
@@ -67,7 +67,7 @@ static ARMS: LazyLock<Vec<Arm>> = LazyLock::new(|| {
     arms
 });
 
-/// Friction of a joint at a bearing temperature, N·m.
+/// Returns the friction of a joint at a bearing temperature, N·m.
 fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, celsius: f64) -> f64 {
     match friction {
         Some(Friction::Polynomial(c)) => friction::polynomial(&c[j], v, celsius, config.friction_sign_width),
@@ -76,16 +76,16 @@ fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, c
     }
 }
 
-/// The temperatures of a plan and of a run, °C.
+/// Temperatures of a plan and of a run, °C.
 const TEMPERATURES: [f64; 2] = [20.0, 30.0];
 
-/// Returns all that is wrong with the torques of a plan that has to leave a share of each limit, and the smallest share that it leaves.
+/// Returns all torque problems of a plan that must keep a share of each limit free, and the smallest share that it keeps.
 fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String, f64) {
     let (friction, mut wrong, mut left) = (arm.friction(), String::new(), f64::INFINITY);
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // First movement: up to a little more than the speed at which the sign of the friction is whole.
+    // Breakaway: up to slightly more than the speed at which the sign of the friction is fully applied.
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);
@@ -127,7 +127,7 @@ fn share() -> impl Strategy<Value = [f64; JOINTS]> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Random waypoints: the margin is kept at each millisecond, and the plan reports what it leaves.
+    /// Random waypoints: the margin is kept at each millisecond, and the plan reports its margin.
     #[test]
     fn plans_keep_the_margin_at_each_millisecond(
         which in 0..64usize,
@@ -170,7 +170,7 @@ proptest! {
     }
 }
 
-/// The arm with a payload whose gravity takes this share of the torque of joint 2, stretched out.
+/// Returns the arm with a payload whose gravity takes this share of the torque of joint 2 in the stretched pose.
 fn stretched(share: f64) -> (Arm, Config) {
     let (arm, mut config) = (Arm::avena(), Arm::avena().config());
     let hold = |config: &Config| {
@@ -185,7 +185,8 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that takes more than the margin leaves is reached and left; the margin is kept where it can be, and less than 10 % is named.
+/// A pose that needs more torque than the margin permits is reached and left. The margin is kept if possible, and a
+/// margin below 10 % is named.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     for share in [0.6, 0.7, 0.8, 0.86, 0.9, 0.94] {
@@ -207,7 +208,8 @@ fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     }
 }
 
-/// What the margin is for: with 10 % more mass and 20 % more friction than in the model, a plan with the default margin stays within each limit.
+/// Purpose of the margin: with 10 % more mass and 20 % more friction than in the model, a plan with the default margin
+/// stays within each limit.
 #[test]
 fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() {
     let places =
@@ -229,7 +231,7 @@ fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() 
     }
 }
 
-/// A margin out of range is a mistake of the caller, named with its range; each value of the range is taken.
+/// A margin out of range is a caller's error that names the range; each value in the range is accepted.
 #[test]
 fn a_margin_is_zero_to_fifty_percent() {
     let arm = Arm::avena();
@@ -284,6 +286,6 @@ fn a_check_names_the_margin_and_warns_below_ten_percent() {
     assert!(kept.to_string().starts_with("torque margin "), "{kept}");
     let share = 100.0 * (1.0 - tight.torque_nm.abs() / tight.limit_nm);
     assert!((share - tight.percent).abs() < 1e-9);
-    // Without a model there is none.
+    // Without a model the check reports no margin.
     assert_eq!(Checker::new(&config).check(&jtc_host::Trajectory::default()).margin, None);
 }

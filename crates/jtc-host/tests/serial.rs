@@ -10,7 +10,7 @@ use jtc_host::{Diagnose, Port, frame};
 use jtc_wire::{ControllerState, DataStatus, FrameType, RawPoint, Response, Status, TrajectoryState, fixed};
 use serialport::{SerialPort as _, TTYPort};
 
-/// The far end, and the path of the near one.
+/// Returns the far end, and the path of the near end.
 fn pair() -> (TTYPort, String) {
     let (mut far, near) = TTYPort::pair().expect("a pseudo-terminal");
     far.set_timeout(Duration::from_secs(5)).unwrap();
@@ -38,7 +38,7 @@ fn j01_bytes_go_both_ways_at_every_rate() {
             got.extend(&buffer[..n]);
         }
         assert_eq!(got, all);
-        // Nothing there: no error, no wait.
+        // No bytes available: no error, no wait.
         assert_eq!(port.read(&mut [0; 8], Duration::ZERO).unwrap(), 0);
     }
 }
@@ -57,7 +57,7 @@ fn what_is_wrong_is_said_with_the_next_command() {
     assert!(matches!(error, PortError::Gone { .. }), "{error}");
 }
 
-/// The door of this port.
+/// Returns the door of this port.
 fn door(path: &str) -> std::path::PathBuf {
     let mut sockets = halt::sockets_of(path).into_iter().filter(|socket| halt::is_alive(socket));
     sockets.next().expect("the program listens")
@@ -67,7 +67,7 @@ fn status(response: Response) -> [u8; jtc_wire::STATUS_LEN] {
     Status { response, ..Status::default() }.emit()
 }
 
-/// J-03: a Stop comes between two frames. A long one that is half written is given up, and no piece of it follows.
+/// J-03: a Stop is sent between two frames. A half-written long frame is abandoned, and no piece of it follows.
 #[test]
 fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     let (mut far, path) = pair();
@@ -81,21 +81,21 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
     let error = port.write_all(&segment[300..]).expect_err("it was given up");
     assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
-    // Nothing that moves the arm passes any more, and what does not still does.
+    // Frames that move the arm are blocked; other frames are still sent.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
-    // A Pause would make a pause of the Stop.
+    // A Pause would turn the Stop into a pause.
     assert!(port.write_all(&fixed::PAUSE).is_err());
     port.write_all(&fixed::STOP).unwrap();
     port.write_all(&fixed::GET_INFO).unwrap();
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The owner does not read: the record is found all the same, and the owner has its bytes later.
+    // The owner does not read: the record is found nevertheless, and the owner gets its bytes later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
-        // Statuses come on, as those of a controller do.
+        // Statuses keep arriving, as from a controller.
         far.write_all(&status(Response::default())).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         if asked.is_finished() {
@@ -108,7 +108,7 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!(first, status(record));
 }
 
-/// What arrived damaged, or is not answered, is written again; at the end the asker learns that nothing is confirmed.
+/// A Stop that arrives damaged or is not answered is repeated; finally the client learns that it is not confirmed.
 #[test]
 fn a_stop_is_written_until_the_controller_confirms_it() {
     let (mut far, path) = pair();
@@ -135,31 +135,31 @@ fn halt_unconfirmed(path: &str, halt: Halt) {
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
 }
 
-/// A motion that waits for its turn, as in a queue, was requested before the Stop: no time makes a new request of it.
+/// A motion that waits, as in a queue, was requested before the Stop; waiting does not turn it into a new request.
 #[test]
 fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
     let (_far, path) = pair();
     let mut port = SerialPort::open(&path, 115_200).unwrap();
     let none = Halts::default();
     assert_eq!(port.halts(), none);
-    // A motion passes before the Stop.
+    // Before the Stop a motion is sent.
     port.ask_to_move_after(none.all).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
-    // Longer than a new request has to wait.
+    // Longer than the 3 s hold-off for new requests.
     std::thread::sleep(Duration::from_millis(3100));
     for _ in 0..10 {
         port.ask_to_move_after(none.all).unwrap();
         let error = port.write_all(&fixed::EXECUTE).expect_err("requested before the Stop");
         assert!(matches!(error, PortError::Halted { by: Some(_) }), "{error}");
     }
-    // One that was requested after it passes.
+    // A motion requested after the Stop is sent.
     port.ask_to_move_after(1).unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
 }
 
-/// J-33: a controller that gets a Pause while it slows down for a Stop pauses. So no Pause is written after a Stop, by whomever.
+/// J-33: a controller that gets a Pause while it decelerates for a Stop pauses. Therefore no client's Pause is written after a Stop.
 #[test]
 fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     let (mut far, path) = pair();
@@ -188,7 +188,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     port.ask_to_move().unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     read(&mut far, &[fixed::EXECUTE; 1]);
-    // After a Pause alone it is resumed.
+    // After a Pause alone the motion is resumed.
     halt_unconfirmed(&path, Halt::Pause);
     std::thread::sleep(Duration::from_millis(3100));
     port.ask_to_resume().unwrap();
@@ -197,7 +197,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     read(&mut far, &[fixed::EXECUTE; 1]);
 }
 
-/// The controller loses what the closure says, and shows these statuses. Bytes that it received, and the end.
+/// Simulates a controller that loses the frames selected by the closure and sends its statuses. Returns the received bytes and the end.
 fn controller(
     mut far: TTYPort,
     mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
@@ -221,7 +221,7 @@ fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
     bytes.windows(frame.len()).any(|window| window == frame)
 }
 
-/// The end of teaching is written until statuses show it, and the arm does not stand before.
+/// The end of teaching is repeated until the statuses show it; before that the arm does not count as at rest.
 #[test]
 fn the_end_of_teaching_is_written_until_statuses_show_it() {
     for heard in [1, 2, 5, u32::MAX] {
@@ -251,7 +251,7 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested, and did not begin yet, begins as soon as the arm rests: its end counts when a record of it came.
+/// Teaching that was requested but has not begun begins as soon as the arm is at rest: its end counts once its record has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -305,7 +305,7 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
     }
 }
 
-/// Two programs of the superuser may have one port: the later one takes no socket from the earlier, and removes none that is not its own.
+/// Two programs of the superuser may hold one port: the later program takes no socket from the earlier one, and removes only its own.
 #[test]
 fn a_socket_of_a_living_program_is_left_alone() {
     let (_far, path) = pair();
@@ -313,7 +313,7 @@ fn a_socket_of_a_living_program_is_left_alone() {
     let socket = door(&path);
     let kept = socket.with_extension("kept");
     std::fs::rename(&socket, &kept).unwrap();
-    // Another program listens at the same place by now.
+    // Meanwhile another program listens at the same path.
     let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     drop(port);
     assert!(socket.exists(), "it is not the port's own");
@@ -325,13 +325,13 @@ fn a_socket_of_a_living_program_is_left_alone() {
     std::fs::remove_file(&socket).unwrap();
 }
 
-/// A request whose bytes come slowly has one deadline: it does not keep the port from being closed.
+/// A request whose bytes arrive slowly has one deadline: it does not keep the port from closing.
 #[test]
 fn a_request_that_comes_byte_by_byte_is_given_up() {
     let (_far, path) = pair();
     let _port = SerialPort::open(&path, 115_200).unwrap();
     let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
-    // The door hangs up before the line is whole: far more than a second of bytes.
+    // The door disconnects before the line is complete: the bytes would take far more than a second.
     let closed = (0..100).any(|_| {
         std::thread::sleep(Duration::from_millis(100));
         stream.write_all(b" ").is_err()

@@ -1,4 +1,4 @@
-//! The paths of the soak run of the simulator are ones that the host would send: a stop on each of them has to succeed.
+//! The paths of the simulator's soak run pass the host's check: a stop on each of them must succeed.
 use jtc_host::check::Checker;
 use jtc_host::{Arm, Point, Trajectory};
 use jtc_sim::soak;

@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! All tests of the crate in one program, to save link time: each file here is a module of it.
 mod arm_numbers;
 mod codes_page;
 mod fuzz_regressions;

@@ -8,20 +8,22 @@ use crate::motion::Motion;
 use crate::path::Path;
 use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
-/// As fast along a path as velocity, acceleration and torque allow, from rest to rest: time-optimal path parameterisation by
-/// reachability analysis (Pham and Pham 2018). Where the limits have a jerk, an interior-point method makes the law of time as short as
-/// velocity, acceleration, jerk and torque allow at places along the path, from one that is averaged over a window. What results is
-/// verified between its samples, too, and slowed down until all limits hold.
+/// Plans the fastest motion from rest to rest along a path within velocity, acceleration and torque: time-optimal path
+/// parameterisation by reachability analysis (Pham and Pham 2018). If the limits have a jerk, an interior-point method
+/// shortens the time law. It starts from a law that is averaged over a window and uses velocity, acceleration, jerk and
+/// torque at places along the path. The motion is also verified between its samples, and slowed down until all limits
+/// hold.
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and [`PlanError::Path`] where the
-/// path leads outside or has no direction, [`PlanError::Torque`] where the torque does not suffice at any speed.
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and
+/// [`PlanError::Path`] if the path leads outside the limits or has no direction, [`PlanError::Torque`] if the torque
+/// does not suffice at any speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
     unexplained(path, limits, arm).map(|motion| reasons::explained(motion, limits, arm))
 }
 
-/// The same without what binds it.
+/// Like [`along`], without determining the limiting constraints.
 pub(crate) fn unexplained(
     path: &dyn Path,
     limits: &Limits,
@@ -30,19 +32,20 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// What was chosen for each section of a path, so that it can be planned again alike: a law that depends on it without jumps.
+/// Choices made for each section of a path, so that a repeated plan makes the same choices: the time law then depends
+/// on the path without jumps.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
-/// How a section is planned.
+/// Planning method of a section.
 #[derive(Clone, Copy, Debug)]
 enum Choice {
     InteriorPoint,
-    /// Without jerk, or by averaging with these shares.
+    /// Without jerk, or averaged with these shares.
     Other(Option<jerk::Shares>),
 }
 
-/// The same without what binds it, where the waypoint (from 1) that was passed last decides at which share of the speed.
+/// Like [`unexplained`], with a share of the speed that depends on the waypoint (from 1) that was passed last.
 pub(crate) fn along_at(
     path: &dyn Path,
     limits: &Limits,
@@ -72,13 +75,14 @@ pub(crate) fn along_at(
     verify::finished(motion, limits, arm)
 }
 
-/// The first of the waypoints at `s`, from 1: one may be given several times in a row. Where there is none, the one that was passed last.
+/// Returns the first waypoint at `s`, from 1; several waypoints in a row may be the same. Without a waypoint at `s`,
+/// returns the last one passed.
 fn first_waypoint(path: &dyn Path, s: f64) -> usize {
     let passed = |s: f64| if s < 0.0 { 0 } else { path.waypoint(s).unwrap_or(1) };
     passed(s).min(passed(s.next_down()) + 1)
 }
 
-/// The sections between the stops.
+/// Returns the sections between the stops.
 fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let end = path.end();
     if !(end.is_finite() && end > 0.0) {
@@ -102,7 +106,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // Waypoints that are given twice are passed twice.
+        // A repeated waypoint is passed repeatedly.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -130,7 +134,7 @@ fn of_section(
         .collect();
     let caps = caps(section, &cells, limits, arm)?;
     let plan = Plan { section, cells: &cells, reached: caps.clone(), caps, shares, limits, arm };
-    // Along a straight line without torque nothing is faster than an average.
+    // Along a straight line without torque no law is faster than an average.
     let is_straight = cells.iter().all(Cell::is_straight);
     let found = match *chosen {
         Some(Choice::Other(_)) => None,
@@ -158,7 +162,7 @@ fn of_section(
     }
 }
 
-/// The motion of a law without jerk, or of one that is averaged over a window, with the shares that were chosen for that.
+/// Returns the motion of a law without jerk, or of a law averaged over a window, with the shares chosen for it.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -169,7 +173,7 @@ fn without_interior(
     };
     let mut made = plan.make(shares, 0)?;
     let shares = made.shares;
-    // Friction counts up to the highest speed in a cell, which is known better each time.
+    // Friction is evaluated up to the highest speed in a cell, which each round estimates better.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
     for _ in 0..TORQUE_ROUNDS {
@@ -187,7 +191,7 @@ fn without_interior(
     Ok((best.ok_or("its time is not finite")?, shares))
 }
 
-/// Highest squared speeds of the cells by the limits of speed, and by friction.
+/// Returns the highest squared speeds of the cells by the limits of speed and by friction.
 fn caps(
     section: &Section,
     cells: &[Cell],
@@ -206,51 +210,51 @@ fn caps(
     cells.iter().map(cap).collect()
 }
 
-/// What a law of time is made from.
+/// Inputs of a time law.
 pub(crate) struct Plan<'a> {
     pub section: &'a Section<'a>,
     pub cells: &'a [Cell],
     /// Highest squared speed of each cell.
     pub caps: Vec<f64>,
-    /// Squared speed up to which friction counts in each cell.
+    /// Squared speed in each cell up to which friction is evaluated.
     pub reached: Vec<f64>,
-    /// Of the speed, per cell.
+    /// Shares of the speed, per cell.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
 }
 
-/// A law of time and its motion.
+/// A time law and its motion.
 pub(crate) struct Made {
     pub law: Law,
     pub motion: Motion,
-    /// Of a law that is limited in jerk.
+    /// Shares of a jerk-limited law.
     pub shares: Option<jerk::Shares>,
 }
 
-/// How often the cells in which a limit does not hold between the samples are slowed down in a law by the interior-point method.
+/// Number of repairs of a law by the interior-point method: cells in which a limit is violated between the samples are slowed down.
 const INTERIOR_REPAIRS: usize = 1;
-/// Up to so many cells, averages over a window are tried as well.
+/// Largest number of cells for which averages over a window are tried as well.
 const FEW: usize = 200;
-/// How often a section is planned with torque.
+/// Number of times that a section is planned with torque.
 const TORQUE_ROUNDS: usize = 4;
-/// By how much a round has to make it shorter for another one.
+/// Least share of the duration that a round must save to justify another round.
 const WORTH: f64 = 0.004;
-/// By what a cell's speed may be higher than it was the time before.
+/// Largest factor between a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
-/// How often the cells in which a limit does not hold between the samples are slowed down alone, before all of the motion is.
+/// Number of repairs of single cells in which a limit is violated between the samples, before the whole motion is slowed down.
 const REPAIRS: usize = 4;
-/// By how much all of the motion is slowed down without that.
+/// Maximum factor by which the whole motion is slowed down instead of a repair.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
-    /// The law and its motion. The cells in which a limit does not hold between the samples are slowed down up to `repairs` times.
+    /// Returns the law and its motion. Cells in which a limit is violated between the samples are slowed down up to `repairs` times.
     fn make(&self, shares: Option<jerk::Shares>, repairs: usize) -> Result<Made, String> {
         if self.limits.has_jerk() { jerk::limited(self, shares, repairs) } else { self.without_jerk(repairs) }
     }
 
-    /// Squared speeds of the cells that are not much higher than those of a law.
+    /// Returns squared speeds of the cells, slightly higher than those of a law.
     fn reached_by(&self, law: &Law) -> Vec<f64> {
         let speed = |s: f64| law.at(law.time_of(s)).1;
         let mut before = 0.0;
@@ -288,7 +292,7 @@ impl Plan<'_> {
         }
     }
 
-    /// By what the time in each cell has to be multiplied so that the limits hold in it.
+    /// Returns a time factor for each cell with which its limits hold.
     pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

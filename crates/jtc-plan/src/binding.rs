@@ -1,4 +1,4 @@
-//! Which limit binds when.
+//! Binding limits over time.
 use std::fmt;
 
 use jtc_wire::Joint;
@@ -15,12 +15,12 @@ pub enum LimitKind {
     Jerk,
     /// Joint torque, N·m.
     Torque,
-    /// A time that was given for a waypoint: the motion could be faster.
+    /// A time given for a waypoint: the motion could be faster.
     GivenTime,
 }
 
 impl LimitKind {
-    /// In lower case, for sentences.
+    /// Returns the name in lower case, for sentences.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Velocity => "velocity",
@@ -31,7 +31,7 @@ impl LimitKind {
         }
     }
 
-    /// Unit of such a limit.
+    /// Returns the unit of this kind of limit.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Velocity => "rad/s",
@@ -49,15 +49,15 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// From when to when which limit of which joint is used up, or comes closest to that: what a faster motion would have to exceed.
+/// Time interval with the limit that is used up, or that is closest to being used up: a faster motion would exceed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
-    /// s from the start.
+    /// Start of the interval, s from the start.
     pub from: f64,
-    /// s from the start.
+    /// End of the interval, s from the start.
     pub to: f64,
-    /// The joint that comes closest to its limit.
+    /// Joint that is closest to its limit.
     pub joint: Joint,
-    /// The limit it comes closest to.
+    /// Limit that the joint is closest to.
     pub limit: LimitKind,
 }

@@ -5,36 +5,36 @@ use crate::distance::distance;
 use crate::path::{Path, PathPoint, Waypointed};
 use crate::{JOINTS, JointVec, PlanError, thin};
 
-/// Waypoints closer than this, rad, are one.
+/// Distance below which waypoints count as equal, rad.
 const SAME: f64 = 1e-9;
-/// Directions that differ less than this make no corner.
+/// Difference of directions below which there is no corner.
 const STRAIGHT: f64 = 1e-9;
-/// Directions whose sum is smaller than this lead back: a stop, no corner (some 3°).
+/// Size of the sum of directions below which the path turns back: a stop instead of a corner (some 3°).
 const BACK: f64 = 0.05;
 
-/// Straight legs of joint space between waypoints, with rounded corners: a leg is left, and the next one reached, within `blend`
-/// rad of the waypoint between them, counted by the joint that moves most.
+/// Straight legs in joint space between waypoints, with rounded corners: the path leaves a leg, and reaches the next
+/// one, within `blend` rad of the waypoint between them, measured on the joint that moves most.
 ///
-/// In a corner the direction changes from that of one leg to that of the other along a step with a slope that rises, stays and falls,
-/// so that the curvature is continuous, the path stays in the triangle of the corner, and no joint overshoots. A corner takes at most half of each of its
-/// legs. Where two legs are one line there is no corner. The path stops where it leads back the way it came, where a waypoint is
-/// given twice in a row, and with a blend of 0 at every waypoint.
+/// In a corner the direction changes from that of one leg to that of the other along a step with a slope that rises,
+/// stays and falls, so that the curvature is continuous, the path stays in the triangle of the corner, and no joint
+/// overshoots. A corner takes at most half of each of its legs. Two collinear legs have no corner. The path stops if it
+/// turns back on itself, if a waypoint is given twice in a row, and at every waypoint if the blend is 0.
 ///
-/// The parameter is the way of the joint that moves most, rad, along the straight legs.
+/// The parameter is the distance that the joint with the largest movement covers, rad, along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
-    /// Without repetitions.
+    /// Corners without repetitions.
     corners: Vec<Corner>,
-    /// Of each waypoint given.
+    /// Entries for each given waypoint.
     given: Vec<Given>,
 }
 
-/// Where a waypoint is on the path.
+/// Place of a waypoint on the path.
 #[derive(Clone, Copy, Debug)]
 struct Given {
-    /// Index of the last corner up to it.
+    /// Index of the last corner up to the waypoint.
     corner: usize,
-    /// That of this corner, where it is one.
+    /// Parameter of this corner, if the waypoint is a corner.
     parameter: f64,
 }
 
@@ -42,22 +42,22 @@ struct Given {
 struct Corner {
     position: JointVec,
     parameter: f64,
-    /// Of the leg that begins here.
+    /// Direction of the leg that begins here.
     direction: JointVec,
-    /// Half of the rounding's parameters; 0: none.
+    /// Half of the rounding's parameters; 0: no rounding.
     half: f64,
     stop: bool,
-    /// A stop for no other reason.
+    /// `true` if a reversal is the only reason for the stop.
     leads_back: bool,
 }
 
 impl BlendedPath {
-    /// Through `waypoints` (rad).
+    /// Creates the path through `waypoints` (rad).
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`] for fewer than two, [`PlanError::NotFinite`], [`PlanError::Blend`] for a negative blend or none,
-    /// [`PlanError::Path`] when all waypoints are the same.
+    /// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`], [`PlanError::Blend`] for a
+    /// negative or invalid blend, [`PlanError::Path`] if all waypoints are equal.
     pub fn new(waypoints: &[JointVec], blend: f64) -> Result<Self, PlanError> {
         if waypoints.len() < 2 {
             return Err(PlanError::TooFew { count: waypoints.len() });
@@ -75,7 +75,7 @@ impl BlendedPath {
         Ok(path)
     }
 
-    /// Directions, parameters and rounded corners of the positions.
+    /// Computes directions, parameters and rounded corners from the positions.
     fn round(&mut self, blend: f64) {
         let corners = &mut self.corners;
         let mut length_before = 0.0;
@@ -96,9 +96,9 @@ impl BlendedPath {
         }
     }
 
-    /// The same path without the corners that lie within `share` of the blend of the straight line between the ones that stay, where
-    /// it follows the line and waypoints are so close to each other that all of the line is within the blend of them; the waypoints
-    /// for which `keep` holds stay. `None` where that leaves nothing out.
+    /// Returns the path without the corners that lie within `share` of the blend of the straight line between the
+    /// corners that stay. The path must follow the line, and waypoints must be so close that the whole line is within
+    /// their blend. Waypoints for which `keep` holds stay. Returns `None` if no corner can be removed.
     pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
         let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
         for (i, given) in self.given.iter().enumerate() {
@@ -126,32 +126,32 @@ impl BlendedPath {
         Some(path)
     }
 
-    /// How many corners it has, both ends counted.
+    /// Returns the number of corners, including both ends.
     pub(crate) fn corners(&self) -> usize {
         self.corners.len()
     }
 
-    /// Whether the corner with this index is rounded.
+    /// Returns `true` if the corner with this index is rounded.
     pub(crate) fn is_rounded(&self, corner: usize) -> bool {
         self.corners[corner].half > 0.0
     }
 
-    /// Whether it stops at each corner.
+    /// Returns `true` if the path stops at each corner.
     pub(crate) fn stops_everywhere(&self) -> bool {
         self.corners[1..self.corners.len() - 1].iter().all(|corner| corner.stop)
     }
 
-    /// The positions of the legs' ends.
+    /// Returns the positions of the legs' ends.
     pub(crate) fn legs(&self) -> impl Iterator<Item = (JointVec, JointVec)> {
         self.corners.windows(2).map(|pair| (pair[0].position, pair[1].position))
     }
 
-    /// The middles of the legs.
+    /// Returns the parameters of the legs' middles.
     pub(crate) fn middles(&self) -> Vec<f64> {
         self.corners.windows(2).map(|pair| 0.5 * (pair[0].parameter + pair[1].parameter)).collect()
     }
 
-    /// The same with stops at the corners with these indices.
+    /// Returns the path with stops at the corners with these indices.
     pub(crate) fn stopping_at(&self, corners: &[usize]) -> Self {
         let mut path = self.clone();
         for &i in corners {
@@ -160,22 +160,22 @@ impl BlendedPath {
         path
     }
 
-    /// Whether two waypoints are so near to each other that there is no leg between them.
+    /// Returns `true` if two waypoints are too close for a leg between them.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
     }
 
-    /// Index of the leg that `s` is on, the next one at a corner.
+    /// Returns the index of the leg at `s`; at a corner, of the next leg.
     fn leg(&self, s: f64) -> usize {
         let after = self.corners.partition_point(|c| c.parameter <= s);
         after.saturating_sub(1).min(self.corners.len() - 2)
     }
 
-    /// On the straight leg.
+    /// Returns the point on the straight leg.
     fn on_leg(&self, leg: usize, s: f64) -> PathPoint {
         let (from, to) = (&self.corners[leg], &self.corners[leg + 1]);
         let (gone, left) = (s - from.parameter, to.parameter - s);
-        // From the nearer end, so that both are met exactly.
+        // Measured from the nearer end, so that both ends are exact.
         let position = std::array::from_fn(|j| {
             if gone <= left {
                 from.position[j] + gone * from.direction[j]
@@ -186,7 +186,7 @@ impl BlendedPath {
         PathPoint { position, first: from.direction, second: [0.0; JOINTS] }
     }
 
-    /// In the rounding of corner `i`.
+    /// Returns the point in the rounding of corner `i`.
     fn in_corner(&self, i: usize, s: f64) -> PathPoint {
         let (corner, before) = (&self.corners[i], &self.corners[i - 1].direction);
         let whole = 2.0 * corner.half;
@@ -203,8 +203,8 @@ impl BlendedPath {
     }
 }
 
-/// A step from 0 at 0 to 1 at 1 whose slope rises, stays and falls for a third each: of all whose slope is no higher than 3/2, the one
-/// with the least second derivative. Its integral, itself and its slope at `u`.
+/// Step from 0 at 0 to 1 at 1 whose slope rises, stays constant and falls for a third each. Of all steps with a slope
+/// of at most 3/2 this one has the smallest second derivative. Returns its integral, its value and its slope at `u`.
 fn step(u: f64) -> (f64, f64, f64) {
     const THIRD: f64 = 1.0 / 3.0;
     if u < THIRD {
@@ -219,7 +219,7 @@ fn step(u: f64) -> (f64, f64, f64) {
 }
 
 impl Corner {
-    /// Decides how it is passed; `before`: direction of the leg that ends here.
+    /// Decides how the corner is passed; `before` is the direction of the leg that ends here.
     fn round(&mut self, before: &JointVec, half: f64) {
         let size = |sign: f64| {
             let parts = before.iter().zip(&self.direction).map(|(a, b)| (b + sign * a).abs());
@@ -260,7 +260,7 @@ impl Path for BlendedPath {
         let mut breaks = Vec::with_capacity(4 * inner.len());
         for corner in inner {
             if corner.half > 0.0 {
-                // Corners that meet have one break between them.
+                // Adjacent corners have one break between them.
                 let begin = corner.parameter - corner.half;
                 if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
                     breaks.push(begin);
@@ -272,7 +272,7 @@ impl Path for BlendedPath {
                 breaks.push(corner.parameter);
             }
         }
-        // Nor do corners that meet a stop or an end.
+        // Corners next to a stop or an end need no break there either.
         breaks.retain(|b| *b > 0.0 && *b < self.end());
         breaks
     }
@@ -299,7 +299,7 @@ impl Waypointed for BlendedPath {
     }
 }
 
-/// Waypoints without repetitions, and which of them each is.
+/// Returns the waypoints without repetitions, and the index of each given waypoint in them.
 fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanError> {
     let mut corners: Vec<Corner> = Vec::with_capacity(waypoints.len());
     let mut given = Vec::with_capacity(waypoints.len());

@@ -1,4 +1,4 @@
-//! A section of a path in cells, with what the limits of the joints mean for its parameter.
+//! Division of a section of a path into cells, with the effect of the joint limits on its parameter.
 use jtc_wire::Joint;
 
 use crate::compose::Section;
@@ -6,30 +6,31 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Into how many cells the parts of a path are divided.
+/// Number of cells into which the parts of a path are divided.
 struct Division {
     straight: usize,
     curved: usize,
-    /// Of a path of few parts, in all.
+    /// Least number of cells for a path of few parts.
     least: usize,
 }
 
 const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
-/// For a law whose acceleration changes at the ends of cells only.
+/// For a law whose acceleration changes only at the ends of cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
-/// Share of what the torque limit leaves over for motion that the speed may take.
+/// Share of the torque left for motion that the speed may use.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
-/// Share of the usable torque that is planned with.
+/// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
-/// Share of the torque limit that has to be left for motion where friction grows with the speed; below it the speed is lowered.
+/// Share of the torque limit that must be left for motion if friction grows with the speed; below this share the speed
+/// is lowered.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of what standing leaves of the usable torque that has to be left for motion where that is less.
+/// Share of the usable torque left by holding that must stay for motion, if that is less.
 const STANDING_SHARE: f64 = 0.5;
-/// Share of the torque limit with which the arm can still creep.
+/// Share of the torque limit that is enough to creep.
 const CREEP_SHARE: f64 = 0.002;
 
-/// The parts of the torque at a place, N·m: q̈ = q′·s̈ + q″·ṡ² makes it hold + mass·s̈ + speed·ṡ², and friction.
+/// Parts of the torque at a point, N·m: q̈ = q′·s̈ + q″·ṡ² gives hold + mass·s̈ + speed·ṡ², plus friction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loads {
     pub hold: JointVec,
@@ -50,7 +51,7 @@ impl Loads {
     }
 }
 
-/// One end of a cell.
+/// End of a cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct End {
     pub point: PathPoint,
@@ -60,15 +61,15 @@ pub(crate) struct End {
 /// A part of a section in which the path is one simple curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
-    /// Parameters, from the section's start.
+    /// Range of the parameter, from the start of the section.
     pub from: f64,
     pub to: f64,
     pub ends: [End; 2],
-    /// Third derivative of the path, mean over the cell.
+    /// Third derivative of the path, averaged over the cell.
     pub third: JointVec,
 }
 
-/// The cells of a section. For a law whose acceleration changes at their ends only there are more (`fine`).
+/// Returns the cells of a section. With `fine` there are more, for a law whose acceleration changes only at their ends.
 pub(crate) fn cells(
     section: &Section,
     arm: Option<&ArmDynamics>,
@@ -83,7 +84,7 @@ pub(crate) fn cells(
         let is_straight = inside.iter().all(|p| p.second == [0.0; JOINTS]);
         let count = if is_straight { division.straight } else { division.curved };
         let count = count.max(division.least / section.parts_of_path);
-        // Near a rest the speed changes within a short way.
+        // Near a rest the speed changes within a short distance.
         let (begins, ends) = (from == section.from && !fine, to == section.to && !fine);
         let share = |i: usize| {
             let u = i as f64 / count as f64;
@@ -114,14 +115,14 @@ pub(crate) fn cells(
     Ok(cells)
 }
 
-/// Whether a place is one that the arm can be at, and has a direction.
+/// Checks that the arm can be at a place and that the path has a direction there.
 fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Result<(), PlanError> {
     let leg = section.path.waypoint(s).unwrap_or(1);
     let numbers = point.first.iter().chain(&point.second);
     if numbers.into_iter().any(|x| !x.is_finite()) {
         return Err(PlanError::Path { leg, parameter: s });
     }
-    // Rounding on the way between two positions at the limit.
+    // The tolerance covers rounding between two positions at the limit.
     for joint in Joint::ALL {
         let (value, (min, max)) = (point.position[joint.index()], limits.position[joint.index()]);
         if !(min - 1e-9..=max + 1e-9).contains(&value) {
@@ -131,8 +132,8 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// What is left of the torque at one end of a cell for motion up (`high`) and down (`low`), N·m: the usable torque less what holds the arm
-/// and the worst friction of the way's direction up to the speed.
+/// Torque left for motion up (`high`) and down (`low`) at one end of a cell, N·m: the usable torque minus the holding
+/// torque and the worst friction in the direction of the path up to the speed.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,
@@ -140,13 +141,13 @@ pub(crate) struct Room {
     limit: JointVec,
 }
 
-/// Torque that a plan uses of a joint where holding takes `hold`, N·m.
+/// Returns the torque that a plan uses of a joint whose holding torque is `hold`, N·m.
 pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
     TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }
 
 impl Room {
-    /// Where the squared speed of the parameter is `cap` at most.
+    /// Computes the remaining torque for a squared parameter speed of at most `cap`.
     pub fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
         let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS], limit: [0.0; JOINTS] };
         for j in 0..JOINTS {
@@ -160,8 +161,8 @@ impl Room {
         room
     }
 
-    /// The joint with the least of it, and that as a share of its torque limit; which of them it is, by how much more than `needed` there
-    /// is.
+    /// Returns the smallest remaining torque as a share of the joint's torque limit, and the joint: the one with the
+    /// smallest excess over `needed`.
     fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
         let over = |j: &usize| share(*j) - needed[*j];
@@ -171,12 +172,12 @@ impl Room {
 }
 
 impl Cell {
-    /// Whether the path has no curvature in it.
+    /// Returns `true` if the path has no curvature in this cell.
     pub fn is_straight(&self) -> bool {
         self.ends.iter().all(|end| end.point.second == [0.0; JOINTS])
     }
 
-    /// Highest squared speed by the limits of speed alone.
+    /// Returns the highest squared speed by the velocity limits alone.
     pub fn speed_cap(&self, limits: &Limits) -> f64 {
         let mut cap = f64::INFINITY;
         for end in &self.ends {
@@ -188,11 +189,11 @@ impl Cell {
         cap
     }
 
-    /// Squared speed, at most `cap`, at which friction leaves torque for motion.
+    /// Returns the squared speed, at most `cap`, at which friction leaves torque for motion.
     ///
     /// # Errors
     ///
-    /// The joint that has none left however slow it is, with the torque that it would take and its limit.
+    /// Returns the joint without remaining torque at any speed, with the required torque and its limit.
     pub fn friction_cap(
         &self,
         mut cap: f64,
@@ -215,7 +216,7 @@ impl Cell {
                     break;
                 }
                 if cap <= SLOWEST * fastest {
-                    // The last few percent are enough to creep.
+                    // Enough to creep.
                     if share > CREEP_SHARE {
                         break;
                     }
@@ -229,9 +230,9 @@ impl Cell {
         Ok(cap)
     }
 
-    /// Limits of the parameter's speed, whose square is `cap` at most, and acceleration that each keep the joints within theirs, whatever
-    /// the other is; the curvature may take `share` of the limits of acceleration and jerk. Friction counts up to the squared
-    /// speed `reached`.
+    /// Returns limits of the parameter's speed, whose square is at most `cap`, and of its acceleration. Each limit
+    /// keeps the joints within their limits for every value of the other. The curvature may use `share` of the limits
+    /// of acceleration and jerk. Friction is considered up to the squared speed `reached`.
     pub fn bounds(
         &self,
         cap: f64,
@@ -276,7 +277,7 @@ impl Cell {
         for j in 0..JOINTS {
             let (first, second) = (end.point.first[j].abs(), end.point.second[j].abs());
             most = most.min((limits.acceleration[j] - second * cap) / first);
-            // Half of the jerk that is left: the other half is for changing the acceleration.
+            // Half of the remaining jerk: the other half is for changes of the acceleration.
             let left = limits.jerk[j] - self.third[j].abs() * cap * speed;
             most = most.min(0.5 * left / (3.0 * second * speed));
         }

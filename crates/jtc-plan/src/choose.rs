@@ -1,27 +1,27 @@
-//! Which corners are rounded, and which waypoints are corners at all.
+//! Chooses which corners are rounded, and which waypoints are corners.
 //!
-//! A stop lies within every blend, and so does a line close to waypoints that are dense: whatever is the fastest is taken.
+//! A stop lies within every blend. A line close to dense waypoints does too. The fastest option is used.
 use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
-/// Shares of the blend that waypoints which are left out may be off the line.
+/// Shares of the blend by which dropped waypoints may deviate from the line.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// A path with this many times the corners of a thinner one is not planned.
+/// Factor of corners over a thinner path from which a path is not planned.
 const DENSE: usize = 8;
-/// How often corners become stops.
+/// Number of rounds in which corners become stops.
 const ROUNDS: usize = 5;
-/// How much faster a stop has to be than a rounded corner.
+/// Share of the duration with a rounded corner below which a stop is used.
 const WORTH: f64 = 0.99;
 
-/// The fastest motion that was found, without what binds it, and its path.
+/// Fastest motion found, without its limiting constraints, and its path.
 pub(crate) struct Chosen {
     pub path: BlendedPath,
     pub motion: Motion,
 }
 
-/// The fastest of some motions through `path`'s waypoints: along it, along it with some waypoints left out or some corners as stops, and
-/// with a stop at each waypoint. The waypoints for which `keep` holds are not left out.
+/// Returns the fastest of several motions through `path`'s waypoints: along the path; with some waypoints dropped or
+/// some corners as stops; and with a stop at each waypoint. Waypoints for which `keep` returns `true` are not dropped.
 pub(crate) fn fastest(
     path: BlendedPath,
     blend: f64,
@@ -65,7 +65,7 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
-        // The same motion would be planned again.
+        // Planning again would give the same motion.
         let is_planned =
             |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();
@@ -83,7 +83,7 @@ pub(crate) fn fastest(
     }
 }
 
-/// A path with its motion and when that is in the middle of each leg.
+/// A path with its motion and the times at the middles of its legs.
 struct Timed {
     path: BlendedPath,
     motion: Motion,
@@ -106,7 +106,8 @@ impl Timed {
         Ok(Self { path, motion, middles })
     }
 
-    /// Rounded corners that take longer than a stop there: of two legs at rest at both ends, the halves beside it.
+    /// Returns the rounded corners that take longer than a stop at the same place. A stop counts as the adjacent halves
+    /// of two legs with rest at both ends.
     fn slow_corners(&self, limits: &Limits) -> Vec<usize> {
         let at_rest: Vec<f64> = self.path.legs().map(|(a, b)| rest_to_rest(&a, &b, limits)).collect();
         let is_slow = |&i: &usize| {
@@ -120,7 +121,7 @@ impl Timed {
 /// A path that also counts the middles of its legs as waypoints.
 struct WithMiddles<'a> {
     path: &'a BlendedPath,
-    /// Parameter, and whether it is a middle.
+    /// Parameters; `true` for a middle.
     places: Vec<(f64, bool)>,
 }
 
@@ -160,8 +161,8 @@ impl Path for WithMiddles<'_> {
     }
 }
 
-/// Time of the fastest motion on a straight line from rest to rest, s, torque not counted: speed, acceleration and jerk of the line as high
-/// as the joints' limits allow.
+/// Returns the time of the fastest motion on a straight line from rest to rest, s, without torque: with the highest
+/// speed, acceleration and jerk of the line that the joint limits permit.
 fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     let least = |limit: &JointVec| {
         let of = |j: usize| limit[j] / (to[j] - from[j]).abs();
@@ -169,7 +170,7 @@ fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     };
     let (speed, acceleration, jerk) =
         (least(&limits.velocity), least(&limits.acceleration), least(&limits.jerk));
-    // Ways are shares of the line. Speeding up takes this long, and half of it times the speed of way.
+    // Positions are shares of the line. The speed-up takes `ramp` seconds; the distance covered is half of that times the speed.
     let ramp = |speed: f64| {
         if speed * jerk < acceleration * acceleration {
             2.0 * (speed / jerk).sqrt()

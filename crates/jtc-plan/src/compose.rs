@@ -1,46 +1,47 @@
-//! A path and a law of time make a motion.
+//! Composition of a motion from a path and a time law.
 use crate::law::Law;
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Shortest piece where jerk is limited, s: the third derivative of a shorter one would be rounding.
+/// Shortest piece with a jerk limit, s: the third derivative of a shorter piece would be rounding.
 const SHORTEST: f64 = 2e-4;
-/// Shortest piece where it is not, s: for the second derivative.
+/// Shortest piece without a jerk limit, s: limited by rounding of the second derivative.
 const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
-/// How far the middle of a piece may be off the path, rad.
+/// Largest distance of the middle of a piece from the path, rad.
 const AWAY: f64 = 1e-9;
-/// How far the acceleration in its middle may be off, as a share of its limit.
+/// Largest error of the acceleration in its middle, as a share of its limit.
 const ACCELERATION_AWAY: f64 = 1e-3;
-/// How often a piece is halved for that.
+/// Maximum number of times that a piece is halved for this.
 const HALVINGS: u8 = 7;
 
-/// A section of a path from stop to stop, and the places where it changes its form.
+/// Section of a path from stop to stop, and the places of a change of form.
 pub(crate) struct Section<'a> {
     pub path: &'a dyn Path,
     pub from: f64,
     pub to: f64,
-    /// Rising, strictly inside.
+    /// Breaks, rising, strictly inside.
     pub breaks: Vec<f64>,
-    /// Parameters of the waypoints that belong to it, rising: that of its start only where the path begins.
+    /// Parameters of the waypoints that belong to the section, rising; the waypoint at its start belongs to it only at
+    /// the beginning of the path.
     pub waypoints: Vec<f64>,
-    /// Parts between the breaks of all of the path.
+    /// Number of parts between the breaks of the whole path.
     pub parts_of_path: usize,
 }
 
 impl Section<'_> {
-    /// Place and derivatives at the parameter `s`, between two breaks on the side of `side`.
+    /// Returns position and derivatives at the parameter `s`, between two breaks on the side of `side`.
     pub fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
         self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
     }
 
-    /// Begin and end of each part between two breaks.
+    /// Returns start and end of each part between two breaks.
     pub fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
         let ends = || self.breaks.iter().copied();
         std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
     }
 
-    /// The motion along it. Its first waypoint time is its start.
+    /// Returns the motion along the section. Its first waypoint time is its start.
     pub fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
         let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };
@@ -69,7 +70,7 @@ impl Section<'_> {
         Motion::new(pieces, self.path.at(self.to).position, times)
     }
 
-    /// Begin and end of each part in time, none shorter than a piece.
+    /// Returns start and end of each part in time, none shorter than a piece.
     fn times(&self, law: &Law) -> Vec<(f64, f64)> {
         let mut times: Vec<f64> = vec![0.0];
         times.extend(self.breaks.iter().map(|s| law.time_of(s - self.from)));
@@ -78,7 +79,7 @@ impl Section<'_> {
     }
 }
 
-/// A stretch of time in one part of a section.
+/// An interval of time in one part of a section.
 struct Part<'a> {
     section: &'a Section<'a>,
     law: &'a Law,
@@ -89,7 +90,7 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    /// Its pieces, as many as it takes to be on the path.
+    /// Adds as many pieces as are needed to stay on the path.
     fn pieces(&self, pieces: &mut Vec<Piece>, halvings: u8) {
         let (from, to) = (self.from, self.to);
         if to <= from {
@@ -97,7 +98,7 @@ impl Part<'_> {
         }
         let length = to - from;
         let mut start = self.state(from, 1.0);
-        // Where it follows another one there is no jump, not even one of rounding.
+        // A piece that follows another one starts exactly at its end, without a jump by rounding.
         if let Some(last) = pieces.last() {
             let end = last.at(last.length);
             (start.position, start.velocity) = (end.position, end.velocity);
@@ -121,7 +122,7 @@ impl Part<'_> {
         })
     }
 
-    /// State at `time`, after (1) or before (−1) what jumps there.
+    /// Returns the state at `time`, after (1) or before (−1) a jump.
     fn state(&self, time: f64, after: f64) -> State {
         let (s, v, a) = self.law.beside(time, after);
         let at = self.section.at(self.section.from + s, self.side);

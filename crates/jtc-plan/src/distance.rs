@@ -1,10 +1,10 @@
-//! How far two positions of the joints are from each other.
+//! Distance of two joint positions.
 use jtc_wire::Joint;
 
 use crate::JointVec;
 
-/// The joint whose position differs most between `a` and `b`, and by how much, rad. One whose difference is no number counts as the
-/// furthest.
+/// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. A joint whose difference
+/// is NaN counts as the furthest.
 pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
     let apart = |joint: Joint| (joint, (b[joint.index()] - a[joint.index()]).abs());
     let [first, others @ ..] = Joint::ALL;
@@ -14,7 +14,7 @@ pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
         .fold(apart(first), |most, next| if next.1.total_cmp(&most.1).is_ge() { next } else { most })
 }
 
-/// Of the joint that moves most, rad.
+/// Returns the distance of the joint that moves most, rad.
 pub(crate) fn distance(a: &JointVec, b: &JointVec) -> f64 {
     a.iter().zip(b).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }

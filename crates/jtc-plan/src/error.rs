@@ -1,62 +1,63 @@
-//! Why there is no motion.
+//! Planning errors.
 use jtc_wire::Joint;
 
 use crate::LimitKind;
 use crate::kinematics::PoseError;
 use crate::limits::MARGIN_MAX;
 
-/// Why there is no motion. Waypoints and legs are counted from 1; leg 1 leads from waypoint 1 to waypoint 2.
+/// Reason why a motion cannot be planned. Waypoints and legs are counted from 1; leg 1 leads from waypoint 1 to
+/// waypoint 2.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// No way from one waypoint, or from none.
+    /// Fewer than two waypoints.
     #[error("a motion takes at least 2 waypoints; given: {count}")]
     TooFew {
-        /// Waypoints given.
+        /// Number of waypoints.
         count: usize,
     },
-    /// A position that is no number.
+    /// A position that is NaN or infinite.
     #[error("waypoint {waypoint}, {}", self.what())]
     NotFinite {
-        /// From 1.
+        /// Waypoint, from 1.
         waypoint: usize,
-        /// Of this joint.
+        /// Joint of the position.
         joint: Joint,
-        /// rad.
+        /// Position, rad.
         value: f64,
     },
     /// A position outside the limits.
     #[error("waypoint {waypoint}, {}", self.what())]
     Position {
-        /// The one that is outside, or the one before the place that is; from 1.
+        /// Waypoint outside the limits, or the last one before the position that is outside; from 1.
         waypoint: usize,
-        /// Of this joint.
+        /// Joint of the position.
         joint: Joint,
-        /// rad.
+        /// Position, rad.
         value: f64,
-        /// rad.
+        /// Lowest position, rad.
         min: f64,
-        /// rad.
+        /// Highest position, rad.
         max: f64,
     },
-    /// A limit within which nothing can move.
+    /// A limit that permits no motion.
     #[error("{joint}: {} limit of {value} {} leaves no motion", .limit.name(), .limit.unit())]
     Limit {
-        /// Of this joint.
+        /// Joint of the limit.
         joint: Joint,
-        /// Which limit.
+        /// Kind of limit.
         limit: LimitKind,
-        /// Its value.
+        /// Value of the limit.
         value: f64,
     },
     /// A range without positions.
     #[error("{joint}: lowest position {min} rad is not below the highest one, {max} rad")]
     Range {
-        /// Of this joint.
+        /// Joint of the range.
         joint: Joint,
-        /// rad.
+        /// Lowest position, rad.
         min: f64,
-        /// rad.
+        /// Highest position, rad.
         max: f64,
     },
     /// A torque margin that is out of range.
@@ -64,85 +65,85 @@ pub enum PlanError {
         "{joint}: torque margin {} % of the limit is out of range (0–{} %)", 100.0 * .share, 100.0 * MARGIN_MAX
     )]
     Margin {
-        /// Of this joint.
+        /// Joint of the margin.
         joint: Joint,
         /// Share of the torque limit.
         share: f64,
     },
-    /// A blend that is none.
+    /// An invalid blend.
     #[error("blend of {value} rad; it is 0 (a stop at each waypoint) or more")]
     Blend {
-        /// rad.
+        /// Blend, rad.
         value: f64,
     },
-    /// A time that is none, or is not after the one before it.
+    /// An invalid time, or a time that is not after the previous one.
     #[error("waypoint {waypoint}: time {time} s is not after {before} s")]
     Time {
-        /// From 1.
+        /// Waypoint, from 1.
         waypoint: usize,
-        /// s.
+        /// Time, s.
         time: f64,
-        /// Time of the waypoint that was given one before it, s.
+        /// Time of the previous waypoint with a time, s.
         before: f64,
     },
-    /// A time that the limits do not allow.
+    /// A time that the limits do not permit.
     #[error(
         "waypoint {waypoint}: {given:.3} s after waypoint {from} is too early, {joint} needs {shortest:.3} s for its {} limit",
         .limit.name()
     )]
     TooEarly {
-        /// The waypoint with the given time before, from 1.
+        /// Previous waypoint with a given time, from 1.
         from: usize,
-        /// From 1.
+        /// Waypoint, from 1.
         waypoint: usize,
-        /// The joint that needs the longest.
+        /// Joint that needs the longest time.
         joint: Joint,
-        /// The limit that it comes up to.
+        /// Limit that the joint reaches.
         limit: LimitKind,
-        /// Time given from that waypoint to this one, s.
+        /// Given time from that waypoint to this one, s.
         given: f64,
-        /// Shortest possible, s; a twentieth more than given where only the legs beside it leave nothing over.
+        /// Shortest possible time, s; a twentieth more than given if only the adjacent legs leave no margin.
         shortest: f64,
     },
-    /// The torque does not suffice however slow the motion is.
+    /// The torque does not suffice at any speed.
     #[error("waypoint {waypoint}, {}", self.what())]
     Torque {
-        /// Where, or the one before the place where; from 1.
+        /// Waypoint of the failure, or the last waypoint before it; from 1.
         waypoint: usize,
-        /// Of this joint.
+        /// Joint with too little torque.
         joint: Joint,
-        /// N·m.
+        /// Required torque, N·m.
         torque: f64,
-        /// What is left for that, N·m.
+        /// Torque available for that, N·m.
         limit: f64,
-        /// The torque limit, of which that is a share, N·m.
+        /// Full torque limit, N·m; `limit` is a share of it.
         whole: f64,
-        /// The arm could not even be held there, where the motion begins, rests or ends.
+        /// `true` if the arm cannot even be held there, at the start, at a rest or at the end.
         holding: bool,
     },
-    /// A path whose positions or derivatives are no numbers, or that has no length.
+    /// A path with NaN or infinite positions or derivatives, or without a length.
     #[error("leg {leg}: the path has no direction or no finite derivatives at parameter {parameter}")]
     Path {
-        /// From 1.
+        /// Leg, from 1.
         leg: usize,
-        /// The path's own.
+        /// Parameter of the path.
         parameter: f64,
     },
-    /// The flange cannot be brought there, or not along a line or an arc.
+    /// The flange cannot reach the pose, or not along a line or an arc.
     #[error(transparent)]
     Flange(#[from] PoseError),
-    /// No law of time was found, which is a fault of the planner or numbers beyond what it can compute with.
+    /// No time law was found, because of a fault of the planner or of extreme values.
     #[error("leg {leg}: no time law within the limits: {reason}")]
     NoTimeLaw {
-        /// From 1.
+        /// Leg, from 1.
         leg: usize,
-        /// What failed.
+        /// Failure of the solver.
         reason: String,
     },
 }
 
 impl PlanError {
-    /// The waypoint that it is about, counted from 1, where its message names one: of two, the one where it is wrong.
+    /// Returns the waypoint that the message names, counted from 1, if it names one: of two, the invalid one.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }
@@ -161,7 +162,7 @@ impl PlanError {
         }
     }
 
-    /// The message without the waypoint that it begins with, where the joint or the flange is wrong at one.
+    /// Returns the message without the leading waypoint, if the error concerns a joint or the flange at a waypoint.
     pub fn what(&self) -> String {
         match self {
             Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is no position"),
@@ -178,7 +179,7 @@ impl PlanError {
         }
     }
 
-    /// What helps.
+    /// Returns a hint for the correction.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::TooFew { .. } => "give where the motion starts and where it ends",

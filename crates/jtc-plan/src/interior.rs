@@ -1,10 +1,12 @@
-//! Laws of time that are limited in jerk, by an interior-point method (Boyd and Vandenberghe 2004).
+//! Time laws with limited jerk, by an interior-point method (Boyd and Vandenberghe 2004).
 //!
-//! The squared speed of the parameter is a quadratic spline of it, whose knots are the ends of cells: acceleration is half its slope, and
-//! jerk half its second derivative times the speed. Velocity, acceleration and torque are then linear in the coefficients, and jerk is
-//! so but for the root of the squared speed. Sum of the time and barriers of all limits is made the least by Newton's method, the second
-//! derivatives of the limits left out; what couples are neighbours alone, so that a step takes time in proportion to the length of the path.
-//! In the first and the last cell the jerk is constant: from rest the squared speed rises by the power 4/3, which no spline does.
+//! The squared speed of the parameter is a quadratic spline of the parameter, whose knots are the ends of cells: the
+//! acceleration is half its slope, and the jerk is half its second derivative times the speed. Velocity, acceleration
+//! and torque are therefore linear in the coefficients; the jerk is linear except for the root of the squared speed.
+//! Newton's method minimises the sum of the time and the barriers of all limits, without the second derivatives of the
+//! limits. Only neighbours are coupled, so that the time of a step is proportional to the length of the path. In the
+//! first and the last cell the jerk is constant: from rest the squared speed rises with the power 4/3, which a spline
+//! cannot represent.
 mod place;
 mod problem;
 mod spline;
@@ -15,20 +17,20 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Shares of the time that the barriers may cost, one after the other.
+/// Shares of the time that the barriers may cost, in sequence.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
-/// Steps for each of them at most.
+/// Maximum number of steps for each share.
 const STEPS: usize = 12;
-/// A step that promises less than this share of what the barriers may cost is the last.
+/// A step that promises less than this share of the allowed barrier cost is the last.
 const WORTH: f64 = 0.25;
-/// The shortest part of a step.
+/// Smallest part of a step.
 const SHORTEST: f64 = 1e-3;
-/// By what squared speeds are lowered to be within the limits, and how often.
+/// Factor for squared speeds outside the limits, and the largest number of reductions.
 const LOWER: f64 = 0.85;
 const LOWER_AGAIN: f64 = 0.97;
 const LOWER_MAX: usize = 100;
 
-/// What is made the least.
+/// Minimisation problem.
 struct Problem<'a> {
     plan: &'a Plan<'a>,
     places: Vec<Place>,
@@ -36,7 +38,7 @@ struct Problem<'a> {
     knots: Vec<f64>,
     /// First and last coefficient as shares of their neighbours.
     ties: (f64, f64),
-    /// How many limits.
+    /// Number of limits.
     limits: f64,
     end: f64,
 }
@@ -47,7 +49,7 @@ impl<'a> Problem<'a> {
         (c[0], c[n - 1]) = (self.ties.0 * c[1], self.ties.1 * c[n - 2]);
     }
 
-    /// Sum of time and `barrier` times the barriers; infinite outside of the limits.
+    /// Returns the time plus `barrier` times the barriers; infinite outside the limits.
     fn value(&self, c: &[f64], barrier: f64) -> f64 {
         let mut sum = 0.0;
         for place in &self.places {
@@ -57,7 +59,7 @@ impl<'a> Problem<'a> {
         sum
     }
 
-    /// The step of Newton's method, and what it promises.
+    /// Returns the step of Newton's method, and its predicted gain.
     fn step(&self, c: &[f64], barrier: f64) -> Option<(Vec<f64>, f64)> {
         let n = c.len();
         let (mut gradient, mut hessian) = (vec![0.0; n], vec![[0.0f64; 3]; n]);
@@ -79,7 +81,7 @@ impl<'a> Problem<'a> {
         Some((step, promise))
     }
 
-    /// Coefficients of a spline that is near a law.
+    /// Returns the coefficients of a spline near a law.
     fn near(&self, law: &Law) -> Vec<f64> {
         let n = self.knots.len() as isize + 1;
         let place = |i: isize| 0.5 * (knot(&self.knots, i - 1) + knot(&self.knots, i));
@@ -102,7 +104,7 @@ impl<'a> Problem<'a> {
         None
     }
 
-    /// Makes the time shorter, with barriers that cost these shares of it, one after the other.
+    /// Shortens the time, with barriers that cost these shares of it, in sequence.
     fn improve(&self, c: &mut Vec<f64>, gaps: &[f64]) {
         for gap in gaps {
             let time = self.value(c, 0.0);
@@ -133,7 +135,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// The solution of a symmetric positive definite system with two bands beside the diagonal, whose right side is `-right`.
+/// Solves a symmetric positive definite system with two bands next to the diagonal, whose right side is `-right`.
 fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     let n = bands.len();
     let mut x: Vec<f64> = right.iter().map(|r| -r).collect();
@@ -167,26 +169,26 @@ fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     Some(x)
 }
 
-/// A search for the fastest law along a plan's cells.
+/// Search for the fastest law along a plan's cells.
 pub(crate) struct Search<'a> {
     plan: &'a Plan<'a>,
-    /// Coefficients of the spline that was found last.
+    /// Coefficients of the last spline found.
     c: Vec<f64>,
     found: bool,
 }
 
 impl<'a> Search<'a> {
-    /// Begins near a law.
+    /// Starts near a law.
     pub fn new(plan: &'a Plan<'a>, near: &Law) -> Option<Self> {
         let c = Problem::new(plan, &vec![1.0; plan.cells.len()])?.near(near);
         Some(Self { plan, c, found: false })
     }
 
-    /// The fastest law with these factors of the time in each cell.
+    /// Returns the fastest law with these factors of the time in each cell.
     pub fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
         let problem = Problem::new(self.plan, slower)?;
         if self.found {
-            // What was found is slower where more is left over now.
+            // Scales the solution down in cells that `slower` slows down.
             for (i, c) in self.c.iter_mut().enumerate() {
                 let near = slower[i.saturating_sub(2)..slower.len().min(i + 3)].iter();
                 let most = near.fold(1.0f64, |most, s| most.max(*s));

@@ -1,8 +1,8 @@
-//! Laws of time that are limited in jerk.
+//! Time laws with limited jerk.
 //!
-//! The fastest law under limits of the parameter's speed and acceleration is averaged over a window. A jump of the acceleration
-//! becomes a ramp as long as the window: with a window of acceleration over jerk the jerk holds. [`crate::profile`] sees to it that
-//! what was averaged keeps to the limits of the cells around it.
+//! The fastest law under limits of the parameter's speed and acceleration is averaged over a window. A jump of the
+//! acceleration becomes a ramp as long as the window: with a window of acceleration over jerk the jerk limit holds.
+//! [`crate::profile`] ensures that the averaged law keeps the limits of the cells around it.
 use crate::along::{Made, Plan};
 use crate::cells::Cell;
 use crate::interior::Search;
@@ -11,30 +11,30 @@ use crate::motion::Motion;
 use crate::profile::{self, Bounds};
 use crate::{JOINTS, Limits};
 
-/// By what the acceleration is lowered from one attempt to the next: lower ones have shorter ramps.
+/// Factor by which the acceleration is lowered from attempt to attempt: lower accelerations have shorter ramps.
 const LOWER: f64 = 0.7;
-/// Attempts at most.
+/// Maximum number of attempts.
 const ATTEMPTS: usize = 24;
-/// What the curvature may take of acceleration and jerk, in attempts one after the other: where a path keeps its speed in its curves, nearly
-/// all; where it has to change it there, less.
+/// Shares of acceleration and jerk that the curvature may use, in the order of the attempts: nearly all if the path
+/// keeps its speed in curves, less if its speed must change there.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// By how much all of the motion is slowed down without that.
+/// Maximum factor by which the whole motion is slowed down instead of a repair.
 const LEFT_OVER: f64 = 1.002;
-/// The same for a law by the interior-point method.
+/// Like [`LEFT_OVER`], for a law by the interior-point method.
 const LITTLE: f64 = 1.005;
-/// Share of the jerk limit that the window is made for.
+/// Share of the jerk limit for which the window is computed.
 const JERK_SHARE: f64 = 0.995;
 
-/// How much of the limits a law uses.
+/// Shares of the limits that a law uses.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shares {
-    /// Of the acceleration along the path.
+    /// Share of the acceleration along the path.
     acceleration: f64,
-    /// Of acceleration and jerk by the curvature.
+    /// Share of acceleration and jerk for the curvature.
     curvature: f64,
 }
 
-/// The best of some laws that use more or less of the limits, or that with these `shares`.
+/// Returns the best of several laws that use more or less of the limits, or the law with these `shares`.
 pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Result<Made, String> {
     let none = || String::from("no attempt took a finite time");
     let shares = shares.or_else(|| best_shares(plan)).ok_or_else(none)?;
@@ -47,10 +47,10 @@ pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Re
     Ok(Made { law: best.law, motion: best.motion, shares: Some(shares) })
 }
 
-/// Shares of the law from which the search for a faster one begins.
+/// Shares of the law from which the search for a faster one starts.
 const SEED: Shares = Shares { acceleration: LOWER * LOWER, curvature: CURVATURE_SHARES[0] };
 
-/// The motion by an interior-point method, where that finds one that is faster than the law from which it begins.
+/// Returns the motion by an interior-point method, if that is faster than the law from which it starts.
 pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     let bounds = bounds(plan, SEED);
     let window = window(plan.cells, &bounds, plan.limits);
@@ -74,7 +74,7 @@ pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     best.filter(|best| best.duration() < seed.duration()).map(|best| best.motion)
 }
 
-/// The shares with which the motion is the shortest, torque not counted.
+/// Returns the shares with the shortest motion, without torque.
 fn best_shares(plan: &Plan) -> Option<Shares> {
     let duration = |shares| Attempt::new(plan, &bounds(plan, shares), false).duration();
     let mut best: Option<(Shares, f64)> = None;
@@ -115,7 +115,7 @@ fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     plan.cells.iter().enumerate().map(of_cell).collect()
 }
 
-/// A law, its motion, and by what the time in each cell has to be multiplied.
+/// Law, its motion, and the factor for the time in each cell.
 struct Attempt {
     law: Law,
     motion: Motion,
@@ -131,12 +131,12 @@ impl Attempt {
         Self { law, motion, slower }
     }
 
-    /// s, when all of it is slowed down.
+    /// Returns the duration if the whole motion is slowed down, s.
     fn duration(&self) -> f64 {
         self.motion.duration() * self.slower.iter().copied().fold(1.0, f64::max)
     }
 
-    /// Slows the cells down in which a limit does not hold, as long as that is faster than slowing down all.
+    /// Slows down the cells in which a limit is violated, as long as that is faster than slowing down the whole motion.
     fn repair(&mut self, plan: &Plan, mut bounds: Vec<Bounds>, repairs: usize) {
         let mut slower = self.slower.clone();
         for _ in 0..repairs {
@@ -157,7 +157,7 @@ impl Attempt {
     }
 }
 
-/// The window in which no joint's acceleration along a straight line changes faster than its jerk allows, s.
+/// Returns the window in which no joint's acceleration along a straight line changes faster than its jerk permits, s.
 fn window(cells: &[Cell], bounds: &[Bounds], limits: &Limits) -> f64 {
     let mut longest = 0.0f64;
     for (cell, bounds) in cells.iter().zip(bounds) {

@@ -31,31 +31,33 @@ pub use route::{LegKind, Route, RoutePoint};
 pub use singular::{SINGULAR, SingularKind, Singularity};
 pub use target::{Target, resolve};
 
-/// Iterations that refine a solution of a closed form: two where the arm is what the form takes it for, more next to a singular pose.
+/// Iterations that refine a solution of a closed form: two if the arm matches the closed form, more next to a singular
+/// pose.
 const REFINE: usize = 25;
 /// Iterations of a search.
 const SEARCH: usize = 60;
 
-/// The kinematics of an arm within its position limits: poses of the flange from joint positions, and back.
+/// Kinematics of an arm within its position limits: poses of the flange from joint positions, and back.
 ///
-/// Poses are those of the flange in the base frame, with positions in m; joint positions are in rad. A solution brings the
-/// flange to the pose within 1 nm and 1 nrad.
+/// Poses are poses of the flange in the base frame, with positions in m; joint positions are in rad. A solution brings
+/// the flange to the pose within 1 nm and 1 nrad.
 ///
-/// Arms with a spherical wrist, and those with three parallel axes like the default arm's and Universal Robots', are recognised from
-/// the numbers of the model, and all solutions are computed in closed form. For any other arm they are found by iteration from many
-/// starting values, always the same ones; that finds nearly every solution, but one may be missed.
+/// Arms with a spherical wrist, and arms with three parallel axes like the default arm and those of Universal Robots,
+/// are recognised from the parameters of the model, and all solutions are computed in closed form. For any other arm
+/// they are found by iteration from many fixed starting values. That finds nearly every solution, but may miss one.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     chain: Chain,
     limits: [(f64, f64); JOINTS],
-    /// What has a closed form.
+    /// Geometry with a closed form.
     exact: Option<Geometry>,
-    /// What nearly has one.
+    /// Geometry that nearly has a closed form.
     near: Option<Geometry>,
 }
 
 impl Kinematics {
-    /// That of `model`, which must have passed [`ArmModel::check`], with the lowest and the highest position of each joint, rad.
+    /// Creates the kinematics of `model`, which must have passed [`ArmModel::check`], with the lowest and the highest
+    /// position of each joint, rad.
     pub fn new(model: &ArmModel, position_limits: &[(f64, f64); JOINTS]) -> Self {
         let chain = Chain::new(model);
         let exact = Geometry::of(&chain.zero, EXACT);
@@ -63,67 +65,68 @@ impl Kinematics {
         Self { chain, limits: *position_limits, exact, near }
     }
 
-    /// Whether all solutions are computed in closed form.
+    /// Returns `true` if all solutions are computed in closed form.
     pub fn is_closed_form(&self) -> bool {
         self.exact.is_some()
     }
 
-    /// Lowest and highest position of each joint, rad.
+    /// Returns the lowest and highest position of each joint, rad.
     pub fn limits(&self) -> &[(f64, f64); JOINTS] {
         &self.limits
     }
 
-    /// The pose of the flange at the joint positions `q`.
+    /// Returns the pose of the flange at the joint positions `q`.
     pub fn flange(&self, q: &JointVec) -> Pose {
         self.chain.flange(q)
     }
 
-    /// The geometric Jacobian of the flange at the joint positions `q`, row major: the flange's velocity in the base frame (rows 0..3, m/rad) and
-    /// its angular velocity (rows 3..6, rad/rad), a column a joint.
+    /// Returns the geometric Jacobian of the flange at the joint positions `q`, row major: the flange's velocity in the
+    /// base frame (rows 0..3, m/rad) and its angular velocity (rows 3..6, rad/rad), one column per joint.
     pub fn jacobian(&self, q: &JointVec) -> [[f64; JOINTS]; 6] {
         let jacobian = self.chain.at(q).jacobian();
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
     }
 
-    /// The joint positions within the limits that bring the flange to `target`, of all solutions the nearest to `near`: with the
-    /// smallest sum of squares of the joints' ways.
+    /// Returns the joint positions within the limits that bring the flange to `target`. Of all solutions it returns the
+    /// one nearest to `near`: with the smallest sum of squares of the joint motions.
     ///
-    /// A singular target, which the arm reaches in infinitely many ways, has one near `near`.
+    /// A singular target, with infinitely many solutions, returns one near `near`.
     ///
     /// # Errors
     ///
-    /// Whether the target is no pose, is out of reach, in this orientation or in any, or within reach outside the limits only: see
-    /// [`PoseError`].
+    /// [`PoseError`] if the target is not a valid pose, is out of reach, in this orientation or in any, or is within
+    /// reach only outside the limits.
     pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
         let goal = orientation::checked(target)?;
         if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
             return Err(PoseError::NotFinite { what: "a joint position to be near to", value: bad });
         }
         let mut found = self.solutions(&goal, near);
-        // In a singular pose nearer than what the closed form chooses; its turns are dealt with below.
+        // In a singular pose this may be nearer than the choice of the closed form; its turns are handled below.
         found.extend(search::converge(&self.chain, &goal, near, SEARCH));
         let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         let within = found.iter().filter_map(|q| turns::nearest(q, near, &self.limits));
         within.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| self.reason(&goal, &found))
     }
 
-    /// All joint positions within the limits that bring the flange to `target`, none twice: each solution with every joint within
-    /// (−π, π] and, where the limits leave room, a turn less and a turn more. Nothing for what is no pose.
+    /// Returns all joint positions within the limits that bring the flange to `target`, without duplicates: each
+    /// solution with every joint within (−π, π] and, if the limits allow, one turn less and one turn more. Returns an
+    /// empty list for an invalid pose.
     ///
-    /// Of a singular target's infinitely many solutions there are some.
+    /// A singular target has infinitely many solutions; some of them are returned.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
         let Ok(goal) = orientation::checked(target) else { return Vec::new() };
         let found = self.solutions(&goal, &[0.0; JOINTS]);
         found.iter().flat_map(|q| turns::variants(q, &self.limits)).collect()
     }
 
-    /// What singular pose `q` is, or is next to: the smaller [`Singularity::smallest`], the nearer.
+    /// Returns the singular pose that `q` is in or next to: a smaller [`Singularity::smallest`] means nearer.
     pub fn singularity(&self, q: &JointVec) -> Singularity {
         let geometry = self.exact.as_ref().or(self.near.as_ref());
         singular::nearest(&self.chain, geometry, &self.chain.at(q))
     }
 
-    /// Principal values of all solutions, without regard to the limits.
+    /// Returns the principal values of all solutions, ignoring the limits.
     fn solutions(&self, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let mut found = Vec::new();
         if let Some(geometry) = self.exact.as_ref().or(self.near.as_ref()) {
@@ -139,7 +142,7 @@ impl Kinematics {
         found
     }
 
-    /// Why no solution is within the limits; `found` are all solutions.
+    /// Returns the reason why no solution is within the limits; `found` are all solutions.
     fn reason(&self, goal: &Frame, found: &[JointVec]) -> PoseError {
         let least = found.iter().map(|q| turns::outside(q, &self.limits));
         match least.min_by(|a, b| a.beyond.total_cmp(&b.beyond)) {
@@ -151,7 +154,7 @@ impl Kinematics {
         }
     }
 
-    /// How far out of reach a pose without a solution is.
+    /// Returns how far a pose without a solution is out of reach.
     fn missing(&self, goal: &Frame) -> PoseError {
         let least = |weights: [f64; 6], from: &JointVec| {
             search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)
@@ -166,13 +169,13 @@ impl Kinematics {
         if place > 1e-6 {
             return PoseError::OutOfReach { distance, missing: place };
         }
-        // The position first: what is left then is a matter of the orientation.
+        // The position first: the remaining residual then belongs to the orientation.
         let turn = best([1e3, 1e3, 1e3, 1.0, 1.0, 1.0]).map_or(0.0, |r| r.residual.fixed_rows::<3>(3).norm());
         PoseError::Orientation { distance, missing: turn }
     }
 }
 
-/// What joint positions outside the limits are: the joint that is the farthest outside.
+/// Returns the error for joint positions outside the limits: it names the joint that is furthest outside.
 fn outside(q: &JointVec, limits: &[(f64, f64); JOINTS]) -> Option<PoseError> {
     let beyond = |joint: &Joint| {
         let (low, high) = limits[joint.index()];

@@ -1,11 +1,11 @@
-//! Laws of time: where on a section of a path a motion is when.
+//! Time laws: position on a section of a path as a function of time.
 
 /// A part of a law in which the third derivative of the parameter is constant.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Phase {
-    /// s.
+    /// Start, s.
     pub start: f64,
-    /// s.
+    /// Length, s.
     pub length: f64,
     /// Parameter, and its first three derivatives by time, at the start.
     pub s: f64,
@@ -15,26 +15,26 @@ pub(crate) struct Phase {
 }
 
 impl Phase {
-    /// Parameter and its first two derivatives, `t` seconds after the start.
+    /// Returns the parameter and its first two derivatives, `t` seconds after the start.
     pub fn at(&self, t: f64) -> (f64, f64, f64) {
         let (v, a, j) = (self.speed, self.acceleration, self.jerk);
         (self.s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j)
     }
 }
 
-/// A law of time of a section of a path, from rest to rest; the parameter begins at 0 and never goes back.
+/// A time law of a section of a path, from rest to rest; the parameter begins at 0 and never decreases.
 #[derive(Clone, Debug)]
 pub(crate) struct Law {
     pub phases: Vec<Phase>,
     /// Parameter at the end.
     pub end: f64,
-    /// It begins and ends at rest.
+    /// `true` if the law begins and ends at rest.
     pub rests: bool,
 }
 
 impl Law {
-    /// Along the vertices (parameter, squared speed), between which the squared speed is a straight line over the parameter: the
-    /// acceleration is constant.
+    /// Creates the law along the vertices (parameter, squared speed), between which the squared speed is linear in the
+    /// parameter: the acceleration is constant.
     pub fn of_vertices(vertices: &[(f64, f64)]) -> Self {
         let mut phases = Vec::with_capacity(vertices.len());
         let mut start = 0.0;
@@ -51,12 +51,12 @@ impl Law {
         Self { phases, end: vertices.last().map_or(0.0, |v| v.0), rests: true }
     }
 
-    /// s.
+    /// Returns the duration, s.
     pub fn duration(&self) -> f64 {
         self.phases.last().map_or(0.0, |p| p.start + p.length)
     }
 
-    /// Parameter and its first two derivatives at `t`.
+    /// Returns the parameter and its first two derivatives at `t`.
     pub fn at(&self, t: f64) -> (f64, f64, f64) {
         let moving = |speed: f64| if self.rests { 0.0 } else { speed };
         if t <= 0.0 {
@@ -71,7 +71,7 @@ impl Law {
         (s.clamp(0.0, self.end), v.max(0.0), a)
     }
 
-    /// The same on one side of `t`, where the acceleration may jump: after it (1) or before it (−1).
+    /// Like [`Law::at`], on one side of `t`, because the acceleration may jump: after it (1) or before it (−1).
     pub fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
         const NEAR: f64 = 1e-10;
         let (s, speed, _) = self.at(t);
@@ -79,7 +79,7 @@ impl Law {
         (s, speed, self.at(inside).2)
     }
 
-    /// When the parameter is `s`.
+    /// Returns the time at which the parameter is `s`.
     pub fn time_of(&self, s: f64) -> f64 {
         if s <= 0.0 {
             return 0.0;
@@ -90,7 +90,7 @@ impl Law {
         let phase = &self.phases[self.phases.partition_point(|p| p.s <= s).saturating_sub(1)];
         let (mut low, mut high) = (0.0, phase.length);
         let mut t = 0.5 * high;
-        // Newton's method, kept between two bounds.
+        // Newton's method, bracketed between two bounds.
         for _ in 0..60 {
             let (at, speed, _) = phase.at(t);
             if at < s {
@@ -108,8 +108,8 @@ impl Law {
         phase.start + t
     }
 
-    /// The same law, averaged over a window of `window` seconds: what jumped in its acceleration becomes a ramp of that length.
-    /// It takes as much longer. Of a law without jerk alone.
+    /// Returns the law averaged over a window of `window` seconds: each jump of its acceleration becomes a ramp of that
+    /// length. The law takes `window` seconds longer. Only for laws without a jerk limit.
     pub fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
@@ -132,7 +132,7 @@ impl Law {
             s = phase.at(length).0;
             phases.push(phase);
         }
-        // What rounding has left over, divided among all.
+        // Distribute the remainder left by rounding over all phases.
         let factor = if s > 0.0 { self.end / s } else { 1.0 };
         for phase in &mut phases {
             phase.s *= factor;

@@ -1,13 +1,13 @@
-//! What a motion has to keep to.
+//! Limits of a motion.
 use jtc_core::Config;
 use jtc_wire::Joint;
 
 use crate::{JOINTS, JointVec, LimitKind, PlanError};
 
-/// Time in which an arm's limits let a joint go from rest to its highest acceleration, s: the jerk limit of [`Limits::of`].
+/// Time in which an arm's limits permit a joint to reach its highest acceleration from rest, s: the jerk limit of [`Limits::of`].
 pub const JERK_TIME: f64 = 0.1;
 
-/// Largest share of a torque limit that a motion can leave free.
+/// Largest share of a torque limit that a motion can keep free.
 pub const MARGIN_MAX: f64 = 0.5;
 
 /// Limits that a motion keeps, per joint, base to wrist.
@@ -19,16 +19,17 @@ pub struct Limits {
     pub velocity: JointVec,
     /// Highest acceleration, rad/s².
     pub acceleration: JointVec,
-    /// Highest jerk, rad/s³; infinite: none.
+    /// Highest jerk, rad/s³; infinite: no limit.
     pub jerk: JointVec,
-    /// Highest torque, N·m; asked for only where a motion is planned with an [`crate::ArmDynamics`].
+    /// Highest torque, N·m; used only if a motion is planned with an [`crate::ArmDynamics`].
     pub torque: JointVec,
-    /// Share of the torque limit that a motion leaves free, 0 to [`MARGIN_MAX`]; see [`crate::ArmDynamics::usable_torque`].
+    /// Share of the torque limit that a motion keeps free, 0 to [`MARGIN_MAX`]; see [`crate::ArmDynamics::usable_torque`].
     pub margin: JointVec,
 }
 
 impl Limits {
-    /// Those of an arm (J-43). An arm has no limit of jerk: here it is the highest acceleration within [`JERK_TIME`].
+    /// Returns the limits of an arm (J-43). An arm has no limit of jerk: here it is the highest acceleration within
+    /// [`JERK_TIME`].
     pub fn of(config: &Config) -> Self {
         let of = |value: fn(&jtc_core::JointConfig) -> f64| config.joints.each_ref().map(value);
         let acceleration = of(|j| j.acceleration_max);
@@ -42,13 +43,13 @@ impl Limits {
         }
     }
 
-    /// Leaves this share of each torque limit free.
+    /// Keeps this share of each torque limit free.
     pub fn with_margin(self, share: f64) -> Self {
         Self { margin: [share; JOINTS], ..self }
     }
 
-    /// Those at which a motion that these bind takes 1/`share` of the time: velocity × `share`, acceleration × its square, jerk × its
-    /// cube. Positions, torques and their margin remain.
+    /// Returns the limits at which a motion bound by them takes 1/`share` of the time: velocity × `share`, acceleration
+    /// × its square, jerk × its cube. Positions, torques and their margin stay unchanged.
     pub fn at_speed(&self, share: f64) -> Self {
         Self {
             velocity: self.velocity.map(|v| v * share),
@@ -58,22 +59,22 @@ impl Limits {
         }
     }
 
-    /// The same without a limit of jerk.
+    /// Returns these limits without a limit of jerk.
     pub fn without_jerk(self) -> Self {
         Self { jerk: [f64::INFINITY; JOINTS], ..self }
     }
 
-    /// Whether any joint's jerk is limited.
+    /// Returns `true` if any joint's jerk is limited.
     pub fn has_jerk(&self) -> bool {
         self.jerk.iter().any(|j| j.is_finite())
     }
 
-    /// Whether there can be a motion within them.
+    /// Checks that a motion is possible within the limits.
     ///
     /// # Errors
     ///
-    /// [`PlanError::Limit`] for the first limit that is no positive number (only that of jerk may be infinite), or a range of
-    /// positions without any, and [`PlanError::Margin`].
+    /// [`PlanError::Limit`] for the first limit that is not a positive number (only the jerk limit may be infinite),
+    /// [`PlanError::Range`] for an empty range of positions, and [`PlanError::Margin`].
     pub fn check(&self) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let j = joint.index();
@@ -88,7 +89,7 @@ impl Limits {
                 (LimitKind::Torque, self.torque[j], true),
             ] {
                 let positive = value > 0.0 && (value.is_finite() || !finite);
-                // Squares and cubes of what is smaller are lost in rounding.
+                // Squares and cubes of smaller values are lost in rounding.
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }
@@ -101,7 +102,7 @@ impl Limits {
         Ok(())
     }
 
-    /// Whether `position` is within the limits; `waypoint`, from 1, names it in the error.
+    /// Checks that `position` is within the limits; `waypoint`, from 1, names it in the error.
     pub(crate) fn holds(&self, position: &JointVec, waypoint: usize) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let (value, (min, max)) = (position[joint.index()], self.position[joint.index()]);

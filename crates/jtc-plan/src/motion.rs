@@ -7,16 +7,16 @@ use crate::{JOINTS, JointVec};
 /// Position, velocity and acceleration at a moment.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct State {
-    /// rad.
+    /// Position, rad.
     pub position: JointVec,
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: JointVec,
-    /// rad/s².
+    /// Acceleration, rad/s².
     pub acceleration: JointVec,
 }
 
 impl State {
-    /// At rest.
+    /// Returns the state at rest.
     pub(crate) fn rest(position: JointVec) -> Self {
         Self { position, ..Self::default() }
     }
@@ -25,21 +25,21 @@ impl State {
 /// A part of a motion: each joint's position is a polynomial of fifth degree of the time since `start`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
-    /// s.
+    /// Start, s.
     pub start: f64,
-    /// s, above 0.
+    /// Length, s, above 0.
     pub length: f64,
-    /// Per joint, ascending.
+    /// Coefficients per joint, ascending.
     pub coefficients: [[f64; 6]; JOINTS],
 }
 
 impl Piece {
-    /// The one that leads from one state to another (Hermite).
+    /// Returns the piece that leads from one state to another (Hermite).
     pub fn between(start: f64, length: f64, a: &State, b: &State) -> Self {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
-            // What is missing at the end, in units of the length.
+            // Residual at the end, in units of the length.
             let dp = b.position[j] - (p + h * (v + h * c));
             let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
             let da = (b.acceleration[j] - 2.0 * c) * h * h;
@@ -52,7 +52,7 @@ impl Piece {
         Self { start, length, coefficients }
     }
 
-    /// At `t` seconds after its start.
+    /// Returns the state `t` seconds after the start.
     pub fn at(&self, t: f64) -> State {
         let mut state = State::default();
         for (j, c) in self.coefficients.iter().enumerate() {
@@ -64,12 +64,12 @@ impl Piece {
         state
     }
 
-    /// Third derivative at `t` seconds after its start, rad/s³.
+    /// Returns the third derivative `t` seconds after the start, rad/s³.
     pub fn jerk(&self, t: f64) -> JointVec {
         self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
     }
 
-    /// The same way in `factor` times the time.
+    /// Returns the same path in `factor` times the time.
     pub fn stretched(&self, factor: f64) -> Self {
         let mut coefficients = self.coefficients;
         for c in &mut coefficients {
@@ -89,24 +89,25 @@ pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) end: State,
     pub(crate) binding: Vec<Binding>,
-    /// All of it was slowed down for this joint's torque.
+    /// Joint for whose torque the whole motion was slowed down.
     pub(crate) slowed: Option<Joint>,
     pub(crate) waypoint_times: Vec<f64>,
 }
 
 impl Motion {
-    /// Of the pieces, which follow each other without a gap, and rest at `end`.
+    /// Creates a motion from its pieces, which follow each other without a gap and come to rest at `end`.
     pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
         Self { pieces, end: State::rest(end), binding: Vec::new(), slowed: None, waypoint_times }
     }
 
-    /// Seconds from rest to rest, above 0.
+    /// Returns the time from rest to rest, s, above 0.
     pub fn duration(&self) -> f64 {
         self.pieces.last().map_or(0.0, |p| p.start + p.length)
     }
 
-    /// State at `t` seconds from the start: before it and beyond the end the arm rests where it begins and ends, exactly at the
-    /// first and the last waypoint. Without a limit of jerk the acceleration jumps, and this is the one that follows the jump.
+    /// Returns the state at `t` seconds from the start. Before the start and after the end the arm rests exactly at the
+    /// first and the last waypoint. Without a limit of jerk the acceleration jumps; the value after the jump is
+    /// returned.
     pub fn at(&self, t: f64) -> State {
         match self.piece(t) {
             None => self.end,
@@ -118,7 +119,7 @@ impl Motion {
         }
     }
 
-    /// Jerk at `t` seconds from the start, rad/s³; 0 where the arm rests.
+    /// Returns the jerk at `t` seconds from the start, rad/s³; 0 while the arm rests.
     pub fn jerk_at(&self, t: f64) -> JointVec {
         if t < 0.0 {
             return [0.0; JOINTS];
@@ -126,18 +127,18 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Which limit binds when, in the order of time: where none is used up, the one that is closest to it around there, or for which all of the
-    /// motion was slowed down.
+    /// Returns the binding limits in the order of time. If no limit is used up, it is the limit that is closest to
+    /// being used up around that time, or the limit for which the whole motion was slowed down.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }
 
-    /// When the motion is nearest to each waypoint, s from the start.
+    /// Returns the time at which the motion is nearest to each waypoint, s from the start.
     pub fn waypoint_times(&self) -> &[f64] {
         &self.waypoint_times
     }
 
-    /// The piece that `t` is in, the first one before the start; `None` from the end on.
+    /// Returns the piece at `t`, or the first one before the start; `None` from the end on.
     fn piece(&self, t: f64) -> Option<&Piece> {
         if t.is_nan() || t >= self.duration() {
             return None;
@@ -146,7 +147,7 @@ impl Motion {
         self.pieces.get(after.saturating_sub(1))
     }
 
-    /// The same way in `factor` times the time.
+    /// Returns the same path in `factor` times the time.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         Self {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
@@ -157,7 +158,8 @@ impl Motion {
         }
     }
 
-    /// Rests for `length` seconds at the place where it passes the waypoint with this index at rest; later waypoints are passed later.
+    /// Inserts a rest of `length` seconds at the waypoint with this index, if the motion is at rest there; later waypoints
+    /// are passed later.
     pub(crate) fn rest_at(&mut self, waypoint: usize, length: f64) {
         let Some(&time) = self.waypoint_times.get(waypoint) else { return };
         let at = self.pieces.partition_point(|p| p.start + 0.5 * p.length < time);
@@ -174,14 +176,15 @@ impl Motion {
         let joint = self.binding.get(after.saturating_sub(1)).map_or(Joint::ALL[0], |b| b.joint);
         binding.extend(self.binding[..after].iter().map(|b| Binding { to: b.to.min(time), ..*b }));
         binding.push(Binding { from: time, to: time + length, joint, limit: LimitKind::GivenTime });
-        // One that goes on after the rest has two parts.
+        // A binding that continues after the rest is split in two.
         let both = self.binding[..after].last().filter(|b| b.to > time).map(|b| Binding { from: time, ..*b });
         let later = both.into_iter().chain(self.binding[after..].iter().copied());
         binding.extend(later.map(|b| Binding { from: b.from + length, to: b.to + length, ..b }));
         self.binding = binding;
     }
 
-    /// Appends another motion that begins where this one ends. The first waypoint of `next` is the last one of this.
+    /// Appends another motion that begins at the end of this one. The first waypoint of `next` is the last waypoint of
+    /// this motion.
     pub(crate) fn append(&mut self, next: &Self) {
         let start = self.duration();
         self.pieces.extend(next.pieces.iter().map(|p| Piece { start: p.start + start, ..*p }));

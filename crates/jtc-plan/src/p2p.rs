@@ -1,4 +1,4 @@
-//! Point to point.
+//! Point-to-point motions.
 use rsruckig::prelude::{
     DataArrayOrVec, InputParameter, Ruckig, Synchronization, ThrowErrorHandler, Trajectory,
 };
@@ -6,19 +6,20 @@ use rsruckig::prelude::{
 use crate::motion::{Motion, Piece};
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, trapezoid, verify};
 
-/// Length of a motion that leads nowhere, s: a trajectory has two points, and so some time.
+/// Duration of a motion without movement, s: a trajectory has two points and therefore some duration.
 const STANDING: f64 = 0.01;
 
-/// A motion from rest to rest as fast as velocity, acceleration and jerk allow, all joints from the first to the last moment
-/// (Ruckig: Berscheid and Kröger 2021); along a straight line of joint space where that takes no longer. With an `arm` it is slowed
-/// down until its torque suffices, and its speed is within the friction table.
+/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk; all joints move from the first to
+/// the last moment (Ruckig: Berscheid and Kröger 2021). The motion follows a straight line of joint space if that takes
+/// no longer. With an `arm` it is slowed down until its torque suffices, and its speed is within the friction table.
 ///
-/// From a place to the same place it is a rest of 10 ms.
+/// A motion from a place to the same place is a rest of 10 ms.
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::NotFinite`] and [`PlanError::Position`]
-/// for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] where the torque does not suffice at any speed.
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::NotFinite`] and
+/// [`PlanError::Position`] for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] if the torque does not suffice at
+/// any speed.
 pub fn point_to_point(
     from: &JointVec,
     to: &JointVec,
@@ -34,7 +35,7 @@ pub fn point_to_point(
     Ok(reasons::explained(verify::finished(motion, limits, arm)?, limits, arm))
 }
 
-/// The same without torque.
+/// Like [`point_to_point`], without torque.
 fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     if from == to {
         return Ok(standing(from, to, 2));
@@ -45,7 +46,7 @@ fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pl
     ruckig(from, to, limits)
 }
 
-/// A rest, from a place to what counts as the same, at which there are `waypoints`.
+/// Returns a rest from a position to an equivalent one, with `waypoints` waypoints.
 pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Motion {
     let piece = Piece::between(0.0, STANDING, &State::rest(*from), &State::rest(*to));
     let mut times = vec![0.0; waypoints];
@@ -55,7 +56,7 @@ pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Moti
     Motion::new(vec![piece], *to, times)
 }
 
-/// By Ruckig, the joint of the longest way deciding where the others may follow it on a straight line.
+/// Plans by Ruckig; the joint with the longest distance decides whether the others can follow it on a straight line.
 fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     let mut input = InputParameter::<JOINTS>::new(None);
     input.current_position = DataArrayOrVec::Stack(*from);
@@ -83,12 +84,12 @@ fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pla
     Ok(Motion::new(pieces.collect(), *to, vec![0.0, end]))
 }
 
-/// The part of a trajectory in which no joint's jerk changes.
+/// Returns the part of a trajectory in which no joint's jerk changes.
 fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Piece {
     let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
     let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
     trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
-    // Its middle decides which jerk: at the start it may still be the one before.
+    // Its middle selects the jerk: at the start it may still be the previous one.
     let middle = start + 0.5 * length;
     trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);
     let coefficients = std::array::from_fn(|j| [p[j], v[j], 0.5 * a[j], jerk[j] / 6.0, 0.0, 0.0]);

@@ -1,10 +1,10 @@
-//! Ways through joint space, without time.
+//! Paths through joint space, without time.
 use crate::JointVec;
 
-/// A place on a path, with derivatives by the path's parameter.
+/// A point on a path, with derivatives by the path's parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PathPoint {
-    /// rad.
+    /// Position, rad.
     pub position: JointVec,
     /// First derivative, rad per unit of the parameter.
     pub first: JointVec,
@@ -12,44 +12,45 @@ pub struct PathPoint {
     pub second: JointVec,
 }
 
-/// A way through joint space: positions over a parameter from 0 to [`end`](Path::end), with two derivatives by it.
+/// A path through joint space: positions over a parameter from 0 to [`end`](Path::end), with two derivatives by it.
 ///
-/// The first derivative is continuous but at [`stops`](Path::stops), and the position is three times differentiable between two
-/// [`breaks`](Path::breaks). The parameter may be any; one that grows like the joints move makes the best time laws.
+/// The first derivative is continuous except at [`stops`](Path::stops), and the position is three times differentiable
+/// between two [`breaks`](Path::breaks). Any parameter is possible; a parameter proportional to the joint movements
+/// gives the best time laws.
 pub trait Path {
-    /// The parameter's last value, above 0.
+    /// Returns the last value of the parameter, above 0.
     fn end(&self) -> f64;
 
-    /// Place and derivatives at `s`, which is within 0 and the end. At a break they may be those of either side.
+    /// Returns position and derivatives at `s`, which is between 0 and the end. At a break they may belong to either side.
     fn at(&self, s: f64) -> PathPoint;
 
-    /// Which waypoint `s` belongs to, for errors: the last one that was passed, counted from 1.
+    /// Returns the waypoint of `s` for errors: the last one passed, counted from 1.
     fn waypoint(&self, _s: f64) -> Option<usize> {
         None
     }
 
-    /// Parameters, rising, between 0 and the end, where a derivative jumps or the path changes its form. Between two neighbours
-    /// the path should look like one simple curve: it is sampled by a fixed number of places between them.
+    /// Parameters, rising, between 0 and the end, at which a derivative jumps or the path changes its form. Between two
+    /// neighbours the path should look like one simple curve: it is sampled at a fixed number of places between them.
     fn breaks(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Parameters, rising, between 0 and the end, where a motion has to come to rest. They count as breaks.
+    /// Parameters, rising, between 0 and the end, at which a motion must come to rest. These stops count as breaks.
     fn stops(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Parameters, rising, nearest to each waypoint, the ends included.
+    /// Returns the parameters, rising, nearest to each waypoint, including the ends.
     fn waypoints(&self) -> Vec<f64> {
         vec![0.0, self.end()]
     }
 }
 
-/// A path of which the waypoints can be looked up, for motions with given times.
+/// Path with access to its waypoints, for motions with given times.
 pub(crate) trait Waypointed: Path {
-    /// Whether the path does not move between the waypoints with these indices.
+    /// Returns `true` if the path does not move between the waypoints with these indices.
     fn is_one_place(&self, from: usize, to: usize) -> bool;
 
-    /// Whether the path rests at the waypoint with this index.
+    /// Returns `true` if the path rests at the waypoint with this index.
     fn stops_at(&self, waypoint: usize) -> bool;
 }

@@ -1,9 +1,9 @@
-//! Highest speeds that last: between speeding up and slowing down the parameter's acceleration is 0 for a while, so that it need not
-//! change by both in one window.
+//! Plateaus of the highest speeds: between speeding up and slowing down the parameter's acceleration is 0 for a while,
+//! so that it need not change by both in one window.
 use crate::profile::simplified;
 
-/// Lowers every highest speed of a law's `vertices` (parameter, squared speed) until it lasts for `window` seconds, or until it is no
-/// higher than the lowest speed beside it.
+/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until it lasts for `window` seconds, or until
+/// it is no higher than the lowest adjacent speed.
 pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk { done: Vec::with_capacity(vertices.len()), ahead: vertices, next: 0 };
     while walk.next < vertices.len() {
@@ -17,14 +17,14 @@ pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)>
     simplified(walk.done)
 }
 
-/// What lies left and right of the place that is looked at.
+/// Vertices left and right of the current place.
 struct Walk<'a> {
     done: Vec<(f64, f64)>,
     ahead: &'a [(f64, f64)],
     next: usize,
 }
 
-/// A stretch of one squared speed.
+/// An interval with constant squared speed.
 #[derive(Clone, Copy)]
 struct Top {
     from: f64,
@@ -37,7 +37,7 @@ impl Top {
         if self.level > 0.0 { (self.to - self.from) / self.level.sqrt() } else { f64::INFINITY }
     }
 
-    /// The one further down, where the sides lead to `left` and `right`.
+    /// Returns the plateau at the lower `level`; the sides lead to `left` and `right`.
     fn at(&self, level: f64, left: (f64, f64), right: (f64, f64)) -> Self {
         let side = |x: f64, foot: (f64, f64)| {
             let height = self.level - foot.1;
@@ -48,7 +48,7 @@ impl Top {
 }
 
 impl Walk<'_> {
-    /// Lowers the highest speed that ends at the last vertex done, if it is one.
+    /// Lowers the highest speed that ends at the last processed vertex, if it is one.
     fn lower(&mut self, window: f64) {
         let Some((x, level)) = self.done.pop() else { return };
         let mut top = Top { from: x, to: x, level };
@@ -87,7 +87,7 @@ impl Walk<'_> {
     }
 }
 
-/// The highest level, between that of `top` and `lowest`, that lasts for the window.
+/// Returns the highest level, between that of `top` and `lowest`, that lasts for the window.
 fn enough(top: &Top, lowest: f64, left: (f64, f64), right: (f64, f64), window: f64) -> Top {
     let (mut low, mut high) = (lowest, top.level);
     for _ in 0..60 {

@@ -1,7 +1,7 @@
-//! The fastest law of time under limits of the parameter's speed and acceleration alone, which are constant in cells of the path.
+//! The fastest time law under limits of the parameter's speed and acceleration alone, which are constant in cells of the path.
 //!
-//! A law that is averaged over a window afterwards keeps to a cell's limits only if it keeps to them half a window before and
-//! after it, too: cells reach that far beyond their ends.
+//! A law that is averaged over a window afterwards keeps a cell's limits only if it also keeps them half a window
+//! before and after the cell: therefore cells are extended beyond their ends.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -19,15 +19,15 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Half a window longer at both ends, by its own highest speed.
+    /// Returns the bounds extended by half a window at both ends, at their own highest speed.
     fn widened(&self, window: f64, end: f64) -> Self {
         let reach = 0.5 * window * self.cap.sqrt();
         Self { from: (self.from - reach).max(0.0), to: (self.to + reach).min(end), ..*self }
     }
 }
 
-/// Vertices (parameter, squared speed) of the fastest law from rest to rest, between which the squared speed is a straight line; each of
-/// its highest speeds lasts for `window` seconds.
+/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest, between which the squared
+/// speed is linear; each of its highest speeds lasts for `window` seconds.
 pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     let end = cells.last().map_or(0.0, |c| c.to);
     let widened: Vec<Bounds> = cells.iter().map(|c| c.widened(window, end)).collect();
@@ -37,12 +37,12 @@ pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     if window > 0.0 { crate::plateau::flattened(&vertices, window) } else { vertices }
 }
 
-/// Non-negative numbers are ordered as their bits are.
+/// The bits of non-negative numbers have the same order as the numbers.
 fn key(x: f64) -> u64 {
     x.max(0.0).to_bits()
 }
 
-/// The lowest of all limits in every part in which they are constant.
+/// Returns the lowest of all limits in every part in which they are constant.
 fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     let mut order: Vec<usize> = (0..bounds.len()).collect();
     order.sort_by(|&a, &b| bounds[a].from.total_cmp(&bounds[b].from));
@@ -75,7 +75,7 @@ fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     parts
 }
 
-/// Highest squared speeds at the ends of the parts: what can be reached from the start and stopped from before the end.
+/// Returns the highest squared speeds at the ends of the parts that can be reached from the start and stopped before the end.
 fn speeds(parts: &[Bounds]) -> Vec<f64> {
     let mut nodes = vec![0.0; parts.len() + 1];
     for (i, part) in parts.iter().enumerate() {
@@ -89,7 +89,7 @@ fn speeds(parts: &[Bounds]) -> Vec<f64> {
     nodes
 }
 
-/// In every part up, along the cap where it is reached, and down.
+/// Returns the vertices of all parts: up, along the cap if it is reached, and down.
 fn vertices(parts: &[Bounds], nodes: &[f64]) -> Vec<(f64, f64)> {
     let mut vertices = vec![(0.0, 0.0)];
     for (part, pair) in parts.iter().zip(nodes.windows(2)) {
@@ -109,7 +109,7 @@ fn vertices(parts: &[Bounds], nodes: &[f64]) -> Vec<(f64, f64)> {
     simplified(vertices)
 }
 
-/// Without vertices that are none.
+/// Removes redundant vertices.
 pub(crate) fn simplified(vertices: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::with_capacity(vertices.len());
     for (i, vertex) in vertices.iter().enumerate() {

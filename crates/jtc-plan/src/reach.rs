@@ -1,4 +1,4 @@
-//! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018), as `copp` computes it.
+//! Time-optimal path parameterisation by reachability analysis (Pham and Pham 2018), as implemented in `copp`.
 use copp::constraints::Constraints;
 use copp::solver::topp2_ra::{ReachSet2OptionsBuilder, Topp2ProblemBuilder, topp2_ra};
 use nalgebra::DMatrixView;
@@ -7,21 +7,21 @@ use crate::cells::{Cell, End, Room};
 use crate::path::PathPoint;
 use crate::{ArmDynamics, JOINTS, Limits};
 
-/// Rows of a place: acceleration and torque of each joint, both ways.
+/// Number of rows per point: acceleration and torque of each joint, both directions.
 const ROWS: usize = 4 * JOINTS;
 
-/// Of squared speeds, when the highest is 1.
+/// Tolerance of squared speeds, relative to the highest.
 const TOLERANCE: f64 = 1e-12;
 
-/// One place's limits, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
+/// Limits of one place, per row: by_speed·ṡ² + by_acceleration·s̈ ≤ limit.
 struct Rows {
     by_speed: [f64; ROWS],
     by_acceleration: [f64; ROWS],
     limit: [f64; ROWS],
 }
 
-/// Vertices (parameter, squared speed) of the fastest law from rest to rest along the cells, whose squared speed is `caps` at most and
-/// whose accelerations and torques are `shares` of their limits at most.
+/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Its squared
+/// speed is at most `caps`, and its accelerations and torques are at most `shares` of their limits.
 pub(crate) fn fastest(
     cells: &[Cell],
     caps: &[f64],
@@ -31,20 +31,20 @@ pub(crate) fn fastest(
 ) -> Result<Vec<(f64, f64)>, String> {
     let places: Vec<f64> = cells.iter().map(|c| c.from).chain(cells.last().map(|c| c.to)).collect();
     let count = places.len();
-    // The lower of the caps on either side of a place.
+    // Lower of the caps on both sides of a point.
     let cap = |i: usize| {
         let (left, right) = (caps[i.saturating_sub(1)], caps[i.min(count - 2)]);
         left.min(right).clamp(1e-18, 1e18)
     };
     let caps_of_places: Vec<f64> = (0..count).map(cap).collect();
-    // In a unit of time in which the highest speed is 1: copp's tolerances are absolute.
+    // In a unit of time in which the highest speed is 1, because copp's tolerances are absolute.
     let unit = caps_of_places.iter().copied().fold(0.0, f64::max);
     let in_units: Vec<f64> = caps_of_places.iter().map(|cap| cap / unit).collect();
     let mut constraints = Constraints::with_capacity(JOINTS, count);
     let failed = |e: copp::diag::ConstraintError| e.to_string();
     constraints.with_s(places.as_slice()).map_err(failed)?;
     constraints.with_constraint_1order(in_units.as_slice(), 0).map_err(failed)?;
-    // A place belongs to the cell after it, and where that looks otherwise, also to the cell before it.
+    // A place belongs to the cell after it, and, if its derivatives differ there, also to the cell before it.
     let share = |i: usize| shares[i.saturating_sub(1)].min(shares[i.min(count - 2)]);
     let end = |i: usize| cells.get(i).map_or(&cells[count - 2].ends[1], |cell| &cell.ends[0]);
     let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm).in_units(unit);
@@ -72,13 +72,13 @@ pub(crate) fn fastest(
     Ok(places.into_iter().zip(squares.into_iter().map(|square| square * unit)).collect())
 }
 
-/// Whether a path goes on otherwise than it came.
+/// Returns `true` if the derivatives of the path differ between two points.
 fn differ(a: &PathPoint, b: &PathPoint) -> bool {
     let far = |a: f64, b: f64| (a - b).abs() > 1e-9 * (1.0 + a.abs() + b.abs());
     (0..JOINTS).any(|j| far(a.first[j], b.first[j]) || far(a.second[j], b.second[j]))
 }
 
-/// Adds the rows of the places from the one with index `first` on.
+/// Adds the rows of the points from index `first` on.
 fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<(), String> {
     let flat = |part: fn(&Rows) -> &[f64; ROWS]| -> Vec<f64> { rows.iter().flat_map(|r| *part(r)).collect() };
     let (a, b, c) = (flat(|r| &r.by_speed), flat(|r| &r.by_acceleration), flat(|r| &r.limit));
@@ -90,7 +90,7 @@ fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<
 }
 
 impl Rows {
-    /// With squared speeds and accelerations of the parameter in this unit, and rows of about 1.
+    /// Returns the rows with squared speeds and accelerations of the parameter in this unit, scaled to about 1.
     fn in_units(mut self, unit: f64) -> Self {
         for row in 0..ROWS {
             let size =

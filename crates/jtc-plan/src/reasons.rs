@@ -1,41 +1,42 @@
-//! Why a motion is not faster, at each moment of it.
+//! Reasons why a motion is not faster, at each moment.
 use jtc_wire::Joint;
 
 use crate::binding::{Binding, LimitKind};
 use crate::motion::Motion;
 use crate::{ArmDynamics, JOINTS, Limits, verify};
 
-/// From this share of it on a limit binds.
+/// Share of a limit from which it counts as binding.
 const BINDS: f64 = 0.985;
-/// Distance of the samples, s, and how many there are at most.
+/// Distance of the samples, s, and their maximum number.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// How far from a moment, s, what binds it may be: the ramps of the acceleration are that long, and it is slow in a corner for that which is
-/// ahead.
+/// Maximum distance in time of the binding limit from a moment, s: the ramps of the acceleration are that long, and
+/// before a corner the motion is slow because of the limit ahead.
 const NEAR: f64 = 0.05;
-/// Torque below this share of its limit is what holds the arm, which no speed changes.
+/// Share of the torque limit below which the torque counts as holding torque, which no speed changes.
 const TORQUE: f64 = 0.9;
-/// What is shorter than this, s, belongs to what was before it.
+/// Intervals shorter than this, s, are merged into the one before.
 const SHORT: f64 = 0.004;
 
-/// A limit and how much of it is used, as a share of the speed at which it is used up.
+/// A limit and its use, as a share of the speed at which it is reached.
 type Use = (f64, Joint, LimitKind);
 
-/// What binds a motion.
+/// Binding limits of a motion.
 pub(crate) struct Reasons {
-    /// Where a limit is used up, that.
+    /// Limits that are used up.
     pub used_up: Vec<Binding>,
-    /// Everywhere, what the motion was slowed down for as a whole, or else the limit that comes closest around there.
+    /// At all times: the limit for which the whole motion was slowed down, or else the limit that comes closest around
+    /// that time.
     otherwise: Vec<Binding>,
 }
 
-/// The motion with what binds it.
+/// Returns the motion with its binding limits.
 pub(crate) fn explained(mut motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Motion {
     motion.binding = find(&motion, limits, arm).joined(motion.duration());
     motion
 }
 
-/// Finds what binds a motion.
+/// Finds the binding limits of a motion.
 pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> Reasons {
     let limits = &verify::with_table(limits, arm);
     let duration = motion.duration();
@@ -54,10 +55,10 @@ pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) 
     Reasons { used_up: runs(used_up, step), otherwise }
 }
 
-/// The limit that is used most at `time`, and the one that is used up.
+/// Returns the limit with the highest use at `time`, and the limit that is reached.
 fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
     let state = motion.at(time);
-    // What holds the arm is looked at only where the torque is near what the margin leaves.
+    // The holding torque is computed only if the torque is near the limit less the margin.
     let torque = arm.map(|arm| {
         let torque = arm.torque(&state);
         let least = |j: usize| (1.0 - limits.margin[j]) * limits.torque[j];
@@ -90,9 +91,9 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
     (most, used_up)
 }
 
-/// The highest use within `reach` samples of each.
+/// Returns the highest use within `reach` samples of each sample.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
-    // Indices whose uses fall: the first one is the highest of those within reach.
+    // Indices with falling uses: the first one is the highest within reach.
     let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;
     let at = |i: usize| {
@@ -111,7 +112,7 @@ fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
     (0..uses.len()).map(at).collect()
 }
 
-/// Samples one after the other that are alike.
+/// Returns runs of equal consecutive samples.
 fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) -> Vec<Binding> {
     let mut runs: Vec<Binding> = Vec::new();
     for (i, sample) in samples.enumerate() {
@@ -128,7 +129,8 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
 }
 
 impl Reasons {
-    /// One for all of a motion that takes `duration` s: what is used up, and between that what binds otherwise.
+    /// Returns one list for a motion that takes `duration` s: the limits that are used up, and between them the other
+    /// binding limits.
     pub fn joined(&self, duration: f64) -> Vec<Binding> {
         let mut all: Vec<Binding> = Vec::new();
         let mut take = |next: Binding| match all.last_mut() {

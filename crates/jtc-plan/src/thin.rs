@@ -1,14 +1,15 @@
-//! Fewer waypoints on the same way.
+//! Thinning of waypoints on the same path.
 use crate::JointVec;
 use crate::distance::distance;
 
-/// Share of the blend that waypoints may be apart which are left out: the line between them is then within the blend of one of them.
+/// Maximum distance of dropped waypoints, as a share of the blend: the line between them is then within the blend of one of them.
 const GAP_SHARE: f64 = 0.9;
-/// Most waypoints that are left out in a row.
+/// Maximum number of consecutive dropped waypoints.
 const ROW_MAX: usize = 256;
 
-/// Indices of the positions that are kept, rising: both ends, those that have to stay (`stays`), and as many others as it takes for all that
-/// are left out to be within `share` of the blend of the straight line between their kept neighbours, along which they follow each other.
+/// Returns the indices of the positions that are kept, rising: both ends, the positions that must stay (`stays`), and
+/// as many others as needed. Every position left out is then within `share` of the blend of the straight line between
+/// its kept neighbours, and the positions follow each other along this line.
 pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f64) -> Vec<usize> {
     let last = positions.len() - 1;
     let dense = |i: usize| distance(&positions[i - 1], &positions[i]) <= GAP_SHARE * blend;
@@ -31,7 +32,7 @@ pub(crate) fn kept(positions: &[JointVec], stays: &[bool], blend: f64, share: f6
     kept
 }
 
-/// Whether what is between the two positions lies no further than `most` from the line between them, one after the other.
+/// Returns `true` if the positions between the two are at most `most` from the line between them, in order along it.
 fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     let (a, b) = (&positions[from], &positions[to]);
     let mut before = 0.0;
@@ -44,7 +45,7 @@ fn follows(positions: &[JointVec], from: usize, to: usize, most: f64) -> bool {
     })
 }
 
-/// Where on the way from `a` (0) to `b` (1) the place nearest to `q` is.
+/// Returns the share of the way from `a` (0) to `b` (1) at which the line is nearest to `q`.
 pub(crate) fn along(a: &JointVec, b: &JointVec, q: &JointVec) -> f64 {
     let (mut product, mut square) = (0.0, 0.0);
     for ((a, b), q) in a.iter().zip(b).zip(q) {

@@ -1,4 +1,4 @@
-//! Through waypoints, with given times.
+//! Motions through waypoints, with given times.
 use jtc_wire::Joint;
 
 use crate::along::{Choices, along_at};
@@ -9,28 +9,30 @@ use crate::{
     ArmDynamics, BlendedPath, JointVec, Limits, Motion, PlanError, along, choose, p2p, reasons, verify, warp,
 };
 
-/// How near a motion passes a waypoint to the time that was given for it, s: half a tick of the controller.
+/// Maximum deviation from a given time of a waypoint, s: half a tick of the controller.
 const ON_TIME: f64 = 5e-4;
-/// How often the speeds between given times are corrected.
+/// Maximum number of corrections of the speeds between given times.
 const CORRECTIONS: usize = 60;
-/// Share of the time wanted that the speed is lowered to: what is left over is done by running it slower.
+/// Share of the wanted time for which the speed is lowered; the remainder is reached by running the part slower.
 const AIM: f64 = 0.98;
-/// By how much later than refused a time is sure to be possible, where it was refused only because its neighbours leave nothing over.
+/// Factor that makes a refused time certainly possible, if the time was refused only because its neighbours leave no
+/// margin.
 const SURE: f64 = 1.05;
-/// What is left over of the speed where no time is given, each time that this is not possible, and at least.
+/// Share of the speed that is used if no time is given: the factor for each failed attempt, and the lowest share.
 const ROOM: f64 = 0.97;
 const ROOM_MIN: f64 = 0.8;
-/// How often in a row a part may take too long at full speed while its neighbours' speeds are corrected.
+/// Largest number of times in a row that a part may take too long at full speed while its neighbours' speeds are
+/// corrected.
 const LATE_MAX: usize = 4;
-/// The slowest share of the speed.
+/// Slowest share of the speed.
 const SLOWEST: f64 = 1e-4;
 
 /// A waypoint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waypoint {
-    /// rad.
+    /// Position, rad.
     pub position: JointVec,
-    /// When the motion is to be nearest to it, s from the start; `None`: as soon as it can be.
+    /// Time at which the motion is nearest to the waypoint, s from the start; `None`: as soon as possible.
     pub time: Option<f64>,
 }
 
@@ -40,18 +42,20 @@ impl From<JointVec> for Waypoint {
     }
 }
 
-/// From the first waypoint to the last, as fast as the limits allow, on straight legs whose corners are rounded within `blend` rad (see
-/// [`BlendedPath`]); 0: a stop at each waypoint. Where it is faster the arm stops at a corner, or waypoints closer to each other than the
-/// blend are passed on a straighter line, within the blend of each of them. Waypoints that are all the same are a rest of 10 ms.
+/// Plans a motion from the first waypoint to the last, as fast as the limits allow, on straight legs whose corners are
+/// rounded within `blend` rad (see [`BlendedPath`]); 0: a stop at each waypoint. If that is faster, the arm stops at a
+/// corner, or waypoints closer to each other than the blend are passed on a straighter line, within the blend of each
+/// of them. Waypoints that are all the same give a rest of 10 ms.
 ///
-/// A waypoint with a time is passed at that time, to half a millisecond; where it could be earlier, the motion since the waypoint
-/// with a time before it is slower; between waypoints at one place the arm rests. Legs without a time after them are as fast as they can be.
+/// A waypoint with a time is passed at that time, to half a millisecond. If it could be passed earlier, the motion
+/// since the previous waypoint with a time is slowed down; between waypoints at one place the arm rests. Legs without a
+/// time after them are as fast as possible.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`] and [`PlanError::Position`] for one that is none or
-/// outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not rise from 0, [`PlanError::TooEarly`] for one
-/// that the limits do not allow, and those of [`along`](crate::along).
+/// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`] and [`PlanError::Position`] for a
+/// waypoint that is invalid or outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not rise
+/// from 0, [`PlanError::TooEarly`] for a time that the limits do not allow, and the errors of [`along`](crate::along).
 pub fn through(
     waypoints: &[Waypoint],
     blend: f64,
@@ -89,8 +93,8 @@ pub fn through(
     }
 }
 
-/// From the first waypoint of a route to its last, as fast as the limits allow. `times` are those of its waypoints, as those of [`Waypoint`];
-/// they are kept as in [`through`].
+/// Plans a motion from the first waypoint of a route to its last, as fast as the limits permit. `times` are the times
+/// of its waypoints, as in [`Waypoint`]; they are kept as in [`through`].
 ///
 /// # Errors
 ///
@@ -113,7 +117,7 @@ pub fn on_route(
     if given.len() < 2 { along(route, limits, arm) } else { on_time(route, &given, limits, arm) }
 }
 
-/// A rest at waypoints that are all the same, until the last time that was given.
+/// Returns a rest at equal waypoints, until the last given time.
 fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     let mut rest = p2p::standing(&positions[0], &positions[positions.len() - 1], positions.len());
     let last = given[given.len() - 1];
@@ -125,7 +129,7 @@ fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     rest
 }
 
-/// Index and time of the waypoints that have one, the first one at 0 in any case.
+/// Returns index and time of the waypoints that have a time; the first one is always at 0.
 fn given_times(waypoints: &[Waypoint]) -> Result<Vec<(usize, f64)>, PlanError> {
     let mut given: Vec<(usize, f64)> = vec![(0, 0.0)];
     for (i, waypoint) in waypoints.iter().enumerate() {
@@ -147,11 +151,11 @@ struct Stretch {
     /// Indices of the waypoints.
     from: usize,
     to: usize,
-    /// Time wanted, s.
+    /// Wanted time, s.
     wanted: f64,
-    /// Of the speed.
+    /// Share of the speed.
     share: f64,
-    /// How often in a row it took too long at full speed.
+    /// Number of times in a row that the stretch took too long at full speed.
     late: usize,
 }
 
@@ -161,7 +165,7 @@ impl Stretch {
     }
 }
 
-/// Corrects the speed between every two given times until all are kept.
+/// Corrects the speed between each two given times until all times are kept.
 fn on_time(
     path: &impl Waypointed,
     given: &[(usize, f64)],
@@ -175,7 +179,7 @@ fn on_time(
         share: 1.0,
         late: 0,
     };
-    // Between waypoints at one place the arm rests.
+    // Between waypoints at one position the arm rests.
     let (rests, mut stretches): (Vec<Stretch>, Vec<Stretch>) =
         given.windows(2).map(between).partition(|s| path.is_one_place(s.from, s.to));
     let motion = moving_on_time(path, &mut stretches, limits, arm)?;
@@ -189,8 +193,8 @@ fn on_time(
     Ok(motion)
 }
 
-/// The same for those between whose waypoints the arm moves: the speed of each is lowered until it takes nearly as long as it is to, and the
-/// rest is done by running it at another rate.
+/// Keeps the times of stretches in which the arm moves. Lowers the speed of each until its duration is nearly the
+/// wanted one; a change of rate corrects the remainder.
 fn moving_on_time(
     path: &impl Waypointed,
     stretches: &mut [Stretch],
@@ -198,7 +202,7 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Of the speed where no time is given: less where changing the rates leaves nothing over.
+    // Share of the speed if no time is given: lower if changing the rates leaves no margin.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {
@@ -210,7 +214,7 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // Its neighbours may still become faster, but not those of the fastest motion.
+        // The neighbours may still become faster, but not those of the fastest motion.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
             return Err(too_early(late, motion, limits, arm));
@@ -220,7 +224,7 @@ fn moving_on_time(
         if stretches.iter().all(|s| is_near(s) || between_rests(s)) {
             let warped = warp::warped(&motion, &parts(stretches, &motion), limits);
             let warped = verify::finished(warped, limits, arm)?;
-            // Errors add up.
+            // Errors accumulate.
             let mut off = 0.0;
             let on_time = stretches.iter().all(|s| {
                 off += s.takes(&warped) - s.wanted;
@@ -237,7 +241,7 @@ fn moving_on_time(
             s.share = (s.share * damped).clamp(SLOWEST, 1.0);
         }
     }
-    // One that is as fast as it can be leaves nothing over for going over from one rate to the next.
+    // A stretch at full speed leaves no margin for the transition from one rate to the next.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {
@@ -246,7 +250,7 @@ fn moving_on_time(
     }
 }
 
-/// The stretches as parts of a motion, with those between them that have no time.
+/// Returns the stretches as parts of a motion, with the parts without a time between them.
 fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     let times = &motion.waypoint_times;
     let mut parts = Vec::with_capacity(stretches.len() + 1);
@@ -264,7 +268,7 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     parts
 }
 
-/// What limits a stretch that takes longer than it may.
+/// Returns the error for a stretch that takes longer than it may, with the limit that binds it.
 fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> PlanError {
     let motion = reasons::explained(motion, limits, arm);
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);
@@ -287,7 +291,7 @@ fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDy
     }
 }
 
-/// Where no limit is used up, the given times bind.
+/// If no limit is reached, the given times bind.
 fn with_given_times(binding: &mut Vec<Binding>, motion: &Motion, stretches: &[Stretch]) {
     let mut all: Vec<Binding> = Vec::new();
     for s in stretches {
@@ -308,7 +312,7 @@ fn with_given_times(binding: &mut Vec<Binding>, motion: &Motion, stretches: &[St
     binding.sort_by(|a, b| a.from.total_cmp(&b.from));
 }
 
-/// The joint that moves most at `time`.
+/// Returns the joint that moves most at `time`.
 fn fastest_joint(motion: &Motion, time: f64) -> Joint {
     let speeds = motion.at(time).velocity;
     let faster = |a: Joint, b: Joint| if speeds[b.index()].abs() > speeds[a.index()].abs() { b } else { a };

@@ -4,40 +4,41 @@ use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
+/// Share of a joint's torque limit that holding the joint may use, without friction: 98 % have been observed to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of what standing leaves of a torque limit that a motion may use, whatever the margin is, and the least as a share of the limit.
+/// Share of the torque left by holding that a motion may use for every margin, and its least value as a share of the
+/// limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
-/// What the torque of a motion is computed with: the arm with its payload, the inertia of its rotors, and the friction
-/// compensation that the controller adds (J-40, J-42, J-60).
+/// Model for the torque of a motion: the arm with its payload, the inertia of its rotors, and the friction compensation
+/// that the controller adds (J-40, J-42, J-60).
 #[derive(Clone, Debug)]
 pub struct ArmDynamics<'a> {
     dynamics: Dynamics,
     rotor: JointVec,
     friction: Option<&'a Friction>,
-    /// Bearing temperatures, °C: of both the one counts that takes more torque.
+    /// Bearing temperatures, °C: the one with the higher torque counts.
     temperatures: [f64; 2],
     sign_width: f64,
     ranges: FrictionRanges,
 }
 
-/// Steps of speed for which the range of a joint's friction is kept.
+/// Number of speed steps for which the range of a joint's friction is stored.
 const STEPS: usize = 128;
 
 /// Per joint, the lowest and highest friction (N·m) of all speeds from 0 up to each step, backward and forward.
 #[derive(Clone, Debug)]
 struct FrictionRanges {
-    /// rad/s.
+    /// Step of speed, rad/s.
     step: JointVec,
     ranges: Vec<[[(f64, f64); STEPS + 1]; 2]>,
 }
 
 impl<'a> ArmDynamics<'a> {
-    /// The arm `model` with the payload, gravity and rotors of `config`, and `friction` where it is compensated for, at a bearing
-    /// temperature of 30 °C.
+    /// Creates the model from the arm `model` with the payload, gravity and rotors of `config`, and `friction` if it is
+    /// compensated for, at a bearing temperature of 30 °C.
     pub fn new(config: &Config, model: &ArmModel, friction: Option<&'a Friction>) -> Self {
         let step = config.joints.each_ref().map(|j| j.velocity_max / STEPS as f64);
         let arm = Self {
@@ -51,23 +52,23 @@ impl<'a> ArmDynamics<'a> {
         arm.with_ranges()
     }
 
-    /// The same at another bearing temperature, °C.
+    /// Returns the model at another bearing temperature, °C.
     pub fn at_temperature(self, temperature: f64) -> Self {
         self.at_temperatures([temperature; 2])
     }
 
-    /// The same at two bearing temperatures, °C. Everywhere the one counts at which the torque is higher: cold bearings take more to
-    /// speed up, and warm ones more to slow down.
+    /// Returns the model at two bearing temperatures, °C. The temperature with the higher torque counts in every state:
+    /// cold bearings need more to speed up, and warm bearings more to slow down.
     pub fn at_temperatures(self, temperatures: [f64; 2]) -> Self {
         Self { temperatures, ..self }.with_ranges()
     }
 
-    /// The controller compensates for friction.
+    /// Returns `true` if the controller compensates for friction.
     pub(crate) fn has_friction(&self) -> bool {
         self.friction.is_some()
     }
 
-    /// Speed at which the sign of the friction polynomial is whole, rad/s; `None` where there is none.
+    /// Returns the speed at which the sign of the friction polynomial reaches ±1, rad/s; `None` without a polynomial.
     pub(crate) fn sign_width(&self) -> Option<f64> {
         matches!(self.friction, Some(Friction::Polynomial(_))).then_some(self.sign_width)
     }
@@ -87,7 +88,7 @@ impl<'a> ArmDynamics<'a> {
         self
     }
 
-    /// Lowest and highest friction of the joint with index `j` at all speeds from 0 to `fastest` (rad/s, signed), N·m.
+    /// Returns the lowest and highest friction of the joint with index `j` at all speeds from 0 to `fastest` (rad/s, signed), N·m.
     pub(crate) fn friction_range(&self, j: usize, fastest: f64) -> (f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0);
@@ -102,7 +103,8 @@ impl<'a> ArmDynamics<'a> {
         (low.min(friction.0), high.max(friction.1))
     }
 
-    /// The same without jumps: low and high, those of a step later between the steps on a straight line, and the slopes of both by the speed.
+    /// Returns a continuous friction: low and high, with the values of the next step interpolated linearly, and the
+    /// slopes of both by the speed.
     pub(crate) fn friction_line(&self, j: usize, fastest: f64) -> (f64, f64, f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0, 0.0, 0.0);
@@ -126,7 +128,7 @@ impl<'a> ArmDynamics<'a> {
         (low + u * low_by, high + u * high_by, low_by * by, high_by * by)
     }
 
-    /// Joint torques that the controller commands at `state` where the arm follows exactly, N·m.
+    /// Returns the joint torques that the controller commands at `state` if the arm follows exactly, N·m.
     pub fn torque(&self, state: &State) -> JointVec {
         let mut torque = self.rigid(&state.position, &state.velocity, &state.acceleration);
         for (j, torque) in torque.iter_mut().enumerate() {
@@ -135,9 +137,10 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Torque that a motion may use of the joint with index `j` where holding the arm takes `hold`, N·m: its limit less the margin. Where
-    /// gravity, with the friction of the first movement, leaves less, a quarter of what they leave of the limit is added to them, and at
-    /// least 2 % of the limit: a pose that can be held can be left and reached.
+    /// Returns the torque that a motion may use of the joint with index `j` if holding the arm takes `hold`, N·m: its
+    /// limit less the margin. If gravity and the friction of the first movement leave less, the result is their sum
+    /// plus a quarter of the remaining limit, and at least plus 2 % of the limit: a pose that can be held can be left
+    /// and reached.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {
@@ -148,7 +151,7 @@ impl<'a> ArmDynamics<'a> {
         ((1.0 - margin) * whole).max(needed).min(whole)
     }
 
-    /// Highest friction of the joint with index `j` up to the speed at which its sign is whole, N·m.
+    /// Returns the highest friction of the joint with index `j` up to the speed at which its sign is fully applied, N·m.
     pub(crate) fn breakaway(&self, j: usize) -> f64 {
         let of = |speed: f64| {
             let (low, high) = self.friction_range(j, speed);
@@ -157,19 +160,20 @@ impl<'a> ArmDynamics<'a> {
         of(self.sign_width).max(of(-self.sign_width))
     }
 
-    /// Joint torques that hold the arm at rest, N·m.
+    /// Returns the joint torques that hold the arm at rest, N·m.
     pub fn holding(&self, position: &JointVec) -> JointVec {
         self.dynamics.inverse(position, &[0.0; JOINTS], &[0.0; JOINTS])
     }
 
-    /// Torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m, at the temperature at which it
-    /// and the torque `rigid` take more together. Velocities that the table does not have count as its nearest.
+    /// Returns the torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m, at
+    /// the temperature with the larger total of friction and `rigid`. Velocities outside the table count as the nearest
+    /// one in it.
     pub(crate) fn friction(&self, j: usize, velocity: f64, rigid: f64) -> f64 {
         let (low, high) = self.frictions(j, velocity);
         if (rigid + high).abs() >= (rigid + low).abs() { high } else { low }
     }
 
-    /// The lower and the higher one at both temperatures.
+    /// Returns the lower and the higher friction of both temperatures.
     fn frictions(&self, j: usize, velocity: f64) -> (f64, f64) {
         let [first, second] = self.temperatures;
         let friction = self.friction_at(j, velocity, first);
@@ -194,7 +198,8 @@ impl<'a> ArmDynamics<'a> {
         }
     }
 
-    /// Highest speed of the joint with index `j` that the friction table has either way, rad/s (J-36); infinite without a table.
+    /// Returns the highest speed of the joint with index `j` in the friction table in both directions, rad/s (J-36);
+    /// infinite without a table.
     pub(crate) fn velocity_max(&self, j: usize) -> f64 {
         match self.friction {
             Some(Friction::Table(tables)) => {
@@ -205,7 +210,7 @@ impl<'a> ArmDynamics<'a> {
         }
     }
 
-    /// Torque without friction at `position` with these velocities and accelerations, rotors included, N·m.
+    /// Returns the torque without friction at `position` with these velocities and accelerations, including rotors, N·m.
     pub(crate) fn rigid(
         &self,
         position: &JointVec,

@@ -1,20 +1,20 @@
-//! Motions without a limit of jerk: trapezoids of speed.
+//! Motions without a jerk limit: trapezoids of speed.
 use crate::motion::{Motion, Piece};
 use crate::{JOINTS, JointVec, Limits};
 
 /// A trapezoid of speed from rest to rest.
 #[derive(Clone, Copy, Debug)]
 struct Trapezoid {
-    /// With the sign of the way.
+    /// Acceleration, with the sign of the movement.
     acceleration: f64,
-    /// s, to the highest speed and from it.
+    /// Time to the highest speed and from it, s.
     ramp: f64,
-    /// s.
+    /// Time at the highest speed, s.
     cruise: f64,
 }
 
 impl Trapezoid {
-    /// The fastest one.
+    /// Returns the fastest trapezoid.
     fn new(way: f64, velocity: f64, acceleration: f64) -> Self {
         let distance = way.abs();
         if distance == 0.0 {
@@ -29,7 +29,7 @@ impl Trapezoid {
         2.0 * self.ramp + self.cruise
     }
 
-    /// The same way in `factor` times the time.
+    /// Returns the same path in `factor` times the time.
     fn stretched(&self, factor: f64) -> Self {
         Self {
             acceleration: self.acceleration / (factor * factor),
@@ -38,7 +38,7 @@ impl Trapezoid {
         }
     }
 
-    /// Way, speed and acceleration at `t`, where the acceleration is that after `t`.
+    /// Returns distance, speed and acceleration at `t`; the acceleration is the value after `t`.
     fn at(&self, t: f64) -> (f64, f64, f64) {
         let (a, top) = (self.acceleration, self.acceleration * self.ramp);
         let left = self.duration() - t;
@@ -52,7 +52,8 @@ impl Trapezoid {
     }
 }
 
-/// From rest to rest: on a straight line where that takes no longer, else each joint by itself in the time of the slowest.
+/// Plans from rest to rest: on a straight line if that takes no longer, else each joint separately in the time of the
+/// slowest.
 pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits) -> Motion {
     let way: JointVec = std::array::from_fn(|j| to[j] - from[j]);
     let mut parts: [Trapezoid; JOINTS] =
@@ -69,7 +70,7 @@ pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits
     pieces(from, to, &parts)
 }
 
-/// The law of a straight line over shares of the way, 0 to 1.
+/// Returns the law of a straight line over shares of the way, 0 to 1.
 fn line(way: &JointVec, limits: &Limits) -> Trapezoid {
     let least = |limit: &JointVec| {
         way.iter()

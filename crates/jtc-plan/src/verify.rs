@@ -1,28 +1,28 @@
-//! What a motion uses of its limits, between samples too, and slowing it down until they hold.
+//! Checks how much of its limits a motion uses, between samples too, and slows it down until they hold.
 use jtc_wire::Joint;
 
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Of a limit that the arithmetic may exceed it by.
+/// Share of a limit that rounding may add to it.
 const ROUNDING: f64 = 1e-9;
 /// Distance of the samples of the torque, s.
 const TORQUE_STEP: f64 = 0.004;
-/// What the torque may reach of its limit at the samples: between them it may be higher.
+/// Share of its limit that the torque may reach at the samples: between them it may be higher.
 const TORQUE_SHARE: f64 = 0.9985;
-/// A motion that is made slower than this, as a factor of its time, is bound by what that was done for.
+/// Factor of the time above which the limit that caused the slowdown counts as binding.
 const MUCH: f64 = 1.01;
-/// Samples of the torque at most; a longer motion has them further apart.
+/// Maximum number of torque samples; a longer motion has them further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
-/// The slowest that a motion is made for its torque, as a factor of its time.
+/// Maximum factor of the time by which a motion is slowed down for its torque.
 const SLOWEST: f64 = 64.0;
 
-/// The limits with the speeds that the friction table has (J-36).
+/// Returns the limits restricted to the speeds in the friction table (J-36).
 pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
     let mut limits = limits.clone();
     for (j, velocity) in limits.velocity.iter_mut().enumerate() {
-        // A little inside: the last row belongs to the table, what rounds beyond it does not.
+        // Slightly inside: the last row belongs to the table, but a value rounded beyond it does not.
         let table = arm.map_or(f64::INFINITY, |arm| arm.velocity_max(j) * (1.0 - 1e-4));
         *velocity = velocity.min(table);
     }
@@ -52,7 +52,8 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// By what a piece's time has to be multiplied so that velocity, acceleration and jerk hold everywhere in it; below 1 where they do.
+/// Returns the factor by which a piece's time must be multiplied so that velocity, acceleration and jerk hold
+/// everywhere in it; below 1 if they hold.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
@@ -63,7 +64,7 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
         let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
         let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
         let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
-        // What is within its limit counts no further: most is, and roots take time.
+        // Values within their limit need no root: most are within it, and roots take time.
         let root = |share: f64, root: fn(f64) -> f64| if share > 1.0 { root(share) } else { share };
         most = most.max(of(&velocity, limits.velocity[j]));
         most = most.max(root(of(&acceleration, limits.acceleration[j]), f64::sqrt));
@@ -77,11 +78,12 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// By what a piece's time has to be multiplied so that the torque suffices in it, by a few samples: as far as that which depends on the
-/// speed goes. 1 where it suffices, and where nothing that depends on the speed helps.
+/// Returns the factor by which a piece's time must be multiplied so that the torque suffices in it, by a few samples.
+/// Only the part that depends on the speed can be reduced. Returns 1 if the torque suffices, and if no speed would
+/// help.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
-    // Where there is a limit of jerk, no acceleration jumps from one piece to the next, and the end of the one before was looked at with it.
+    // With a jerk limit, no acceleration jumps between pieces, and the end of the previous piece was already checked.
     let same = usize::from(limits.has_jerk());
     for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm).into_iter().skip(same) {
         let state = piece.at(t);
@@ -106,13 +108,13 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
     most
 }
 
-/// A bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth where it is above `limit`: the magnitudes of its
-/// Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
+/// Returns a bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth if it is above `limit`: the
+/// magnitudes of its Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {
     hull(&bernstein(polynomial)[..polynomial.len()], limit, 6)
 }
 
-/// Bernstein coefficients on 0..1.
+/// Returns the Bernstein coefficients on 0..1.
 fn bernstein(polynomial: &[f64]) -> [f64; 5] {
     let degree = polynomial.len() - 1;
     let mut bernstein = [0.0; 5];
@@ -137,7 +139,7 @@ fn hull(b: &[f64], limit: f64, depth: u8) -> f64 {
     if depth == 0 || bound <= limit || bound <= reached * (1.0 + 1e-6) {
         return bound;
     }
-    // Halved (de Casteljau).
+    // Halves the interval (de Casteljau).
     let (mut work, mut left, mut right) = ([0.0; 5], [0.0; 5], [0.0; 5]);
     work[..=n].copy_from_slice(b);
     for i in 0..=n {
@@ -150,7 +152,7 @@ fn hull(b: &[f64], limit: f64, depth: u8) -> f64 {
     hull(&left[..=n], limit, depth - 1).max(hull(&right[..=n], limit, depth - 1))
 }
 
-/// The parts of the torque at a place of the motion, N·m, and where that is.
+/// Parts of the torque at a place of the motion, N·m, and the time of the place.
 struct Load {
     time: f64,
     hold: JointVec,
@@ -174,7 +176,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Those that are over so far: of most there is enough at every speed.
+    // Loads that were exceeded so far: most loads have enough torque at every speed.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -193,10 +195,11 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     Ok(Motion { slowed, ..motion.stretched(factor) })
 }
 
-/// Time, joint, torque and what it may be of a place where the torque does not suffice.
+/// Time, joint, torque and torque limit at a place with too little torque.
 type Over = (f64, Joint, f64, f64);
 
-/// The least factor of the time, above `least`, with which nothing is `over`, and the joint that was last; `whole` are the torque limits.
+/// Returns the least factor of the time, above `least`, for which no place is `over`, and the last such joint; `whole`
+/// are the torque limits.
 fn factor_for(
     motion: &Motion,
     whole: &JointVec,
@@ -224,7 +227,7 @@ fn factor_for(
     Ok((slow, joint))
 }
 
-/// Waypoint, from 1, that was passed last at `time`.
+/// Returns the last waypoint passed at `time`, from 1.
 fn waypoint_at(motion: &Motion, time: f64) -> usize {
     motion.waypoint_times.partition_point(|t| *t <= time).max(1)
 }
@@ -239,7 +242,7 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     Ok(())
 }
 
-/// Whether the arm, if there is one, can be held at a place; `waypoint`, from 1, names it in the error.
+/// Checks that the arm, if there is one, can be held at a place; `waypoint`, from 1, names it in the error.
 pub(crate) fn holds(
     position: &JointVec,
     waypoint: usize,
@@ -258,9 +261,10 @@ pub(crate) fn holds(
     Ok(())
 }
 
-/// Moments of a piece, s from its start, at which its torque is sampled: both ends, since the acceleration may jump there, what lies between
-/// them no further apart than `step`, and where a joint becomes so fast that the sign of its friction is whole. Where its accelerations
-/// are not between those of its ends there are more.
+/// Returns the moments of a piece, s from its start, at which its torque is sampled: both ends, because the
+/// acceleration may jump there, moments between them at most `step` apart, and the moments at which a joint becomes so
+/// fast that the sign of its friction reaches ±1. Pieces whose accelerations exceed those of their ends have more
+/// moments.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
     let count = (piece.length / step).ceil().max(least) as usize;
@@ -278,7 +282,7 @@ fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<
     moments
 }
 
-/// Whether a joint's acceleration in the piece may be outside of those at its ends.
+/// Returns `true` if a joint's acceleration in the piece may be outside of those at its ends.
 fn bulges(piece: &Piece, limits: &Limits) -> bool {
     let h = piece.length;
     piece.coefficients.iter().zip(&limits.acceleration).any(|([_, _, c2, c3, c4, c5], limit)| {
@@ -293,7 +297,7 @@ fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
     let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
     let mut loads = Vec::new();
     for (i, piece) in motion.pieces.iter().enumerate() {
-        // Where there is a limit of jerk, no acceleration jumps from one piece to the next.
+        // With a jerk limit no acceleration jumps between pieces.
         let same = usize::from(i > 0 && limits.has_jerk());
         for t in moments(piece, step, limits, arm).into_iter().skip(same) {
             let s = piece.at(t);

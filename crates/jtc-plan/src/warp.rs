@@ -1,17 +1,17 @@
-//! The same way at other times: parts of a motion run at rates of their own, which go over into each other smoothly.
+//! A motion on the same path at other times: parts of a motion run at their own rates, with smooth transitions between them.
 use crate::Limits;
 use crate::compose::Section;
 use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Time in which one rate becomes the next one at most, s, and as a share of the shorter part.
+/// Maximum time of a change from one rate to the next, s, and as a share of the shorter part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
-/// Slower than this, rad/s, a motion rests.
+/// Speed below which a motion is at rest, rad/s.
 const RESTS: f64 = 1e-9;
 
-/// A part of a motion from the one before to `end` (s), and how long it is to take, s.
+/// Part of a motion from the previous part to `end` (s), and its wanted duration, s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
     pub end: f64,
@@ -32,7 +32,7 @@ impl Path for InTime<'_> {
     }
 }
 
-/// The motion with each part as long as is wanted, to rounding. Its limits have to be looked at anew.
+/// Returns the motion with the wanted duration of each part, up to rounding. Its limits must be checked again.
 pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion {
     let parts: Vec<Part> = parts.iter().copied().filter(|p| p.wanted > 0.0).collect();
     let changes = changes(motion, &parts);
@@ -47,16 +47,16 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
     let section = Section { path: &path, from: 0.0, to, parts_of_path: breaks.len() + 1, breaks, waypoints };
     let mut warped = section.motion(&law, limits);
     warped.end = motion.end;
-    // It begins at rest, exactly.
+    // The motion begins exactly at rest.
     if let Some(first) = warped.pieces.first_mut() {
         first.coefficients.iter_mut().for_each(|c| c[1] = 0.0);
     }
     warped
 }
 
-/// Each part stretched by itself: all of them begin and end at rest.
+/// Stretches each part separately: all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
-    // Per part: end before, begin before and after, factor.
+    // Per part: previous end, start before and after, factor.
     let (mut before, mut after) = (0.0, 0.0);
     let mut scales = Vec::with_capacity(parts.len());
     for part in parts {
@@ -77,7 +77,7 @@ fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
     Motion::new(pieces.collect(), motion.end.position, times)
 }
 
-/// Time of the change of rate at the end of each part but the last, s.
+/// Returns the time of the change of rate at the end of each part except the last, s.
 fn changes(motion: &Motion, parts: &[Part]) -> Vec<f64> {
     let change = |pair: &[Part]| {
         let rests = motion.at(pair[0].end).velocity.iter().all(|v| v.abs() < RESTS);
@@ -86,7 +86,7 @@ fn changes(motion: &Motion, parts: &[Part]) -> Vec<f64> {
     parts.windows(2).map(change).collect()
 }
 
-/// Where in the old motion the new one is when.
+/// Returns the time in the old motion as a law of the time in the new one.
 fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     let begins = std::iter::once(0.0).chain(parts.iter().map(|p| p.end));
     let lengths: Vec<f64> = parts.iter().zip(begins).map(|(p, begin)| p.end - begin).collect();
@@ -113,10 +113,11 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// The rates at which each part is as long as wanted: half of each change happens in the part before, and half in the one after it.
+/// Returns the rates at which each part is as long as wanted: half of each change happens in the part before, and half
+/// in the part after it.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
-    // A twelfth of the change's time: what half of it adds to the way.
+    // A twelfth of the change's time: the contribution of half of it to the distance.
     for _ in 0..60 {
         for i in 0..parts.len() {
             let mut way = lengths[i];

@@ -1,4 +1,4 @@
-//! Paths of any form, bad input, long paths, and what binds.
+//! Paths of any form, bad input, long paths, and binding limits.
 use std::f64::consts::TAU;
 
 use jtc_core::{Config, Parameters, Payload};
@@ -47,7 +47,7 @@ fn a_curve_is_followed_within_all_limits() {
             let path = Lissajous { turns: 2.0, size };
             let motion = along(&path, &limits, Some(&arm)).unwrap();
             let count = (motion.duration() / H) as usize;
-            // The places of the curve next to which the motion is, in order.
+            // Places of the curve next to the motion, in order.
             let mut s = 0.0;
             for k in 0..=count {
                 let p: [JointVec; 4] = std::array::from_fn(|i| motion.at((k + i) as f64 * H).position);
@@ -148,7 +148,7 @@ fn waypoints_at_one_place_are_a_rest() {
     }
 }
 
-/// J-60: what the arm carries decides whether it can be held at the end, and the error says that it is about holding.
+/// J-60: the payload decides whether the arm can be held at the end, and the error names the holding torque.
 #[test]
 fn j60_a_pose_that_cannot_be_held_is_named() {
     let (mut config, parameters) = (Config::avena(), Parameters::avena());
@@ -166,19 +166,19 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");
         assert!(error.to_string().contains("holding the arm there"), "{error}");
     }
-    // Given twice, it is the first one.
+    // If the place is given twice, the error names the first waypoint.
     for blend in [0.0, 0.05] {
         let waypoints = [[0.0; 6], stretched, stretched, [0.0; 6]].map(Waypoint::from);
         let error = through(&waypoints, blend, &limits, Some(&arm)).unwrap_err();
         assert_eq!(error.waypoint(), Some(2), "{error}");
     }
-    // Without the payload it can be held.
+    // Without the payload the arm can be held.
     config.payload = Payload::NONE;
     let arm = ArmDynamics::new(&config, &parameters.model, None);
     assert!(point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).is_ok());
 }
 
-/// J-36: velocities stay inside the friction table, whatever the limits are.
+/// J-36: velocities stay inside the friction table, for all limits.
 #[test]
 fn j36_velocities_stay_inside_the_friction_table() {
     let (config, parameters) = (Config::avena(), Parameters::avena());

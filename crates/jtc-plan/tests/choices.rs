@@ -1,4 +1,4 @@
-//! Whatever is the fastest within the blend is taken, and each second of a motion has a reason.
+//! The fastest option within the blend is used, and each second of a motion has a reason.
 use jtc_core::Config;
 use jtc_plan::{JOINTS, JointVec, LimitKind, Limits, Motion, Waypoint, through};
 use proptest::prelude::*;
@@ -31,7 +31,7 @@ proptest! {
         }
     }
 
-    /// All of a motion has a reason why it is not faster.
+    /// Each part of a motion has a reason for its duration.
     #[test]
     fn what_binds_is_named_for_all_of_a_motion(seed in any::<u64>()) {
         let case = Case::random(seed);
@@ -43,7 +43,8 @@ proptest! {
         prop_assert!(rising && named >= 0.95 * motion.duration(), "seed {}: {} of {} s", seed, named, motion.duration());
     }
 
-    /// Waypoints that lie densely on a smooth curve are hardly slower than a few of them; all of them are passed within the blend.
+    /// Waypoints that lie densely on a smooth curve are hardly slower than a few of them; all are passed within the
+    /// blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);
@@ -65,8 +66,8 @@ proptest! {
     }
 }
 
-/// With twice the limits that are named a motion is faster. In nearly all cases: a law that is limited in jerk is the best of some
-/// attempts, and others are tried with other limits.
+/// With twice the named limits a motion is faster, in nearly all cases: a jerk-limited law is the best of several
+/// attempts, and other attempts are tried with other limits.
 #[test]
 fn what_is_named_is_what_binds() {
     let (mut faster, mut all) = (0, 0);
@@ -84,7 +85,7 @@ fn what_is_named_is_what_binds() {
     assert!(all >= 150 && 100 * faster >= 97 * all, "{faster} of {all}");
 }
 
-/// Twice what binds, for all joints: others may be as close to theirs.
+/// Doubles the binding limits for all joints: other joints may be as close to theirs.
 fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     let mut relaxed = limits.clone();
     for b in motion.binding() {
@@ -99,7 +100,7 @@ fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     relaxed
 }
 
-/// Each waypoint is passed within the blend, and no place is further than that from one.
+/// Checks that each waypoint is passed within the blend, and that no place is further than that from a waypoint.
 fn passes_all(motion: &Motion, positions: &[JointVec], blend: f64, seed: u64) -> Result<(), TestCaseError> {
     let distance = |a: &JointVec, b: &JointVec| (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max);
     let places: Vec<JointVec> =

@@ -1,4 +1,4 @@
-//! Which waypoint an error is about, as a value and in its message.
+//! Waypoint of an error, as a value and in its message.
 use jtc_plan::kinematics::PoseError;
 use jtc_plan::{LimitKind, PlanError};
 use jtc_wire::Joint;
@@ -34,7 +34,7 @@ fn about(waypoint: usize) -> Vec<PlanError> {
     ]
 }
 
-/// The first number behind the word is the value's.
+/// The first number after the word is the value's.
 #[test]
 fn the_waypoint_is_the_one_that_the_message_names() {
     for error in about(17) {

@@ -1,4 +1,4 @@
-//! Lines of the flange that the arm cannot follow: what is wrong, and where.
+//! Lines of the flange that the arm cannot follow: the error and its place.
 use crate::{lines, robots};
 
 use std::f64::consts::PI;
@@ -12,7 +12,8 @@ fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
     FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
 }
 
-/// A spherical wrist turns about axis 5 through 0: the singular pose is met on the way, at the angle where it is near.
+/// A spherical wrist turns about axis 5 through 0: the error occurs on the line, at the angle that counts as near the
+/// singular pose.
 #[test]
 fn a_line_through_a_wrist_singularity_ends_there() {
     let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
@@ -50,7 +51,7 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// To an arm that is stretched but for half a degree.
+/// To an arm that is stretched up to half a degree.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -81,7 +82,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends in reach, but not what is between: the column around the axis of joint 1 that a PUMA 560 cannot enter.
+/// Both ends are in reach, but not the places between them: the column around the axis of joint 1 that a PUMA 560
+/// cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();
@@ -130,7 +132,7 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
     let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
     assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
-    // Where the arm stands already outside.
+    // The arm already stands outside.
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();

@@ -24,7 +24,7 @@ fn small(size: f64) -> impl Strategy<Value = Vec3> {
     prop::array::uniform3(-size..size)
 }
 
-/// The path, or `None` where a line leads past a singular pose or out of reach.
+/// Returns the path, or `None` if a line leads past a singular pose or out of reach.
 fn path(model: &ArmModel, q: &JointVec, legs: &[Leg], blend: f64) -> Option<FlangePath> {
     match FlangePath::new(&Kinematics::new(model, &WIDE), q, legs, blend) {
         Ok(path) => Some(path),
@@ -47,7 +47,8 @@ fn deviation(path: &FlangePath, s: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
 
-    /// Each position on the straight line between the ends, in even steps, and each orientation turned in proportion about one axis.
+    /// Each position is on the straight line between the ends, in even steps, and each orientation is turned in
+    /// proportion about one axis.
     #[test]
     fn lines_are_straight(q in start(), shift in small(0.3), turn in small(0.6)) {
         for (name, model) in arms() {
@@ -57,7 +58,7 @@ proptest! {
             prop_assert_eq!(path.waypoints(), vec![0.0, path.end()]);
             let (whole_shift, whole_turn) = difference(&from, &to);
             prop_assert!((path.end() - whole_shift.max(0.25 * whole_turn)).abs() < 1e-9);
-            // Between two breaks the joints turn by little: the planner takes that for one simple curve.
+            // Between two breaks the joints turn little: the planner treats this as one simple curve.
             let ends: Vec<f64> = [0.0].into_iter().chain(path.breaks()).chain([path.end()]).collect();
             prop_assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{name}: {ends:?}");
             for pair in ends.windows(2) {
@@ -97,7 +98,7 @@ proptest! {
             if !at_break {
                 prop_assert!(deviation(&path, s) < 2e-3, "{name}: {} at {s}", deviation(&path, s));
             }
-            // A blended corner leaves no jump in any of the two.
+            // A blended corner leaves no jump in either of them.
             if path.stops().is_empty() {
                 for corner in path.breaks() {
                     let (before, after) = (path.at(corner - 1e-7), path.at(corner + 1e-7));
@@ -111,7 +112,7 @@ proptest! {
         }
     }
 
-    /// On the circle that was drawn before its points were taken.
+    /// The flange stays on the circle that defines the points.
     #[test]
     fn arcs_are_round(
         q in start(), radius in 0.03..0.2f64, plane in small(3.0), angles in (0.3..3.0f64, 0.3..2.5f64), turn in small(0.4)
@@ -142,7 +143,7 @@ proptest! {
         }
     }
 
-    /// Off the legs within the radius of the corner only, and there inside its triangle.
+    /// The flange leaves the legs only within the radius of the corner, and stays inside its triangle.
     #[test]
     fn corners_are_cut_within_their_radius(
         q in start(), shifts in prop::array::uniform2(small(0.2)), blend in 0.0..0.05f64
@@ -173,7 +174,7 @@ proptest! {
         }
     }
 
-    /// A joint that turns back on the way needs the range up to there, and no more.
+    /// A joint that turns back on the path needs the range up to its turning point, and no more.
     #[test]
     fn a_joint_that_turns_back_needs_the_range_up_to_there(q in start(), shift in small(0.3), turn in small(0.5)) {
         let model = robots::avena();
@@ -201,7 +202,7 @@ proptest! {
                 prop_assert!(with(top + 1e-6).is_ok(), "{:?}", with(top + 1e-6));
                 let refused = match with(top - 1e-6) {
                     Ok(other) => {
-                        // Near a singular pose there may be another way of the joints, which stays inside.
+                        // Near a singular pose the joints may have another path, which stays inside.
                         let at = |k: u32| sign * other.at(other.end() * f64::from(k) / 1000.0).position[joint];
                         prop_assert!((0..=1000).all(|k| at(k) < top));
                         continue;
@@ -211,14 +212,14 @@ proptest! {
                 let (_, distance, source) = on_leg(refused);
                 let PoseError::OutsideLimits { joint: named, .. } = source else { panic!("{source}") };
                 prop_assert_eq!(named.index(), joint);
-                // Where it turns, or where another turn comes as far.
+                // At a turning point of the joint, or at another one that is as far.
                 let short = top - at(distance / free.end());
                 prop_assert!((distance - low * free.end()).abs() < 0.006 || short < 3e-6, "{distance} {low}");
             }
         }
     }
 
-    /// With one joint's range cut short, where it leaves that range on the same path without.
+    /// Cuts one joint's range short: the error is at the place at which the unlimited path leaves that range.
     #[test]
     fn a_limit_on_the_way_is_found_where_it_is(
         q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
@@ -241,7 +242,7 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // Nowhere before.
+                // At no earlier place.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
@@ -254,7 +255,7 @@ proptest! {
     }
 }
 
-/// A motion along a path has the flange on its line at any moment, not only at the places that the planner looks at.
+/// A motion along a path keeps the flange on its line at any moment, not only at the places that the planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {
     let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());

@@ -11,9 +11,9 @@ use jtc_plan::kinematics::{
 use proptest::prelude::*;
 use robots::difference;
 
-/// Each joint a whole turn.
+/// A whole turn for each joint.
 const TURN: [(f64, f64); JOINTS] = [(-PI, PI); JOINTS];
-/// Smallest singular value from which on a pose is away from singular ones.
+/// Smallest singular value of poses that count as away from singular ones.
 const AWAY: f64 = 0.01;
 
 fn positions() -> impl Strategy<Value = JointVec> {
@@ -29,7 +29,7 @@ fn length(a: &JointVec, b: &JointVec) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
 
-/// What holds for every arm and every pose that it reaches.
+/// Checks the properties that hold for every arm and every pose in reach.
 fn check_all(name: &str, model: &ArmModel, q: &JointVec, most: usize) -> Result<(), TestCaseError> {
     let kin = Kinematics::new(model, &TURN);
     let pose = robots::pose(model, q);
@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// Where the closed forms are at their limits: right angles and stretched arms.
+    /// Limits of the closed forms: right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -127,7 +127,7 @@ proptest! {
         }
     }
 
-    /// The default arm in its own limits, where not every solution is.
+    /// The default arm within its own limits, which not every solution satisfies.
     #[test]
     fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
         let limits = robots::avena_limits();
@@ -150,7 +150,7 @@ proptest! {
         }
     }
 
-    /// As a calibration leaves an arm: a milliradian and a millimetre from the geometry with a closed form.
+    /// An arm after a calibration: a milliradian and a millimetre from the geometry with a closed form.
     #[test]
     fn an_arm_off_its_ideal_geometry_is_solved_too(
         q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
@@ -172,7 +172,7 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 comes 0.15005 m beside the axis of joint 1 and as far up as both links reach.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and as high as both links reach.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -192,20 +192,21 @@ fn out_of_reach_says_how_far() {
     assert!((missing - 0.10005).abs() < 1e-6, "{error}");
 }
 
-/// Where the UR5 is stretched to its limit the flange points outwards or sideways, but not back.
+/// At the limit of the UR5's reach the flange points outwards or sideways, but not back.
 #[test]
 fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let model = robots::ur5();
     let kin = Kinematics::new(&model, &TURN);
     let q = [0.3, -1.0, 0.1, -1.5, 0.4, 0.0];
     let mut pose = robots::pose(&model, &q);
-    // A place that is reached, turned by half a turn about the flange's x axis.
+    // A place in reach, turned by half a turn about the flange's x axis.
     pose.rotation = pose.rotation.map(|[x, y, z]| [x, -y, -z]);
     let error = kin.solve(&pose, &q).unwrap_err();
     let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
     assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
     assert!(missing > 0.01 && missing < PI, "{error}");
-    // Turned back by a little more than that, some such orientation is reached; less is not for any axis near.
+    // Turned back by a little more than that, such an orientation is in reach; turned by less, it is not, for any axis
+    // near.
     let turned = |angle: f64| {
         let (s, c) = angle.sin_cos();
         let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
@@ -222,7 +223,7 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // No solution has the joint there, and the others are free.
+        // No solution has the joint at that position, and the other joints are free.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
@@ -261,7 +262,7 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
 }
 
-/// Numbers of all kinds, most of them of no use.
+/// Numbers of all kinds, most of them invalid.
 fn any_number() -> impl Strategy<Value = f64> {
     let special =
         vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];
@@ -271,7 +272,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
-    /// What is no pose, no start or no limit is an error or has no solution; it never panics, and always ends.
+    /// An invalid pose, start or limit gives an error or has no solution; the search never panics, and always ends.
     #[test]
     fn no_number_does_any_harm(
         position in prop::array::uniform3(any_number()), quaternion in prop::array::uniform4(any_number()),
@@ -383,7 +384,7 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
 
-/// By central differences of forward kinematics that share no code with it: the velocity of the flange and the rate of its rotation.
+/// By central differences of independent forward kinematics: the velocity of the flange and the rate of its rotation.
 #[test]
 fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
     let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];

@@ -1,5 +1,6 @@
-//! Random motions on random arms, judged by samples of their positions: no limit is exceeded, no corner is cut by more than the
-//! blend, both ends are met exactly and at rest. `cargo run --profile dist -p jtc-plan --example campaign` judges as many as are wanted.
+//! Random motions on random arms, judged by samples of their positions: no limit is exceeded, no corner is cut by more
+//! than the blend, both ends are met exactly and at rest. `cargo run --profile dist -p jtc-plan --example campaign`
+//! judges any number of them.
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 
@@ -7,7 +8,7 @@ use crate::judge;
 
 use judge::Case;
 
-/// What may be refused: the arm cannot be held somewhere, or carries too much.
+/// Errors that are allowed: the arm cannot be held somewhere, or carries too much.
 fn is_legal(error: &PlanError) -> bool {
     matches!(error, PlanError::Torque { .. })
 }
@@ -40,7 +41,8 @@ proptest! {
         }
     }
 
-    /// Position and state at a moment belong together: velocities are the slopes of positions, accelerations those of velocities.
+    /// Position and state at a moment are consistent: velocities are the slopes of positions, accelerations those of
+    /// velocities.
     #[test]
     fn velocity_and_acceleration_are_the_slopes(seed in any::<u64>()) {
         const H: f64 = 1e-5;

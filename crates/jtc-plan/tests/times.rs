@@ -1,4 +1,4 @@
-//! Given times are kept where the limits allow, and refused where they do not.
+//! Given times are kept if the limits allow, and refused if not.
 use jtc_core::Config;
 use jtc_plan::{LimitKind, Limits, PlanError, Waypoint, through};
 use proptest::prelude::*;
@@ -10,8 +10,8 @@ use judge::Case;
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Some waypoints get later times than the fastest motion has there; these are kept, and all limits too. Only where
-    /// corners are rounded may one be too early: its neighbours, which are slower, slow it down.
+    /// Some waypoints get later times than in the fastest motion; these times and all limits are kept. A time may be
+    /// too early only with rounded corners: slower neighbours slow the waypoint down.
     #[test]
     fn given_times_are_kept(
         seed in any::<u64>(),

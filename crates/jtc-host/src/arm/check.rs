@@ -1,5 +1,5 @@
-//! Whether an arm is physical, complete, held by its drives and within what the controller takes: all that is wrong, not only the
-//! first.
+//! Check of an arm: physical, complete, held by its drives, within the range of the controller. The check lists all findings, not
+//! only the first.
 
 mod borne;
 mod limits;
@@ -17,26 +17,26 @@ pub use self::stability::RotorMargins;
 use super::source::JOINT_KEYS;
 use super::{Arm, PoseError, Source};
 
-/// One thing that was found out about an arm.
+/// Finding of the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmFinding {
-    /// What it is about: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
+    /// Subject: `limit`, `physical`, `drives`, `bounds`, `missing`, `default`, `holding`, `gains`, `too-light`, `damping`,
     /// `unit`, `pose` or `proposed`.
     pub code: &'static str,
-    /// How bad it is (a problem: the controller refuses it), what it is, its cause and what to do.
+    /// Severity (the controller refuses a problem), description, cause and advice.
     #[serde(flatten)]
     pub finding: Finding,
-    /// The joint, where it is about one.
+    /// Joint, if the finding is about one joint.
     pub joint: Option<Joint>,
-    /// Key in the arm file, where it is about one.
+    /// Key in the arm file, if the finding is about one key.
     pub name: Option<&'static str>,
     /// The value, in `unit`.
     pub value: Option<f64>,
-    /// What it is measured by, in `unit`.
+    /// Limit for the value, in `unit`.
     pub limit: Option<f64>,
-    /// Of both.
+    /// Unit of value and limit.
     pub unit: Option<&'static str>,
-    /// The pose in which it is so, rad.
+    /// Pose in which the finding holds, rad.
     pub pose_rad: Option<[f64; JOINTS]>,
 }
 
@@ -68,7 +68,7 @@ impl ArmFinding {
     }
 }
 
-/// What gravity asks of a joint in its worst pose.
+/// Gravity torque of a joint in its worst pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Holding {
     /// The joint.
@@ -77,30 +77,30 @@ pub struct Holding {
     pub torque_nm: f64,
     /// The joint's torque limit, N·m.
     pub limit_nm: f64,
-    /// A pose in which gravity asks for it, rad.
+    /// Pose with this gravity torque, rad.
     pub pose_rad: [f64; JOINTS],
 }
 
-/// The outcome of the check of an arm.
+/// Result of the check of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Checked {
     /// All findings, the worst first.
     pub findings: Vec<ArmFinding>,
-    /// Joint by joint; empty where the numbers allow no such question.
+    /// Gravity torque of each joint; empty if the numbers of the arm do not allow the computation.
     pub holding: Vec<Holding>,
-    /// How far the rotor inertias may be from those of the file; `None` where the gains are not stable, or not given.
+    /// Tolerated factors of the rotor inertias, relative to the file; `None` if the gains are not stable or not given.
     pub rotor_margins: Option<RotorMargins>,
 }
 
 impl Checked {
-    /// A controller would refuse this arm.
+    /// Returns `true` if a controller would refuse this arm.
     pub fn is_refused(&self) -> bool {
         self.findings.iter().any(|f| f.finding.severity == Severity::Problem)
     }
 }
 
 impl Arm {
-    /// All that a person should know before a controller is given this arm.
+    /// Checks the arm and returns all that an operator must know before its parameters go to a controller.
     pub fn check(&self) -> Checked {
         let mut findings = Vec::new();
         self.find_limits(&mut findings);
@@ -122,7 +122,7 @@ impl Arm {
         Checked { findings, holding, rotor_margins }
     }
 
-    /// `joint 2 (shoulder)`, or the number alone where it is the name.
+    /// Returns `joint 2 (shoulder)`, or only the number if the joint's name is its number.
     fn titled(&self, joint: Joint) -> String {
         let name = &self.joint_names[joint.index()];
         if name.replace('_', " ") == joint.to_string() {
@@ -142,7 +142,7 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // Each joint and link by itself, the others being good ones: the check ends at the first fault.
+        // Checks each joint and link alone with valid values for the rest, because the check ends at the first fault.
         let good = Arm::avena().model;
         for index in 0..=JOINTS {
             let mut joint = ArmModel { links: good.links, ..good };
@@ -171,7 +171,7 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a slip", value, None),
             _ => ("a slip", f64::NAN, None),
         };
-        // By its name instead of its number.
+        // Names the part by its name instead of its number.
         let text = error.to_string();
         let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
@@ -216,7 +216,7 @@ impl Arm {
         }
     }
 
-    /// Limits outside the range of their setting (J-53).
+    /// Finds limits outside the range of their setting (J-53).
     fn find_settings(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let config = self.config();
         for joint in Joint::ALL.into_iter().filter(|joint| !faulty.contains(joint)) {
@@ -239,7 +239,8 @@ impl Arm {
         }
     }
 
-    /// Gains, friction and masses; friction is measured by the limits, so joints whose limits are `faulty` are left out.
+    /// Finds gains, friction and masses out of bounds. The joints in `faulty` are left out, because friction is checked against
+    /// their limits.
     fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
         let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {
@@ -277,7 +278,7 @@ impl Arm {
             }));
         }
         let only_numbers = super::ParameterSet { model: None, ..set };
-        // What gains have already been found for is not said twice.
+        // Gains that already have a finding are not reported twice.
         if let Err(error) = only_numbers.check()
             && !findings.iter().any(|f| f.code == "bounds")
         {
@@ -318,7 +319,7 @@ impl Arm {
         });
     }
 
-    /// A finding for each key of joints that comes from `source`.
+    /// Adds a finding for each key of joints that comes from `source`.
     fn find_keys(
         &self,
         findings: &mut Vec<ArmFinding>,
@@ -334,7 +335,7 @@ impl Arm {
         }
     }
 
-    /// Poses in which the limits do not let the arm be.
+    /// Finds poses outside the position limits.
     fn find_poses(&self, findings: &mut Vec<ArmFinding>) {
         for name in self.poses.keys() {
             let Err(PoseError::Outside { joint, value, min, max, .. }) = self.pose(name) else { continue };
@@ -363,7 +364,7 @@ impl Arm {
     }
 }
 
-/// `joint 3`, `joints 1, 2, 4`, `all joints`.
+/// Formats joint numbers: `joint 3`, `joints 1, 2, 4`, `all joints`.
 fn numbers(joints: &[Joint]) -> String {
     let each: Vec<String> = joints.iter().map(|j| j.number().to_string()).collect();
     match joints {

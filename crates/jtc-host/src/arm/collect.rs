@@ -1,4 +1,4 @@
-//! One loader for every file that has parameters, and for a directory full of them.
+//! Loader for every file format with parameters, and for directories of such files.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::csv::{self, Table};
 use super::{Arm, Change, ParameterSet, Warning, is_xml};
 use crate::file::{FileError, read_text};
 
-/// Which friction compensation to take where a file has both.
+/// Friction compensation to use if a file has both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum FrictionChoice {
     /// The polynomial.
@@ -23,7 +23,7 @@ pub enum FrictionChoice {
 /// Parameters from files and directories.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterFile {
-    /// The whole arm, where the file describes one.
+    /// The whole arm, if a file describes one.
     pub arm: Option<Arm>,
     /// Friction polynomial, c0..c5 ascending.
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
@@ -33,9 +33,9 @@ pub struct ParameterFile {
     pub pid: Option<[PidGains; JOINTS]>,
     /// Kinematics and masses.
     pub model: Option<ArmModel>,
-    /// Files read, with what each gave.
+    /// Files that were read, with the parameter that each file gave.
     pub sources: Vec<(PathBuf, &'static str)>,
-    /// What was not carried over, filled in or left out.
+    /// Values that were not carried over, were filled in or left out.
     pub warnings: Vec<Warning>,
 }
 
@@ -44,19 +44,18 @@ impl ParameterFile {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, or holds no parameters in a known form, with the place.
+    /// Returns an error with the place if a file cannot be read, or holds no parameters in a known format.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
 
-    /// Reads files and directories together, later ones over earlier ones. Tables of single joints count only when all six of a
-    /// kind are named or lie in a directory that is named: no joint is given another one's numbers, and no file is read that was
-    /// not meant.
+    /// Reads files and directories together; later ones override earlier ones. Tables of single joints count only if all six of a
+    /// kind are named or lie in a named directory. So no joint gets the numbers of another joint, and no unintended file is read.
     ///
     /// # Errors
     ///
-    /// The first file that cannot be read or understood, tables of some joints only, or numbers
-    /// that cannot be sent ([`ParameterSet::check`]).
+    /// Returns an error for the first file that cannot be read or parsed, for missing tables of some joints, or for numbers that
+    /// cannot be sent ([`ParameterSet::check`]).
     pub fn load_all(paths: &[PathBuf]) -> Result<Self, FileError> {
         let mut all = Self::default();
         let mut joints = JointTables::default();
@@ -72,7 +71,7 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// From the text of a table alone; that of one joint stands for all, so that its numbers are looked at.
+    /// Parses the text of one table; the table of one joint is used for all six, so that its numbers are checked.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
@@ -84,7 +83,7 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// What can be sent.
+    /// Returns the parameters for a controller.
     pub fn parameter_set(&self, choice: FrictionChoice) -> ParameterSet {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         let table = self.table.as_ref().map(|t| Friction::Table(**t));
@@ -206,12 +205,12 @@ impl ParameterFile {
     }
 }
 
-/// TOML or XML, not a table of numbers.
+/// Returns `true` for TOML or XML, `false` for a table of numbers.
 fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Tables of single joints, until all six of a kind are there.
+/// Tables of single joints, collected until all six of a kind are present.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,
@@ -224,10 +223,10 @@ impl JointTables {
     }
 }
 
-/// Tables of all six joints, and the files that they are from.
+/// Tables of all six joints, and their files.
 type Complete<T> = ([T; JOINTS], Vec<PathBuf>);
 
-/// One kind of table, and the file of each joint.
+/// Tables of one kind, with the file of each joint.
 struct PerJoint<T> {
     found: [Option<(PathBuf, T)>; JOINTS],
 }
@@ -243,7 +242,7 @@ impl<T> PerJoint<T> {
         self.found.iter().flatten().count()
     }
 
-    /// Takes the table of a joint; the name of the file gives its number.
+    /// Adds the table of a joint; the file name gives the joint number.
     fn add(&mut self, path: &Path, table: T) -> Result<(), FileError> {
         let Some((_, joint, _)) = split_name(path) else {
             let problem = "holds the numbers of one joint, and its name gives no joint: such files are named ...Joint0.csv \
@@ -258,7 +257,7 @@ impl<T> PerJoint<T> {
         Ok(())
     }
 
-    /// All six, or none; an error that names the files that are missing.
+    /// Returns the tables of all six joints, `None` if no file has such a table, or an error that names the missing files.
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();
@@ -282,7 +281,7 @@ impl<T> PerJoint<T> {
     }
 }
 
-/// `PidParamJoint3.csv` is joint 4 between `PidParamJoint` and `.csv`: these files count from 0.
+/// Splits a file name: `PidParamJoint3.csv` is joint 4 between `PidParamJoint` and `.csv`, because these files count from 0.
 fn split_name(path: &Path) -> Option<(String, Joint, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
     let (head, tail) = name.split_once("Joint")?;
@@ -290,7 +289,7 @@ fn split_name(path: &Path) -> Option<(String, Joint, String)> {
     Some((format!("{head}Joint"), Joint::from_index(digit)?, tail[1..].to_owned()))
 }
 
-/// The file of another joint beside `path`.
+/// Returns the file name for another joint in the directory of `path`.
 fn sibling(path: &Path, joint: Joint) -> String {
     let joint = joint.index();
     match split_name(path) {

@@ -1,4 +1,4 @@
-//! The tables of numbers that existing programs write: friction tables, friction polynomials, gains, arm model.
+//! Tables of numbers as existing programs write them: friction tables, friction polynomials, gains, arm model.
 
 use jtc_core::{JOINTS, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};
@@ -6,18 +6,18 @@ use jtc_wire::Joint;
 
 use crate::file::{FileError, Place, number, number_rows, rows};
 
-/// What a table of numbers turned out to be.
+/// Parameter that a table of numbers holds.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Table {
-    /// One joint's friction table.
+    /// Friction table of one joint.
     Friction(Box<TableOf<f32>>),
-    /// All joints' friction tables.
+    /// Friction tables of all joints.
     FrictionAll(Box<[TableOf<f32>; JOINTS]>),
     /// c0..c5 of all joints.
     Polynomial([[f64; 6]; JOINTS]),
-    /// One joint's gains.
+    /// Gains of one joint.
     Pid(PidGains),
-    /// All joints' gains.
+    /// Gains of all joints.
     PidAll([PidGains; JOINTS]),
     /// Kinematics and masses.
     Model(Box<ArmModel>),
@@ -89,7 +89,7 @@ fn increasing(axis: &[f32; 20], line: usize, name: &str) -> Result<(), FileError
     }
 }
 
-/// `joint,vel_index,vel,temp_index,temp,torque`, 2400 rows.
+/// Reads the long form of a friction table: `joint,vel_index,vel,temp_index,temp,torque`, 2400 rows.
 fn long_table(text: &str) -> Result<Table, FileError> {
     let empty =
         TableOf { velocity: [f32::NAN; 20], temperature: [f32::NAN; 20], torque: [[f32::NAN; 20]; 20] };
@@ -122,7 +122,8 @@ fn long_table(text: &str) -> Result<Table, FileError> {
     Ok(Table::FrictionAll(tables))
 }
 
-/// Coulomb friction is positive, the temperature coefficient small, the reference temperature one of a workshop.
+/// Returns `true` if the Coulomb and viscous coefficients are positive, the temperature coefficient is small and the reference
+/// temperature is that of a workshop.
 fn plausible(c: &[f64]) -> bool {
     let viscous = c[0] > 0.0 && c[1] > 0.0;
     match c {
@@ -135,7 +136,7 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     let reversed = |c: &Vec<f64>| c.iter().rev().copied().collect::<Vec<f64>>();
     let wrong: Vec<usize> = (0..all.len()).filter(|i| !plausible(&all[*i].1)).collect();
     let turned = wrong.iter().filter(|i| plausible(&reversed(&all[**i].1))).count();
-    // Most rows make sense only from right to left.
+    // Most rows are plausible only from right to left.
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(

@@ -1,8 +1,8 @@
-//! What of an arm a controller cannot be given: friction, gains and arm model go over the wire; limits, gravity and rotor inertia
-//! are built into the controller.
+//! Differences between an arm file and a controller's built-in settings. Friction, gains and arm model can be sent; limits,
+//! gravity and rotor inertia are built into the controller.
 //!
-//! A controller that runs with other limits or another gravity than the arm file gives moves another arm than the one that was
-//! checked (J-55). It is known to use the built-in arm's settings, [`Config::avena`].
+//! A controller with other limits or another gravity than the arm file moves another arm than the checked one (J-55). The
+//! controller is known to use the settings of the built-in arm, [`Config::avena`].
 
 use jtc_core::settings::{Setting, TABLE};
 use jtc_core::{Config, JointConfig};
@@ -10,21 +10,21 @@ use jtc_wire::Joint;
 
 use super::Arm;
 
-/// Values closer than this, relative to their size, are the same number written in two ways.
+/// Relative difference below which two values count as the same number, written in two ways.
 const SAME: f64 = 1e-9;
 
 /// A value of the arm file that the controller does not use.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Difference {
-    /// Its key in an arm file.
+    /// Key in an arm file.
     pub name: String,
-    /// None for what concerns the whole arm.
+    /// Joint; `None` if the value concerns the whole arm.
     pub joint: Option<Joint>,
-    /// The value of the arm file.
+    /// Value in the arm file.
     pub file: f64,
-    /// As the controller has it built in.
+    /// Value that is built into the controller.
     pub device: f64,
-    /// Of both.
+    /// Unit of both values.
     pub unit: &'static str,
 }
 
@@ -40,12 +40,12 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// What no frame of the protocol carries, in words.
+/// Settings that no frame of the protocol carries, in words.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
 impl Arm {
-    /// Whether the arm has a value of its own for a setting: no URDF has a place for gravity and rotor inertia.
+    /// Returns `true` if the arm has its own value for a setting; a URDF cannot give gravity and rotor inertia.
     pub(super) fn gives(&self, setting: &Setting, joint: Option<Joint>) -> bool {
         match setting.name {
             "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
@@ -54,13 +54,13 @@ impl Arm {
         }
     }
 
-    /// Whether it is a setting of a joint that belongs to an arm, and this arm has a value of its own for it.
+    /// Returns `true` if the setting belongs to a joint of an arm, and this arm has its own value for the setting.
     pub(super) fn gives_joint(&self, setting: &Setting, joint: Joint) -> bool {
         setting.of_joint() && setting.of_arm() && self.gives(setting, Some(joint))
     }
 
-    /// The settings of this arm that a controller with the settings `device` uses otherwise: gravity first, then joint by joint.
-    /// Empty: the controller's settings are those of this arm.
+    /// Returns the settings in which this arm differs from the controller settings `device`: gravity first, then joint by joint.
+    /// Empty: all settings are equal.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
         let own = self.config();
         let mut all = Vec::new();
@@ -85,16 +85,16 @@ impl Arm {
         all
     }
 
-    /// The settings that no frame carries and that the file does not give either: the controller's own count, and there is nothing
-    /// to compare them with.
+    /// Returns the settings that no frame carries and that the file does not give. The controller uses its own values for them,
+    /// so there is nothing to compare.
     pub fn settings_not_given(&self) -> Vec<&'static str> {
         let rotors = self.rotors_given.contains(&false);
         let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Settings to check a motion against that a controller with the settings `device` is to execute: of each limit the tighter
-    /// one, and the gravity, payload and rotor inertia that the controller computes with.
+    /// Returns the settings for the check of a motion that a controller with the settings `device` will execute: the tighter of
+    /// both limits, and the controller's gravity, payload and rotor inertia.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
@@ -146,14 +146,14 @@ mod tests {
         );
     }
 
-    /// An arm without gravity in its file stands as the controller takes it to stand.
+    /// An arm without gravity in its file uses the gravity of the controller.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences(&Config::avena()).is_empty());
     }
 
-    /// A URDF has no place for rotor inertia: that is not 0, and not a difference.
+    /// A URDF cannot give a rotor inertia: the value is unknown, not 0, and not a difference.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
         let urdf = Arm::parse(&Arm::avena().to_urdf()).unwrap();
@@ -161,12 +161,12 @@ mod tests {
             urdf.device_differences(&Config::avena()).iter().map(|d| d.name.clone()).collect();
         assert!(!names.contains(&"rotor_inertia_kg_m2".to_owned()), "{names:?}");
         assert_eq!(urdf.settings_not_given(), ["gravity", "rotor inertia"]);
-        // What is checked for a controller counts the rotors that it computes with.
+        // A check for a controller uses the rotor inertias of that controller.
         assert_eq!(
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file that is made of it gives none either; one with 0 does.
+        // An arm file written from the URDF has no rotor inertia either; a file with the value 0 has one.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

@@ -11,7 +11,7 @@ use super::toml_form::FORMAT;
 use super::{Arm, RULES, Rule};
 
 fn list(values: &[f64]) -> String {
-    // `{:?}` keeps a fraction, which makes a float of it in TOML.
+    // `{:?}` keeps the fraction, so that TOML reads a float.
     let cells: Vec<String> = values.iter().map(|v| format!("{v:?}")).collect();
     format!("[{}]", cells.join(", "))
 }
@@ -20,7 +20,7 @@ fn narrow(values: &[f32]) -> String {
     list(&values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>())
 }
 
-/// A TOML string.
+/// Formats a TOML string.
 fn quoted(text: &str) -> String {
     serde_json::to_string(text).expect("a string is JSON, and TOML has the same escapes")
 }
@@ -29,13 +29,14 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Frames of the description: 0 is the base, 1 to 6 are behind the joints of these numbers, 7 is the flange.
+/// Returns the name of a frame of the description: 0 is the base, 1 to 6 are the links after the joints of these numbers, 7 is
+/// the flange.
 pub(crate) fn frame_name(i: usize) -> String {
     if i > JOINTS { "flange".into() } else { format!("link_{i}") }
 }
 
 impl Arm {
-    /// The list of those numbers of a joint, or of the arm, that are proposals.
+    /// Writes the list of the proposed numbers of a joint or of the arm.
     fn write_marks(&self, out: &mut String, joint: Option<Joint>) {
         let marked = self.sources.marked(joint);
         if !marked.is_empty() {
@@ -45,7 +46,7 @@ impl Arm {
         }
     }
 
-    /// As an arm file.
+    /// Writes the arm as an arm file.
     pub fn to_toml(&self) -> String {
         let mut out = format!("format = {FORMAT}\nname = {}\n", quoted(&self.name));
         if let Some(g) = &self.gravity {
@@ -131,7 +132,7 @@ impl Arm {
         out
     }
 
-    /// As a robot description: what it can carry of the arm, which is kinematics, masses and limits.
+    /// Writes the arm as a robot description, which carries only kinematics, masses and limits.
     pub fn to_urdf(&self) -> String {
         let three = |v: &[f64; 3]| format!("{} {} {}", v[0], v[1], v[2]);
         let placed = |o: &Origin| format!("<origin xyz=\"{}\" rpy=\"{}\"/>", three(&o.xyz), three(&o.rpy));

@@ -1,11 +1,11 @@
-//! How much inertia the gains of an arm tolerate, in the loop that the controller closes (J-41, J-71).
+//! Inertia that the gains of an arm tolerate in the loop of the controller (J-41, J-71).
 //!
-//! The loop of one joint: a position is read, its torque acts `delay_ticks` later and for one tick, and the derivative is taken
-//! over five ticks. Such a loop is stable between two inertias. Below the lower one the derivative is too late, above the upper
-//! one the integral is too strong.
+//! The loop of one joint: the controller reads a position, and its torque acts `delay_ticks` later for one tick. The derivative
+//! covers five ticks. Such a loop is stable between two inertias. Below the lower inertia the derivative is too late; above the
+//! upper inertia the integral is too strong.
 //!
-//! Joints that move each other: with D the lower and U the upper inertias of the joints and M the mass matrix with rotors, the arm
-//! is stable where M − D and U − M are positive definite. This is exact where the gains of all joints have the same ratios.
+//! Coupled joints: with D the lower and U the upper inertias of the joints and M the mass matrix with rotors, the arm is stable
+//! if M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
 
 use std::f64::consts::PI;
 
@@ -22,10 +22,10 @@ const WINDOW: f64 = 5.0;
 const STEPS: i32 = 400;
 /// Lowest frequency of the search, rad per tick.
 const SLOWEST: f64 = 1e-6;
-/// Rotor inertias, as factors of the proposed ones, that gains have to tolerate as long as nobody has measured the rotor: drives
-/// of one family differ by so much.
+/// Factors of a proposed rotor inertia that the gains must tolerate until the rotor is measured: drives of one family differ by
+/// these factors.
 pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
-/// Lightest and heaviest rotor that is tried, as a factor.
+/// Smallest and largest rotor inertia of the search, as a factor.
 const FACTORS: (f64, f64) = (0.0, 1000.0);
 
 type Matrix = [[f64; JOINTS]; JOINTS];
@@ -33,26 +33,26 @@ type Matrix = [[f64; JOINTS]; JOINTS];
 /// The inertias (kg·m²) between which a joint is stable under its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StableInertia {
-    /// Below it, the derivative is too late.
+    /// Lower limit; below this inertia the derivative is too late.
     pub least: f64,
-    /// Above it, the integral is too strong; infinite without one.
+    /// Upper limit; above this inertia the integral is too strong. Infinite without an integral.
     pub most: f64,
 }
 
-/// Rotor inertias, as factors of those in the file, between which the arm is stable.
+/// Range of rotor inertias, as factors of those in the file, in which the arm is stable.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RotorMargin {
-    /// Lowest factor; 0: also without a rotor.
+    /// Lowest factor; 0: the arm is stable also without a rotor.
     pub down: f64,
-    /// Highest factor; 1000: that or more.
+    /// Highest factor; 1000: the arm is stable up to 1000 or more.
     pub up: f64,
 }
 
 impl StableInertia {
-    /// `None`: these gains hold no inertia, or are no numbers.
+    /// Returns the stable range, or `None` if these gains are not stable with any inertia, or are not numbers.
     ///
-    /// With θ the frequency in rad per tick, the loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), H being the control law with the
-    /// delay and half a tick of hold. So the inertia at a change of stability is that factor of H where H is real.
+    /// With θ the frequency in rad per tick, the loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ). H is the control law with the delay
+    /// and half a tick of hold. At a change of stability H is real, and the inertia is that factor times H.
     pub fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;
@@ -93,25 +93,25 @@ impl StableInertia {
     }
 }
 
-/// Between which inertias each joint is stable; `None` where a joint never is.
+/// Returns the stable range of inertias of each joint; `None` if a joint has no stable range.
 pub(super) fn all_stable(gains: &[PidGains; JOINTS], delay_ticks: u8) -> Option<[StableInertia; JOINTS]> {
     let each: Vec<StableInertia> = gains.iter().filter_map(|g| StableInertia::of(g, delay_ticks)).collect();
     each.try_into().ok()
 }
 
-/// Mass matrices without rotors in poses all over the ranges.
+/// Returns mass matrices without rotors, in poses distributed over the ranges.
 pub(super) fn mass_matrices(model: &ArmModel, ranges: &Ranges) -> Vec<Matrix> {
     let dynamics = Dynamics::new(model, [0.0; 3]);
     (0..POSES).map(|n| dynamics.mass_matrix(&pose(n, ranges))).collect()
 }
 
-/// Whether a symmetric matrix is positive definite (Cholesky).
+/// Returns `true` if a symmetric matrix is positive definite (Cholesky).
 fn is_positive(mut a: Matrix) -> bool {
     for k in 0..JOINTS {
         if a[k][k].is_nan() || a[k][k] <= 0.0 {
             return false;
         }
-        // The column below it, before it is changed.
+        // Copy of the column below the pivot before the update.
         let column: JointVec = std::array::from_fn(|i| a[i][k]);
         for (i, row) in a.iter_mut().enumerate().skip(k + 1) {
             let factor = column[i] / column[k];
@@ -121,7 +121,7 @@ fn is_positive(mut a: Matrix) -> bool {
     true
 }
 
-/// The mass matrix with these rotors is not below `stable` times `reserve`.
+/// Returns `true` if the mass matrix with these rotors is at least `stable` times `reserve`.
 pub(super) fn is_heavy_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -133,7 +133,7 @@ pub(super) fn is_heavy_enough(
     is_positive(a)
 }
 
-/// The mass matrix with these rotors is not above `stable` over `reserve`.
+/// Returns `true` if the mass matrix with these rotors is at most `stable` divided by `reserve`.
 pub(super) fn is_light_enough(
     m: &Matrix,
     rotor: &JointVec,
@@ -145,7 +145,8 @@ pub(super) fn is_light_enough(
     is_positive(a)
 }
 
-/// How much lighter and heavier the rotors of the joints `of` may be; `None`: the arm is not stable with `rotor` as it is.
+/// Returns the smallest and largest factor for the rotor inertias of the joints `of`; `None` if the arm is not stable with
+/// `rotor`.
 pub(super) fn rotor_margin(
     matrices: &[Matrix],
     rotor: &JointVec,
@@ -166,7 +167,7 @@ pub(super) fn rotor_margin(
     Some(margin)
 }
 
-/// The factor nearest to `far` at which `holds` does, which it does at 1.
+/// Searches for the factor nearest to `far` for which `holds` returns `true`; `holds(1)` must be `true`.
 fn end(far: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(far) {
         return far;

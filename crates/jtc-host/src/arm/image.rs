@@ -1,4 +1,4 @@
-//! An arm as a controller with extensions has it: one image (J-54), its hash (J-52), and what of it differs from a file (J-55).
+//! Image of an arm in a controller with extensions (J-54), its hash (J-52), and its differences from a file (J-55).
 
 use jtc_core::settings::{self, SettingError};
 use jtc_core::{Config, Friction, JOINTS, PidGains, TableOf};
@@ -9,30 +9,30 @@ use jtc_wire::{ArmImage, EncodeError, FloatName, Floats, FrictionImage, Hash, Jo
 use super::{Arm, Difference, values};
 use crate::frame::model_rows;
 
-/// Why an image is not that of an arm.
+/// Reason why an image is not that of an arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
-    /// The bytes are no image of a version that is known.
+    /// The bytes are not an image of a known version.
     #[error("no arm image that this program reads")]
     Form,
-    /// A setting is out of range, or they contradict each other.
+    /// A setting is out of range, or two settings contradict each other.
     #[error("{0}")]
     Setting(SettingError),
 }
 
 impl Arm {
-    /// The values of the settings that a controller of this arm has, in the order of its table. What the file does not give is as
-    /// in the built-in arm.
+    /// Returns the setting values of a controller with this arm, in the order of the settings table. Missing values are taken
+    /// from the built-in arm.
     pub fn settings(&self) -> Vec<SettingValue> {
         settings::values(&self.config(), 0, true).collect()
     }
 
-    /// The image that a controller has which uses this arm; `None` when gains or friction are missing.
+    /// Returns the image of a controller that uses this arm; `None` if gains or friction are missing.
     ///
     /// # Errors
     ///
-    /// A number that no frame carries.
+    /// Returns an error for a number that no frame carries.
     pub fn image(&self) -> Result<Option<Vec<u8>>, EncodeError> {
         let (Some(pid), Some(friction)) = (&self.pid, self.friction()) else { return Ok(None) };
         let settings = self.settings();
@@ -52,20 +52,20 @@ impl Arm {
         Ok(Some(bytes))
     }
 
-    /// The hash that a controller has which uses this arm; `None` when gains or friction are missing.
+    /// Returns the hash of a controller that uses this arm; `None` if gains or friction are missing.
     ///
     /// # Errors
     ///
-    /// Those of [`Arm::image`].
+    /// Returns the errors of [`Arm::image`].
     pub fn hash(&self) -> Result<Option<u64>, EncodeError> {
         Ok(self.image()?.map(|image| Hash::of_image(&image)))
     }
 
-    /// The arm that a controller has.
+    /// Creates the arm from the image of a controller.
     ///
     /// # Errors
     ///
-    /// Bytes that are no image, and settings of no arm.
+    /// Returns an error if the bytes are not an image, or the settings do not belong to an arm.
     pub fn from_image(bytes: &[u8]) -> Result<Self, ImageError> {
         let image = ArmImage::parse(bytes).ok_or(ImageError::Form)?;
         let config =
@@ -88,11 +88,12 @@ impl Arm {
         })
     }
 
-    /// What of this arm differs from that of a controller, value by value; of what the file does not give, nothing.
+    /// Returns the differences between this arm and the arm of a controller, value by value; values that the file does not give
+    /// are skipped.
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();
         let mut compare = |name: String, joint, file: f64, device: f64, unit| {
-            // The wire carries 32 bits of gains, friction and model.
+            // The wire carries gains, friction and model as 32-bit floats.
             if file as f32 != device as f32 {
                 all.push(Difference { name, joint, file, device, unit });
             }
@@ -125,7 +126,7 @@ impl Arm {
         compare: &mut impl FnMut(String, Option<Joint>, f64, f64, &'static str),
     ) {
         let has = device.friction();
-        // A file may have both: what counts is the one that the device uses.
+        // A file may have both forms of friction; the comparison uses the form of the device.
         let own = match has {
             Some(Friction::Table(_)) => self.table.as_ref().map(|t| Friction::Table(**t)).or(self.friction()),
             _ => self.friction(),
@@ -144,7 +145,7 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // One of 440 stands for all.
+                    // The first different number of the 440 represents the whole table.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
                         let count = pairs.filter(|(own, has)| own != has).count();
@@ -153,7 +154,7 @@ impl Arm {
                     }
                 }
             }
-            // One is a polynomial and the other is not.
+            // The two forms differ: polynomial and table.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
@@ -163,7 +164,7 @@ impl Arm {
     }
 }
 
-/// The settings that are not those of the built-in arm and have no key of their own in an arm file.
+/// Returns the settings that differ from the built-in arm and have no key of their own in an arm file.
 fn others(config: &Config) -> Vec<SettingValue> {
     let built_in = Config::avena();
     let built_in = settings::values(&built_in, 0, true);
@@ -216,7 +217,7 @@ fn tables(floats: &Floats<'_>) -> [TableOf<f32>; JOINTS] {
     })
 }
 
-/// Every number of two models, with its name.
+/// Returns every number of two models, with its name.
 fn model_numbers(own: &ArmModel, has: &ArmModel) -> Vec<(String, f64, f64)> {
     let (own, has) = (model_rows(own), model_rows(has));
     let mut all = Vec::new();
@@ -248,7 +249,7 @@ mod tests {
         assert!(arm.differences(&again).is_empty(), "{:?}", arm.differences(&again));
         assert_eq!(again.image().unwrap().as_deref(), Some(&image[..]));
         assert_eq!(again.name, "avena");
-        // Also through its file.
+        // The image also survives a round trip through the arm file.
         let file = Arm::from_toml(&again.to_toml()).unwrap();
         assert_eq!(file.image().unwrap().as_deref(), Some(&image[..]));
         let table = Arm { polynomial: None, ..arm.clone() };
@@ -257,7 +258,7 @@ mod tests {
         assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
     }
 
-    /// Settings that have no key of a joint are in a table of the file.
+    /// Settings without a joint key are in a table of the file.
     #[test]
     fn j53_settings_of_the_controller_travel_with_the_file() {
         let text =
@@ -305,7 +306,7 @@ mod tests {
             ("friction_polynomial.c2", Some(2)),
         ];
         assert_eq!(names, expected.map(|(name, joint)| (name.to_owned(), joint)));
-        // What a file does not give differs from nothing.
+        // Values that a file does not give cause no difference.
         let open = Arm { gravity: None, pid: None, polynomial: None, table: None, ..arm.clone() };
         other.joints[2] = arm.joints[2];
         other.model = arm.model;

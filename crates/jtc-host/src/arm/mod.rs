@@ -1,4 +1,4 @@
-//! Arms: kinematics, masses, limits, gains and friction of one arm, from the files that people have.
+//! Arms: kinematics, masses, limits, gains and friction of one arm, read from TOML, URDF and CSV files.
 
 mod check;
 mod collect;
@@ -52,19 +52,19 @@ mod urdf {
     }
 }
 
-/// The default arm's file, as delivered.
+/// File of the default arm, as delivered.
 pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
 
-/// The part of a robot description that is the arm, where it holds more than one.
+/// Selection of the arm in a robot description that holds more joints than the six.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ArmChoice {
-    /// Names of the six joints that move, base to wrist; `None`: there are no others.
+    /// Names of the six moving joints, base to wrist; `None`: the description has exactly six.
     pub joints: Option<Vec<String>>,
-    /// The link that is the flange; only joints on the way to it are looked at. `None`: what is fixed to the last joint.
+    /// Flange link; only joints on the path to this link are considered. `None`: the frame fixed to the last joint.
     pub tip: Option<String>,
 }
 
-/// The arm of a robot description, and what else it gives that an arm has no place for.
+/// Arm of a robot description, with the values of the description for which an arm has no field.
 struct Described {
     arm: Arm,
     /// Acceleration of gravity in the base frame, m/s²: z of the description points upwards.
@@ -73,10 +73,10 @@ struct Described {
     friction: [[f64; 2]; JOINTS],
 }
 
-/// One arm.
+/// Arm with all numbers of its file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arm {
-    /// Its name.
+    /// Name of the arm.
     pub name: String,
     /// Names of the six joints, base to wrist.
     pub joint_names: [String; JOINTS],
@@ -88,11 +88,11 @@ pub struct Arm {
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
     pub joints: [JointConfig; JOINTS],
-    /// Joints, base to wrist, whose rotor inertia the file gives. That of the others is 0 in `joints`: it is not known.
+    /// Joints, base to wrist, whose rotor inertia the file gives. An unknown rotor inertia is 0 in `joints`.
     pub rotors_given: [bool; JOINTS],
     /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
     pub gravity: Option<[f64; 3]>,
-    /// Settings of the controller that the file gives in its `[settings]`.
+    /// Controller settings from the `[settings]` table of the file.
     pub others: Vec<SettingValue>,
     /// Gains.
     pub pid: Option<[PidGains; JOINTS]>,
@@ -100,11 +100,11 @@ pub struct Arm {
     pub polynomial: Option<[[f64; 6]; JOINTS]>,
     /// Friction tables.
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
-    /// Named joint positions, rad. No controller has them, and no hash counts them.
+    /// Named joint positions, rad. Poses are not sent to a controller and are not part of a hash.
     pub poses: Poses,
-    /// What was not carried over or filled in.
+    /// Values that were not carried over, or were filled in.
     pub warnings: Vec<Warning>,
-    /// Where the numbers come from.
+    /// Source of each number.
     pub sources: Sources,
 }
 
@@ -114,59 +114,61 @@ impl Arm {
         Self::from_toml(AVENA_TOML).expect("the delivered arm file is good: tests read it")
     }
 
-    /// From a TOML or URDF file, recognised by its content.
+    /// Loads an arm from a TOML or URDF file; the content decides the format.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, is of no known form, or whose numbers are no arm of these drives, with the place.
+    /// Returns an error with the place if the file cannot be read, its format is unknown, or its numbers do not describe an arm
+    /// of these drives.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::parse(&text).map_err(|e| e.in_file(path))
     }
 
-    /// From the text of a TOML or URDF file.
+    /// Reads an arm from the text of a TOML or URDF file.
     ///
     /// # Errors
     ///
-    /// A text of no known form, or whose numbers are no arm of these drives, with the place.
+    /// Returns an error with the place if the format is unknown, or the numbers do not describe an arm of these drives.
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let arm = if is_xml(text) { Self::from_urdf(text)? } else { Self::from_toml(text)? };
         arm.checked()
     }
 
-    /// From the text of a URDF file in which nothing but the arm moves.
+    /// Reads an arm from the text of a URDF file in which only the six joints of the arm move.
     ///
     /// # Errors
     ///
-    /// A text that is no URDF, or does not have exactly one chain of six revolute joints.
+    /// Returns an error if the text is not a valid URDF, or does not have exactly one chain of six revolute joints.
     pub fn from_urdf(text: &str) -> Result<Self, FileError> {
         Self::from_urdf_with(text, &ArmChoice::default())
     }
 
-    /// From the text of a URDF file, of which `choice` selects the arm.
+    /// Reads an arm from the text of a URDF file; `choice` selects the arm.
     ///
     /// # Errors
     ///
-    /// A text that is no URDF, or in which `choice` does not name six revolute joints in a row.
+    /// Returns an error if the text is not a valid URDF, or `choice` does not name six revolute joints in a row.
     pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         urdf::read(text, choice).map(|described| described.arm)
     }
 
-    /// From a URDF file, of which `choice` selects the arm; what such a file lacks is proposed by [`RULES`] and marked.
+    /// Imports an arm from a URDF file; `choice` selects the arm. Missing values are proposed by [`RULES`] and marked.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, is no URDF, leaves open which six joints are the arm, or is no arm of these drives.
+    /// Returns an error if the file cannot be read, is not a valid URDF, does not determine the six joints, or does not describe
+    /// an arm of these drives.
     pub fn import(path: &Path, choice: &ArmChoice) -> Result<Self, FileError> {
         let text = read_text(path)?;
         Self::import_text(&text, choice).map_err(|e| e.in_file(path))
     }
 
-    /// As [`import`](Self::import), from the text of the file.
+    /// Like [`import`](Self::import), from the text of the file.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// Returns the errors of [`import`](Self::import).
     pub fn import_text(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         if !is_xml(text) {
             return Err(FileError::form("is no robot description: a URDF is XML and begins with <"));
@@ -177,31 +179,31 @@ impl Arm {
         Ok(arm)
     }
 
-    /// From a TOML or URDF file whose numbers may be wrong: [`Arm::check`] finds those.
+    /// Loads an arm from a TOML or URDF file without checking its numbers; [`Arm::check`] finds wrong numbers.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is of no known form, with the place.
+    /// Returns an error with the place if the file cannot be read or its format is unknown.
     pub fn load_unchecked(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let arm = if is_xml(&text) { Self::from_urdf(&text) } else { toml_form::read(&text) };
         arm.map_err(|e| e.in_file(path))
     }
 
-    /// The arm, unless its numbers are no arm of these drives.
+    /// Returns the arm, or an error if its numbers do not describe an arm of these drives.
     fn checked(self) -> Result<Self, FileError> {
         self.is_physical()?;
         Ok(self)
     }
 
-    /// Whether the numbers are those of an arm that these drives can move.
+    /// Checks that the numbers describe an arm that these drives can move.
     ///
     /// # Errors
     ///
-    /// The first number of the model or of the limits that is none.
+    /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: limits that the drives cannot keep, or would stop at by themselves.
+        // J-35, J-43: limits that the drives cannot keep, or at which the drives stop by themselves.
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -209,7 +211,7 @@ impl Arm {
         })
     }
 
-    /// What a fault of the model is in, by its name in the file.
+    /// Returns the name in the file of the joint or link with the model error.
     fn name_of_part(&self, error: &ModelError) -> String {
         let part = if error.is_of_joint() { &self.joint_names[..] } else { &self.link_names[..] };
         let kind = if error.is_of_joint() { "joint" } else { "link" };
@@ -217,31 +219,30 @@ impl Arm {
         format!("arm model, {kind} {name}")
     }
 
-    /// Settings of a controller for this arm; what the file does not give is as for the default arm, but a rotor inertia that is
-    /// not given is 0.
+    /// Returns the controller settings for this arm. Missing values are taken from the default arm; a missing rotor inertia is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // One that is out of range, which no file brings here, stays as it is by default.
+            // A value out of range keeps its default; no file reader lets such a value through.
             let _ = settings::apply(&mut config, *value);
         }
         config
     }
 
-    /// Friction compensation: the polynomial, else the table.
+    /// Returns the friction compensation: the polynomial if there is one, else the table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))
     }
 
-    /// What can be sent to a controller; friction as polynomial, else as table.
+    /// Returns the parameters for a controller, with friction as polynomial if there is one, else as table.
     pub fn parameter_set(&self) -> ParameterSet {
         ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
     }
 
-    /// Parameters of a controller for this arm; what the file does not give is as for the default arm.
+    /// Returns the controller parameters for this arm. Missing values are taken from the default arm.
     pub fn parameters(&self) -> Parameters {
         let default = Parameters::avena();
         Parameters {
@@ -253,7 +254,7 @@ impl Arm {
 }
 
 impl Arm {
-    /// An arm of which nothing is given, with names like those that files have.
+    /// Creates an arm with default values and with names in the style of arm files.
     fn nameless() -> Self {
         Self {
             name: String::new(),
@@ -275,12 +276,12 @@ impl Arm {
     }
 }
 
-/// A setting of the controller that has no key of its own in an arm file: it stands in `[settings]`.
+/// Returns `true` for a controller setting without its own key in an arm file: such a setting stands in `[settings]`.
 fn has_no_key(setting: &Setting) -> bool {
     setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }
 
-/// The text is XML, as a robot description is; a byte order mark may stand before it.
+/// Returns `true` if the text is XML, as a robot description is; a byte order mark may precede the XML.
 fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }

@@ -1,11 +1,11 @@
-//! What a controller is given, and the checks that come before.
+//! Parameters for a controller, and the checks before they are sent.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
 
-/// Parameters to send; `None`: not this one.
+/// Parameters to send; a part that is `None` is not sent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     /// Friction compensation.
@@ -16,42 +16,42 @@ pub struct ParameterSet {
     pub model: Option<ArmModel>,
 }
 
-/// Why parameters cannot be sent.
+/// Reason why parameters cannot be sent.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
-    /// Not a number that a frame carries.
+    /// A number that no frame carries.
     #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// Of this joint.
+        /// Joint with this number.
         joint: Joint,
         /// The value.
         value: f64,
     },
-    /// Integral bounds the wrong way round.
+    /// The lower integral bound is above the upper one.
     #[error("integral of {joint}: lower bound {min} is above upper bound {max}")]
     IntegralBounds {
-        /// Of this joint.
+        /// Joint with these bounds.
         joint: Joint,
-        /// rad·s.
+        /// Lower bound, rad·s.
         min: f64,
-        /// rad·s.
+        /// Upper bound, rad·s.
         max: f64,
     },
     /// A table axis does not increase.
     #[error("friction table of {joint}: {axis} {after} at place {place} does not lie above {before}")]
     Axis {
-        /// Of this joint.
+        /// Joint with this table.
         joint: Joint,
         /// "velocity" or "temperature".
         axis: &'static str,
-        /// Place of the second value, from 1.
+        /// Position of the second value on the axis, from 1.
         place: usize,
-        /// The value before.
+        /// Value before that position.
         before: f32,
-        /// The value there.
+        /// Value at that position.
         after: f32,
     },
     /// The arm model is not physical.
@@ -62,9 +62,9 @@ pub enum ParameterError {
 /// A parameter beyond the bounds of a controller (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beyond {
-    /// `None`: of the arm model.
+    /// Joint; `None` for a parameter of the arm model.
     pub joint: Option<Joint>,
-    /// What it is, and within what.
+    /// Parameter, value and bounds.
     pub bounds: OutOfBounds,
 }
 
@@ -90,12 +90,12 @@ impl Diagnose for ParameterError {
 }
 
 impl ParameterSet {
-    /// Nothing in it.
+    /// Returns `true` if the set is empty.
     pub fn is_empty(&self) -> bool {
         self.friction.is_none() && self.pid.is_none() && self.model.is_none()
     }
 
-    /// What a controller needs before it powers an arm, and is not in here.
+    /// Returns the missing parameters that a controller needs before it powers an arm.
     pub fn missing(&self) -> Vec<&'static str> {
         let parts = [
             (self.friction.is_none(), "friction"),
@@ -105,7 +105,7 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// The first parameter beyond what a controller with these settings takes (J-06): for the words after it refused.
+    /// Returns the first parameter beyond the bounds of a controller with these settings (J-06), for the message after a refusal.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
         let joints = Joint::ALL.into_iter().zip(&config.joints);
@@ -129,11 +129,12 @@ impl ParameterSet {
         friction.or_else(gains).or_else(masses)
     }
 
-    /// All that cannot be sent, and much of what the controller would refuse with "incorrect value" (J-06), before anything is sent.
+    /// Checks the parameters before they are sent, including many values that the controller would refuse with "incorrect value"
+    /// (J-06).
     ///
     /// # Errors
     ///
-    /// The first number that no frame carries, that contradicts another, or that is not physical.
+    /// Returns an error with the first number that no frame carries, that contradicts another number, or that is not physical.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {
@@ -163,7 +164,7 @@ fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterE
     if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-/// Axes that rise, and numbers that a frame carries.
+/// Checks that both axes increase and that frames carry all numbers.
 pub(super) fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;

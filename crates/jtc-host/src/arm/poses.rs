@@ -1,7 +1,7 @@
 //! Named joint positions of an arm, in the `[poses]` table of its file.
 //!
-//! A pose is a name and six positions (rad, base to wrist). Poses are no part of what a controller is given, nor of the arm's hash.
-//! [`save_pose`] and [`remove_pose`] change that table alone: the rest of the file stays as it is, comments included.
+//! A pose is a name and six positions (rad, base to wrist). Poses are not sent to a controller and are not part of the arm's
+//! hash. [`save_pose`] and [`remove_pose`] change only that table: the rest of the file keeps its text, including comments.
 
 mod error;
 
@@ -23,17 +23,18 @@ pub type Poses = BTreeMap<String, [f64; JOINTS]>;
 
 /// Longest name of a pose, characters.
 const NAME_MAX: usize = 64;
-/// Names this alike are taken for a slip of the hand.
+/// Similarity from which a name counts as a misspelling of another name.
 const ALIKE: f64 = 0.7;
-/// Positions are saved to a micrometre at the end of an arm of one metre: encoders measure no finer.
+/// Saved positions have a resolution of 1e-6 rad, a micrometre at the end of a one-metre arm: encoders measure no finer.
 const DECIMALS: f64 = 1e6;
 
 impl Arm {
-    /// The positions of a named pose, rad.
+    /// Returns the positions of a named pose, rad.
     ///
     /// # Errors
     ///
-    /// [`PoseError::Unknown`], with the name that looks most like it; [`PoseError::Outside`] where the arm's limits do not let it be there.
+    /// Returns [`PoseError::Unknown`] with the most similar name, or [`PoseError::Outside`] if the pose is outside the arm's
+    /// limits.
     pub fn pose(&self, name: &str) -> Result<[f64; JOINTS], PoseError> {
         let Some(position) = self.poses.get(name) else {
             let known: Vec<String> = self.poses.keys().cloned().collect();
@@ -47,11 +48,11 @@ impl Arm {
         self.at_pose(name, position).map(|()| *position)
     }
 
-    /// Whether the limits let the arm be at a position (rad) of this name.
+    /// Checks that a position (rad) is within the arm's limits; `name` is for the error.
     ///
     /// # Errors
     ///
-    /// [`PoseError::Outside`], of the first joint that cannot be there.
+    /// Returns [`PoseError::Outside`] with the first joint outside its limits.
     pub fn at_pose(&self, name: &str, position: &[f64; JOINTS]) -> Result<(), PoseError> {
         match self.outside(position) {
             None => Ok(()),
@@ -61,7 +62,7 @@ impl Arm {
         }
     }
 
-    /// The first joint that is outside its range there, and that range, rad.
+    /// Returns the first joint that is outside its range at this position, and that range, rad.
     pub(crate) fn outside(&self, position: &[f64; JOINTS]) -> Option<(Joint, f64, f64)> {
         let config = self.config();
         Joint::ALL.into_iter().find_map(|joint| {
@@ -71,7 +72,8 @@ impl Arm {
     }
 }
 
-/// Whether a pose may have this name: it fits into an option beside lists of numbers, and into a cell of a waypoint file.
+/// Returns `true` for a valid name of a pose: it fits into an option next to lists of numbers, and into a cell of a waypoint
+/// file.
 pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
@@ -79,7 +81,7 @@ pub fn is_pose_name(name: &str) -> bool {
         && name.parse::<f64>().is_err()
 }
 
-/// The poses of a file's table.
+/// Reads the poses from the table of a file.
 pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileError> {
     let pose = |(name, values): (&String, &Vec<f64>)| {
         let wrong = |problem: String| FileError::at(Place::name(format!("poses, {}", short(name))), problem);
@@ -97,17 +99,17 @@ pub(super) fn read(given: &BTreeMap<String, Vec<f64>>) -> Result<Poses, FileErro
     given.iter().map(pose).collect()
 }
 
-/// A key of a table as it stands in a file.
+/// Formats a key of a table for a TOML file.
 pub(super) fn key(name: &str) -> String {
     toml_edit::Key::new(name).display_repr().into_owned()
 }
 
-/// Saves a pose (rad) into an arm file, to a millionth of a radian.
+/// Saves a pose (rad) in an arm file, rounded to a millionth of a radian.
 ///
 /// # Errors
 ///
-/// A name that is none, one that is there already unless `force` is set, a robot description, a file that is no arm file or cannot be
-/// written. The file is as it was then.
+/// Returns an error if the name is invalid, if the pose exists and `force` is not set, if the file is a robot description or not
+/// an arm file, or if the file cannot be written. After an error the file is unchanged.
 pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool) -> Result<(), PoseError> {
     if !is_pose_name(name) {
         return Err(PoseError::Name { name: short(name) });
@@ -118,7 +120,7 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
             return Err(PoseError::Exists { path: path.to_owned(), name: name.into() });
         }
         match table.get_mut(name).and_then(Item::as_value_mut) {
-            // What stands before and behind it stays.
+            // Text before and after the value stays.
             Some(value) => {
                 let around = value.decor().clone();
                 *value = Value::Array(Array::from_iter(rounded));
@@ -131,15 +133,16 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
     })
 }
 
-/// Takes a pose out of an arm file.
+/// Removes a pose from an arm file.
 ///
 /// # Errors
 ///
-/// A pose that is not there, a robot description, a file that is no arm file or cannot be written. The file is as it was then.
+/// Returns an error if the pose does not exist, if the file is a robot description or not an arm file, or if the file cannot be
+/// written. After an error the file is unchanged.
 pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     edit(path, |table, arm| {
         if arm.poses.remove(name).is_none() {
-            // With the names that there are.
+            // This error lists the existing names.
             return arm.pose(name).map(drop);
         }
         table.remove(name);
@@ -147,7 +150,7 @@ pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     })
 }
 
-/// Changes the table of poses in a file, and the arm of that file alike: both must come to the same.
+/// Applies the same change to the table of poses in a file and to the arm of that file; both must give the same poses.
 fn edit(
     path: &Path,
     change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
@@ -174,8 +177,8 @@ fn edit(
     Ok(())
 }
 
-/// A changed text with the byte order mark and the line ends of the one before, which the TOML library does not keep: lines before and
-/// behind the change have their own, those between them that of the first line.
+/// Restores the byte order mark and the line ends of the old text in a changed text, because the TOML library does not keep them.
+/// Lines before and after the change keep their line ends; lines between them get the line end of the first line.
 fn as_it_was(changed: &str, before: &str) -> String {
     const MARK: char = '\u{feff}';
     let (lines, old): (Vec<&str>, Vec<&str>) = (
@@ -193,7 +196,7 @@ fn as_it_was(changed: &str, before: &str) -> String {
         _ => (*line).to_owned(),
     };
     let mark = before.starts_with(MARK).then(|| MARK.to_string());
-    // The line that was the last may have had no end.
+    // The old last line may have had no line end.
     let kept = |(new, old): (&&str, &&str)| if old.ends_with('\n') { (*old).to_owned() } else { fresh(new) };
     let (first, last) = (lines.iter().zip(&old).take(head).map(kept), old.len() - tail);
     let between = lines[head..lines.len() - tail].iter().map(fresh);
@@ -220,7 +223,7 @@ mod tests {
         (dir, path)
     }
 
-    /// The first pose makes the table; each later change touches one line, and taking all of them out leaves the arm as it was.
+    /// The first pose creates the table, each later change touches one line, and removing all poses restores the arm.
     #[test]
     fn the_rest_of_the_file_stays_as_it_is() {
         let (_dir, path) = file(AVENA_TOML);
@@ -246,7 +249,7 @@ mod tests {
         assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
     }
 
-    /// Line ends and the byte order mark stay, also where they are mixed: without the pose the file has its own bytes again.
+    /// Line ends, also mixed ones, and the byte order mark stay: after the pose is removed the file has its original bytes.
     #[test]
     fn every_byte_of_the_rest_stays() {
         let with_home = format!("{AVENA_TOML}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n# the end\n");
@@ -281,7 +284,7 @@ mod tests {
         let with = Arm { poses: Poses::from([("home".into(), HOME)]), ..Arm::avena() };
         assert_eq!(with.hash().unwrap(), plain.hash().unwrap());
         assert!(with.differences(&plain).is_empty());
-        // They go round through the file.
+        // Poses survive a round trip through the file.
         assert_eq!(Arm::parse(&with.to_toml()).unwrap().poses, with.poses);
     }
 
@@ -325,7 +328,7 @@ mod tests {
             let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();
             assert!(error.contains(problem), "{line}: {error}");
         }
-        // One that the limits do not allow is found by the check, and refused where it is used.
+        // The check finds a pose outside the limits, and its use is refused.
         let arm = Arm::parse(&format!("{AVENA_TOML}\n[poses]\nfar = [0, 2, 0, 0, 0, 0]\n")).unwrap();
         assert_eq!(
             arm.pose("far").unwrap_err().to_string(),
@@ -338,7 +341,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the name and the numbers are, the pose that is read is the one that was saved.
+        /// For any name and numbers, the pose read from the file equals the saved pose.
         #[test]
         fn what_was_saved_is_read(name in "[a-zA-Zäλ][a-zA-Z0-9_.ö-]{0,20}".prop_filter("a number", |name| name.parse::<f64>().is_err()), q in prop::array::uniform6(-3.0..3.0f64)) {
             let (_dir, path) = file(AVENA_TOML);

@@ -1,7 +1,7 @@
-//! Starting values for what a robot description lacks, each by a rule that can be read.
+//! Starting values for numbers that a robot description lacks, each by a documented rule.
 //!
-//! They are there so that an arm can be simulated and brought up slowly; none of them is measured. An arm file marks them, and
-//! `jtc arm check` names them until somebody has replaced them.
+//! With these values an arm can be simulated and brought up slowly; none of them is measured. An arm file marks them, and
+//! `jtc arm check` lists them until the operator has replaced them.
 
 use jtc_core::settings::TOOL_SPEED;
 use jtc_core::{JOINTS, PidGains};
@@ -13,16 +13,16 @@ use super::statics::{Inertia, Ranges, inertia, worst_gravity};
 use super::toml_form::TEACH_DAMPING_DEFAULT;
 use super::{Arm, Change, Source, Warning};
 
-/// How a number is proposed.
+/// Rule for the proposal of a number.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Rule {
-    /// Its key in an arm file.
+    /// Key in an arm file.
     pub name: &'static str,
-    /// The rule in words.
+    /// Rule in words.
     pub rule: &'static str,
 }
 
-/// The rules of all numbers that are proposed.
+/// Rules of all numbers that are proposed.
 pub const RULES: [Rule; 11] = [
     Rule { name: "gravity_m_s2", rule: "9.81 m/s² down, z of the robot description being up" },
     Rule { name: "position_min_rad", rule: "the drives' working area" },
@@ -64,56 +64,56 @@ pub const RULES: [Rule; 11] = [
     },
 ];
 
-/// Rate at which the damping of Teaching reduces a speed at most, 1/s (J-25).
+/// Highest rate at which the damping in Teaching reduces a speed, 1/s (J-25).
 const TEACH_DAMPING_RATE: f64 = 100.0;
-/// Tool speed limit of an imported arm, m/s: that of robots next to people when they are set up (ISO 10218).
+/// Tool speed limit of an imported arm, m/s: the limit for setting up a robot next to people (ISO 10218).
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Kd over the least inertia, times the age of the derivative (J-71).
+/// Kd divided by the least inertia, multiplied by the age of the derivative (J-71).
 const DAMPING: f64 = 0.7;
-/// Half of the time over which the derivative is taken, and half of a tick for which a torque is held, s.
+/// Half of the derivative's time window plus half of a tick, for which a torque is held, s.
 const DERIVATIVE_AGE: f64 = 3e-3;
 /// Kp over Kd, 1/s.
 const STIFFNESS_RATE: f64 = 20.0;
 /// Ki over Kp, 1/s.
 const INTEGRAL_RATE: f64 = 2.0;
-/// Part of the greatest Ki that is stable without friction.
+/// Share of the greatest Ki that is stable without friction.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
-/// Reserve of the gains at both ends of the rotors that they have to tolerate.
+/// Reserve of the gains at both ends of the range of rotor inertias that the gains must tolerate.
 const RESERVE: f64 = 1.5;
 /// Steps of the search for gains with that reserve.
 const REDUCTIONS: usize = 60;
-/// Acceleration limit (rad/s²) for which a torque limit that is not given is enough.
+/// Acceleration limit (rad/s²) for which a proposed torque limit is sufficient.
 const ENOUGH_ACCELERATION: f64 = 3.0;
-/// Part of the torque that gravity leaves for the acceleration limit.
+/// Share of the torque left by gravity that the acceleration limit uses.
 const ACCELERATION_PART: f64 = 1.0 / 3.0;
-/// Part of the position error limit that a rotor as heavy as it may be lags by.
+/// Greatest lag of the heaviest assumed rotor, as a share of the position error limit.
 const ERROR_PART: f64 = 0.2;
-/// Acceleration (rad/s²) that a drive without a load has with all its torque.
+/// Acceleration (rad/s²) of a drive without a load at full torque.
 const ROTOR_ACCELERATION: f64 = 200.0;
-/// Least acceleration limit that is proposed, rad/s²; gravity may leave nothing.
+/// Smallest acceleration limit that is proposed, rad/s²; used also if gravity leaves no torque.
 const LEAST_ACCELERATION: f64 = 0.5;
 
-/// With so many significant digits: more would look measured. Downwards, so that no limit is passed.
+/// Rounds down to this number of significant digits: more digits would look measured, and rounding up could pass a limit.
 fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }
     let places = digits - 1 - value.abs().log10().floor() as i32;
-    // By text, which gives the nearest number to the decimal fraction.
+    // The conversion through text gives the number nearest to the decimal fraction.
     let scale = 10f64.powi(places);
     let down = (value * scale * (1.0 + 1e-12)).floor() / scale;
     format!("{down:.*}", places.max(0) as usize).parse().unwrap_or(down)
 }
 
 impl Arm {
-    /// Lowest and highest position of each joint, at most a turn away from zero.
+    /// Returns the lowest and highest position of each joint, at most one turn away from zero.
     pub(super) fn ranges(&self) -> Ranges {
         use std::f64::consts::TAU;
         self.joints.map(|j| (j.position_min.clamp(-TAU, TAU), j.position_max.clamp(-TAU, TAU)))
     }
 
-    /// Fills in what the description lacks, and marks it. `gravity` in the base frame, m/s²; `friction`: Coulomb (N·m) and viscous
-    /// (N·m·s/rad) of each joint, where the description has them.
+    /// Fills in the numbers that the description lacks, and marks them. `gravity` is in the base frame, m/s²; `friction` is
+    /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint if the description has them.
     pub(super) fn propose(&mut self, gravity: [f64; 3], friction: &[[f64; 2]; JOINTS]) {
         if self.gravity.is_none() {
             self.gravity = Some(gravity);
@@ -144,7 +144,7 @@ impl Arm {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
-                // What the heaviest rotor needs beside the model's torque comes of a position error.
+                // A position error supplies the torque of the heaviest rotor that the model does not contain.
                 let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
                 let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;
@@ -164,7 +164,7 @@ impl Arm {
         }
     }
 
-    /// Gains that are stable with the lightest and the heaviest rotors that are to be expected.
+    /// Returns gains that are stable with the lightest and the heaviest rotors to be expected.
     fn proposed_gains(&self, ranges: &Ranges) -> [PidGains; JOINTS] {
         let (delay, bounds) = (self.config().delay_ticks, self.config().parameter_bounds);
         let rotor = |factor: f64| self.joints.map(|j| factor * j.rotor_inertia);
@@ -197,7 +197,7 @@ impl Arm {
         of(damping, integral)
     }
 
-    /// Torque limits that the description does not give: those of another arm would be strangers' numbers.
+    /// Proposes the missing torque limits from this arm's own numbers; limits of another arm would not fit.
     fn propose_torques(&mut self, worst: &[f64; JOINTS], ranges: &Ranges) {
         let open = |joint: Joint| self.sources.of((Some(joint), "torque_max_nm")) == Source::Default;
         let open: Vec<usize> = Joint::ALL.into_iter().filter(|j| open(*j)).map(Joint::index).collect();
@@ -265,7 +265,7 @@ mod tests {
         }
     }
 
-    /// The page about arms has them word by word.
+    /// The documentation page about arms contains the rules word for word.
     #[test]
     fn the_rules_are_those_of_the_page() {
         let page = include_str!("../../../../docs/arm.md");

@@ -1,26 +1,26 @@
-//! Where each number of an arm comes from: its file, a proposal of `jtc arm import`, or nowhere.
+//! Source of each number of an arm: its file, a proposal of `jtc arm import`, a default, or none.
 
 use std::collections::BTreeSet;
 
 use jtc_wire::Joint;
 use serde::Serialize;
 
-/// Where a number comes from.
+/// Source of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
     /// The file gives it.
     File,
-    /// The file gives it and marks it as a starting value that nobody has measured or looked up.
+    /// The file gives the number and marks it as a starting value that was neither measured nor looked up.
     Proposed,
-    /// The file does not give it, and a default counts.
+    /// The file does not give the number, and a default is used.
     Default,
-    /// The file does not give it, and there is none.
+    /// The file does not give the number, and a default does not exist.
     Missing,
 }
 
 impl Source {
-    /// Its name, as in JSON.
+    /// Returns the name, as in JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::File => "file",
@@ -31,7 +31,7 @@ impl Source {
     }
 }
 
-/// A key of an arm file: of a joint, or of the arm.
+/// Key of a joint or of the arm in an arm file.
 pub type Key = (Option<Joint>, &'static str);
 
 /// Keys of the arm that can be proposed.
@@ -50,7 +50,7 @@ pub(super) const JOINT_KEYS: [&str; 10] = [
     "friction_polynomial",
 ];
 
-/// The keys whose values are not simply those of the file.
+/// Keys whose values are proposals or defaults.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sources {
     proposed: BTreeSet<Key>,
@@ -58,12 +58,12 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// The keys that the file marks as proposals, those of the arm first, then joint by joint.
+    /// Returns the keys that the file marks as proposals: first those of the arm, then joint by joint.
     pub fn proposed(&self) -> impl Iterator<Item = Key> + '_ {
         self.proposed.iter().copied()
     }
 
-    /// Where the value of a key that has one comes from.
+    /// Returns the source of a key that has a value.
     pub fn of(&self, key: Key) -> Source {
         if self.proposed.contains(&key) {
             Source::Proposed
@@ -74,18 +74,18 @@ impl Sources {
         }
     }
 
-    /// The value of `key` is a proposal.
+    /// Marks the value of `key` as a proposal.
     pub(super) fn propose(&mut self, key: Key) {
         self.defaults.remove(&key);
         self.proposed.insert(key);
     }
 
-    /// The file has no such key, and a default counts.
+    /// Marks the value of `key` as a default, because the file has no such key.
     pub(super) fn fill_in(&mut self, key: Key) {
         self.defaults.insert(key);
     }
 
-    /// Marked keys of a joint or of the arm, in the order of the file.
+    /// Returns the marked keys of a joint or of the arm, in the order of the file.
     pub(super) fn marked(&self, joint: Option<Joint>) -> Vec<&'static str> {
         let keys: &[&str] = if joint.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
         keys.iter().copied().filter(|key| self.proposed.contains(&(joint, key))).collect()

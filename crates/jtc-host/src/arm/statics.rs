@@ -1,4 +1,4 @@
-//! What an arm at rest asks of its drives: the greatest gravity torque over all positions, and the inertia that a joint moves.
+//! Load of the drives of an arm at rest: the greatest gravity torque over all positions, and the inertia that a joint moves.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -6,32 +6,32 @@ use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 /// Lowest and highest position of each joint, rad.
 pub(super) type Ranges = [(f64, f64); JOINTS];
 
-/// Poses from which the search for a greatest torque starts.
+/// Number of start poses of the search for the greatest torque.
 const STARTS: usize = 24;
-/// Rounds of all joints in one search; it mostly ends after three.
+/// Maximum rounds over all joints in one search; a search mostly ends after three.
 const ROUNDS: usize = 12;
-/// Poses in which inertia is looked at.
+/// Number of poses in which inertia is computed.
 pub(super) const POSES: usize = 512;
-/// Less than this, relative to the torque, is no gain.
+/// Relative increase of the torque up to which the search counts no gain.
 const GAIN: f64 = 1e-9;
 
-/// The greatest torque (N·m, without sign) that gravity asks of a joint, and a pose (rad) in which it does.
+/// Greatest gravity torque of a joint (N·m, without sign), and a pose (rad) with this torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worst {
     pub torque: f64,
     pub pose: JointVec,
 }
 
-/// The least and the greatest inertia (kg·m²) that a joint moves.
+/// Least and greatest inertia (kg·m²) that a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Inertia {
-    /// With the other joints free to give way: what its drive feels at first.
+    /// Inertia while the other joints can move freely: the inertia that the drive feels at first.
     pub least: f64,
-    /// With the other joints held.
+    /// Inertia while the other joints are held.
     pub most: f64,
 }
 
-/// The `n`-th pose of a sequence that fills the ranges evenly (Halton 1960).
+/// Returns the `n`-th pose of a sequence that fills the ranges evenly (Halton 1960).
 pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     const PRIMES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];
     std::array::from_fn(|j| {
@@ -45,7 +45,8 @@ pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     })
 }
 
-/// Where a + b·cos x + c·sin x is greatest in a range, from its values at `at` and a third of a turn to either side.
+/// Returns the x in a range at which a + b·cos x + c·sin x is greatest, from the values at `at` and a third of a turn to either
+/// side.
 fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     let third = std::f64::consts::TAU / 3.0;
     let angles = [at, at + third, at - third];
@@ -59,10 +60,10 @@ fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     ends.max_by(|x, y| height(*x).total_cmp(&height(*y))).unwrap_or(low)
 }
 
-/// The greatest gravity torque of each joint over the ranges.
+/// Returns the greatest gravity torque of each joint over the ranges.
 ///
-/// As a function of a single position each torque is a sine with an offset, so its greatest value along one position is known in
-/// closed form; the search goes from joint to joint until no position gives more, from many starts.
+/// As a function of a single position each torque is a sine with an offset, so the greatest value along one position has a closed
+/// form. The search goes from joint to joint until no position gives more torque, from many start poses.
 pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges) -> [Worst; JOINTS] {
     let dynamics = Dynamics::new(model, gravity);
     let third = std::f64::consts::TAU / 3.0;
@@ -88,7 +89,7 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
                     break;
                 }
             }
-            // Rounding is no torque.
+            // Ignores rounding errors.
             if height > best.torque * (1.0 + GAIN) + 1e-9 {
                 best = Worst { torque: height, pose: plain(&q, sign, height, ranges, &torque) };
             }
@@ -97,7 +98,7 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
     })
 }
 
-/// The same pose with each position that does not matter at 0.
+/// Returns the pose with each position that does not change the torque set to 0, or as near to 0 as its range allows.
 fn plain(
     q: &JointVec,
     sign: f64,
@@ -125,7 +126,7 @@ fn with(q: &JointVec, joint: usize, position: f64) -> JointVec {
     q
 }
 
-/// The inertia of each joint with its rotor, in poses all over the ranges.
+/// Returns the least and greatest inertia of each joint with its rotor, over poses distributed over the ranges.
 pub(super) fn inertia(model: &ArmModel, rotor: &JointVec, ranges: &Ranges) -> [Inertia; JOINTS] {
     let dynamics = Dynamics::new(model, [0.0; 3]);
     let mut all = [Inertia { least: f64::INFINITY, most: 0.0 }; JOINTS];
@@ -155,7 +156,7 @@ mod tests {
         arm.joints.map(|j| (j.position_min, j.position_max))
     }
 
-    /// Against the plainest search there is: a grid of all positions that matter.
+    /// Compares with the simplest search: a grid of all positions that change the torque.
     #[test]
     fn the_greatest_gravity_torque_is_no_less_than_any_on_a_grid() {
         let arm = Arm::avena();

@@ -9,7 +9,7 @@ use test_kit::existing;
 use super::*;
 use host_kit::Diagnose;
 
-/// The host's reading of the arm file and the controller's built-in defaults are the same numbers.
+/// The arm file as the host reads it equals the controller's built-in defaults.
 #[test]
 fn the_delivered_arm_is_the_controller_s_default() {
     let arm = Arm::avena();
@@ -32,10 +32,10 @@ fn a_file_of_another_kind_is_called_no_arm_file() {
 fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     let whole = Arm::avena();
     assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));
-    // Files from before there was a format mean the same.
+    // Files without a format key are older and mean the same.
     assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
     for other in ["3", "1", "\"two\""] {
-        // Also where the rest has keys that are not known.
+        // The format error comes first, also if the file has unknown keys.
         let text = AVENA_TOML.replace("\nformat = 2\n", &format!("\nformat = {other}\nnew_key = 1\n"));
         let message = Arm::parse(&text).unwrap_err().to_string();
         assert!(message.contains(&format!("format = {other} is none")), "{message}");
@@ -43,7 +43,7 @@ fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     }
 }
 
-/// The six joints in a plain description.
+/// Returns a plain description with the six joints.
 fn urdf(axis: &str, joint: &str) -> String {
     let arm = Arm::avena();
     let mut text = String::from("<robot name=\"t\"><link name=\"world\"/>");
@@ -85,7 +85,7 @@ fn a_plain_urdf_is_carried_over_exactly() {
     assert!(arm.warnings.is_empty(), "{:?}", arm.warnings);
 }
 
-/// An axis of −z turns the sense of each joint: torques of the mirrored motion, mirrored back.
+/// An axis of −z inverts the direction of each joint: the torques are those of the mirrored motion, mirrored back.
 #[test]
 fn joints_about_minus_z_keep_positions_and_torques() {
     let (plain, turned) = (Arm::avena(), Arm::parse(&urdf("0 0 -1", "revolute")).unwrap());
@@ -101,7 +101,7 @@ fn joints_about_minus_z_keep_positions_and_torques() {
     }
 }
 
-/// A tool screwed to the last link and a plate between two joints are the same arm as their masses put together.
+/// A tool on the last link and a plate between two joints give the same arm as their combined masses.
 #[test]
 fn fixed_bodies_become_part_of_their_link() {
     let tool = "<link name=\"tool\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" \
@@ -123,11 +123,11 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
-    // No form of file and no option helps there.
+    // No file format and no option helps in this case.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
-    // What stands in the value of an attribute ends no tag.
+    // A `>` in the value of an attribute does not end the tag.
     assert!(error_of(&"<a x='/>'>".repeat(60_000)).contains("nested"));
     assert!(error_of(&"<a x=\"'/>\">".repeat(60_000)).contains("nested"));
     assert!(
@@ -147,7 +147,7 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     );
 }
 
-/// A joint of that kind, with a link of 1 kg on it, on `parent`.
+/// Returns a joint of type `kind` on `parent`, with a link of 1 kg.
 fn more(name: &str, kind: &str, parent: &str) -> String {
     format!(
         "<link name=\"of_{name}\"><inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" \
@@ -165,7 +165,7 @@ fn a_continuous_joint_has_the_working_area_of_its_drive() {
     assert!(arm.warnings.iter().any(|w| w.place == "joint j2" && w.problem.contains("no position limits")));
 }
 
-/// Z1, UR with a gripper, a redundant arm: what is too much is named, and the command that selects six.
+/// Z1, UR with a gripper, a redundant arm: the error names the surplus joints and the command that selects six.
 #[test]
 fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     let plain = urdf("0 0 1", "revolute");
@@ -202,12 +202,12 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
         let held = |w: &Warning| w.place == format!("joint {body}") && w.problem.contains("held at 0");
         assert!(arm.warnings.iter().any(held), "{:?}", arm.warnings);
     }
-    // Only what lies on the way to the tip is the arm.
+    // Only joints on the path to the tip belong to the arm.
     let arm = import(&seven, None, Some("flange")).unwrap();
     assert_eq!((arm.joint_names[5].as_str(), arm.model.joints[6]), ("j6", Arm::avena().model.joints[6]));
     let arm = import(&branch, None, Some("l6")).unwrap();
     assert_eq!(arm.model.joints[6], Origin::default(), "the flange is the tip");
-    // The tip behind a gripper that is held at zero.
+    // The tip is after a gripper that is held at zero.
     let arm = import(&seven, names("j1,j2,j3,j4,j5,j6"), Some("of_gripper")).unwrap();
     assert_eq!(arm.model.joints[6], Arm::avena().model.joints[6]);
 
@@ -230,7 +230,7 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert!(import(&seven, None, Some("l5")).unwrap_err().to_string().contains("is --tip the last link"));
 }
 
-/// A seventh joint in the middle that is held at zero: the arm without it.
+/// A seventh joint in the middle is held at zero: the result is the arm without it.
 #[test]
 fn a_joint_that_is_held_keeps_its_place() {
     let plain = urdf("0 0 1", "revolute");
@@ -332,7 +332,7 @@ fn the_existing_parameter_files_are_read() {
     }
     if let Some(file) = load("model_default.txt") {
         let model = file.model.unwrap();
-        // The one number that the old default has with the other sign.
+        // The only number whose sign differs in the old default.
         assert_eq!((model.joints[3].xyz[2], model.links), (0.005, arm.model.links));
     }
     if let Some(file) = load("avena_arm_id.urdf") {
@@ -357,7 +357,7 @@ fn the_existing_parameter_files_are_read() {
     }
 }
 
-/// Gains of one joint as the existing programs write them; each joint has its own Kp.
+/// Writes the gains of one joint as the existing programs do; each joint has its own Kp.
 fn gains_file(dir: &Path, joint: usize) -> PathBuf {
     let path = dir.join(format!("PidParamJoint{joint}.csv"));
     std::fs::write(&path, format!("{},10,5,-1,1\n", 1000 + joint)).unwrap();
@@ -375,7 +375,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert_eq!(kp(ParameterFile::load_all(&backwards).unwrap()), expected);
     assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
 
-    // One is named although all are there: which is meant is not guessed.
+    // Only one file is named although all are present: the loader does not guess the intention.
     let error_of = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
     let text = error_of(&all[2..3]);
     assert!(
@@ -387,7 +387,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert!(text.contains("not named: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
     assert!(error_of(&[&all[..], &all[..1]].concat()).contains("joint 1"));
 
-    // One is missing in the directory.
+    // A file is missing in the directory.
     std::fs::remove_file(&all[3]).unwrap();
     let text = ParameterFile::load(dir.path()).unwrap_err().to_string();
     assert!(text.contains("PidParamJoint3.csv (joint 4)") && !text.contains("(joint 5)"), "{text}");

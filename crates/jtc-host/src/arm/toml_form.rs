@@ -1,4 +1,4 @@
-//! The TOML form of an arm.
+//! TOML format of an arm.
 
 use std::collections::BTreeMap;
 
@@ -21,10 +21,10 @@ use super::source::{ARM_KEYS, JOINT_KEYS};
 use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
-/// Format of the arm files that are read. Files without it are older and mean the same.
+/// Format number of the arm files that this program reads. Files without a number are older and mean the same.
 pub(super) const FORMAT: i64 = 2;
 
-/// The keys that decide how the rest is read.
+/// Keys that decide how the rest is read.
 #[derive(Deserialize)]
 struct Head {
     format: Option<toml::Value>,
@@ -72,11 +72,11 @@ struct TableForm {
 }
 
 impl Arm {
-    /// From the TOML form; numbers that the controller would refuse are an error.
+    /// Reads an arm from TOML; returns an error for numbers that the controller would refuse.
     ///
     /// # Errors
     ///
-    /// The first key or number that is missing, unknown or of the wrong form, with its line.
+    /// Returns an error with the first key or number that is missing, unknown or of the wrong form, with its line.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let arm = read(text)?;
         match arm.limit_faults().into_iter().next() {
@@ -89,7 +89,7 @@ impl Arm {
     }
 }
 
-/// The arm of a text; its numbers may be wrong.
+/// Reads the arm from a text without checking its numbers.
 pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     let wrong = |e: toml::de::Error| {
         let line = e.span().map(|s| 1 + text.get(..s.start).unwrap_or("").matches('\n').count());
@@ -100,7 +100,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
         return Err(FileError::form(problem));
     }
-    // Before the keys, which another format may have others of.
+    // Checks the format before the keys, because another format may have other keys.
     if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
         && format.as_integer() != Some(FORMAT)
     {
@@ -179,7 +179,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     })
 }
 
-/// An array of just so many numbers: as an array type of its own it would be read without those that are too many.
+/// Reads an array of exactly `N` numbers; as an array type it would be read without the surplus numbers.
 fn exactly<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
     let numbers = Vec::<f64>::deserialize(from)?;
     let count = numbers.len();
@@ -188,12 +188,12 @@ fn exactly<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N
         .map_err(|_| D::Error::invalid_length(count, &format!("an array of length {N}").as_str()))
 }
 
-/// The same of a number that need not be there.
+/// Like [`exactly`], for an optional key.
 fn exactly_or_none<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<Option<[f64; N]>, D::Error> {
     exactly(from).map(Some)
 }
 
-/// The settings of the controller that a file gives.
+/// Reads the controller settings of a file.
 fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, FileError> {
     let mut all = Vec::new();
     for (name, value) in given {
@@ -222,7 +222,7 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
     Ok(all)
 }
 
-/// A part that all six joints have, or none.
+/// Returns a part of all six joints, `None` if no joint has the part, or an error if only some joints have it.
 fn all_or_none<T>(
     joints: &[JointForm],
     key: &str,
@@ -246,7 +246,7 @@ fn all_or_none<T>(
     }
 }
 
-/// Takes over which numbers a list of the file marks as proposed: those of the arm, or of a joint.
+/// Takes over the list of proposed numbers, either of the arm or of a joint.
 fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]) -> Result<(), FileError> {
     let number = of.map(|(number, _)| number);
     let keys: &[&'static str] = if of.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
@@ -292,7 +292,7 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
             )));
         }
     };
-    // Also where polynomials are used: who changes over later does not look for it there.
+    // Checks the tables also if polynomials are used, because an operator who changes to tables later does not expect an error in them.
     for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
         check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;
     }

@@ -1,7 +1,8 @@
-//! Arms from URDF: six rotary joints in a chain and a fixed flange; what the controller's arm model cannot carry is reported.
+//! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the controller's arm model
+//! cannot carry.
 //!
-//! Joints about another axis than +z are carried by turning the frames of their links, which changes neither positions nor
-//! torques. Bodies behind fixed joints, and behind joints that are none of the six, become part of the link that carries them.
+//! For a joint about another axis than +z the reader turns the frame of its link, which changes neither positions nor torques.
+//! Bodies attached by fixed joints, and by joints that are not among the six, become part of the link that carries them.
 
 mod choice;
 mod frames;
@@ -20,22 +21,22 @@ use self::limits::short;
 use super::{Arm, ArmChoice, Change, Described, Sources, Warning};
 use crate::file::FileError;
 
-/// The chain of joints with what hangs on it.
+/// Chain of joints with the bodies attached to it.
 struct Chain<'a> {
     robot: &'a Robot,
     rotary: [&'a Joint; JOINTS],
-    /// From the last link to the flange.
+    /// Joints from the last link to the flange.
     flange: Vec<&'a Joint>,
     warnings: Vec<Warning>,
     sources: Sources,
-    /// Names of the joints whose limits give no position.
+    /// Names of the joints without position limits.
     without_ranges: Vec<String>,
 }
 
-/// Standard gravity as arm files have it, m/s², downwards in a description whose z points upwards.
+/// Standard gravity as in arm files, m/s², downwards in a description whose z points upwards.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// The arm of a description; `choice` selects its joints.
+/// Reads the arm of a description; `choice` selects its joints.
 pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileError> {
     text::check_depth(text)?;
     let text = text::with_velocities(text);
@@ -61,13 +62,14 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         joints,
         warnings: chain.warnings,
         sources: chain.sources,
-        // The form has no place for the rest.
+        // URDF cannot carry the rest.
         ..Arm::nameless()
     };
     Ok(Described { arm, gravity, friction })
 }
 
-/// No two joints or links share a name, and no link has two parents: which of them is meant is not guessed.
+/// Checks that no two joints or links share a name and that no link has two parents, because the reader does not guess which is
+/// meant.
 fn only_once(robot: &Robot) -> Result<(), FileError> {
     fn twice(mut names: Vec<&str>) -> Option<&str> {
         names.sort_unstable();
@@ -110,7 +112,7 @@ impl<'a> Chain<'a> {
         Ok(chain)
     }
 
-    /// What hangs on it does not move against what carries it.
+    /// Returns `true` if the joint does not move: its child link is rigidly attached to its parent link.
     fn rigid(&self, joint: &Joint) -> bool {
         !self.rotary.iter().any(|r| r.name == joint.name)
     }
@@ -119,7 +121,7 @@ impl<'a> Chain<'a> {
         self.warnings.push(Warning::new(change, place, problem));
     }
 
-    /// Five axes and a gripper are six joints as well.
+    /// Warns if the sixth joint is a gripper: five axes and a gripper are also six joints.
     fn doubt_gripper(&mut self, choice: &ArmChoice) {
         let last = self.rotary[JOINTS - 1];
         let words = format!("{} {}", last.name, last.child.link).to_lowercase();
@@ -129,7 +131,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Acceleration of gravity in the base frame, m/s².
+    /// Returns the acceleration of gravity in the base frame, m/s².
     fn gravity(&self) -> [f64; 3] {
         let mut frame = Frame::IDENTITY;
         let mut at = &self.rotary[0].parent.link;
@@ -137,12 +139,12 @@ impl<'a> Chain<'a> {
             frame = Frame::of(&origin(&joint.origin)).then(&frame);
             at = &joint.parent.link;
         }
-        // Rounding of a quarter turn is no tilt.
+        // Removes the rounding error of a quarter turn, which is not a tilt.
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// What leads from the last link to the flange: the way to `tip`, or else the fixed joint behind it; of several the one whose
-    /// name is one, else the first.
+    /// Finds the joints from the last link to the flange: the path to `tip`, or else a fixed joint on the last link. If there are
+    /// several fixed joints, the joint with the name of a flange is used, else the first.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -175,7 +177,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Joints on the way from link `from` to link `to`, first to last, if none of them moves.
+    /// Returns the joints on the path from link `from` to link `to`, first to last, if none of them moves.
     fn rigid_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
         let mut path = Vec::new();
         let mut at = to;
@@ -195,7 +197,7 @@ impl<'a> Chain<'a> {
         let mut model = ArmModel::default();
         let base = self.rotary[0].parent.link.clone();
         self.look_below(&base);
-        // Turn of each link's frame against URDF's.
+        // Rotation of each link's frame relative to URDF.
         let mut turn = Frame::IDENTITY;
         model.links[0] = self.link(&base, &turn)?;
         for (i, joint) in self.rotary.into_iter().enumerate() {
@@ -239,7 +241,7 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// What lies below the arm's own base: it does not move, but it places the base somewhere else.
+    /// Reports joints below the arm's own base: they do not move, but an offset changes the place of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {
@@ -258,7 +260,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// A link with all that fixed joints hang on it, in the turned frame.
+    /// Returns a link in the turned frame, together with all bodies attached by joints that do not move.
     fn link(&mut self, name: &str, turn: &Frame) -> Result<Link, FileError> {
         let mut bodies = Vec::new();
         let mut todo = vec![(name.to_owned(), Frame::IDENTITY)];

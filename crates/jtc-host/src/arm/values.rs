@@ -1,4 +1,4 @@
-//! Every number of an arm with its unit, its range, its default and where it comes from.
+//! Every number of an arm with its unit, range, default and source.
 
 use jtc_core::settings::{self, Setting};
 use jtc_core::{Config, ParameterBounds, PidGains, WORKING_AREA};
@@ -8,30 +8,31 @@ use serde::Serialize;
 use super::toml_form::{ACCELERATION_DEFAULT, POSITION_ERROR_DEFAULT, VELOCITY_DEFAULT};
 use super::{Arm, Source};
 
-/// A number of an arm.
+/// Number of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmValue {
-    /// Its key in an arm file; of a number in a table or list with the part behind a dot, as in `pid.kp` and `com_xyz_m.x`.
+    /// Key in an arm file. For a number in a table or list the part follows a dot, as in `pid.kp` and `com_xyz_m.x`.
     pub name: &'static str,
-    /// The joint, for what is of one; the flange has none.
+    /// Joint, if the number belongs to a joint; `None` for the flange.
     pub joint: Option<Joint>,
-    /// The link, 0 for the base, for what is of one; origins of joints are of the link that they carry, that of the flange of 7.
+    /// Link, 0 for the base, if the number belongs to a link. The origin of a joint has the number of the link that the joint
+    /// carries; the flange has 7.
     pub link: Option<usize>,
-    /// The number; nothing where it is missing.
+    /// Value; `None` if the number is missing.
     pub value: Option<f64>,
-    /// Its unit.
+    /// Unit of the value.
     pub unit: &'static str,
-    /// The least that a controller takes, where that is bounded.
+    /// Least value that a controller accepts, if there is a bound.
     pub min: Option<f64>,
-    /// The most that a controller takes, where that is bounded.
+    /// Greatest value that a controller accepts, if there is a bound.
     pub max: Option<f64>,
-    /// What counts where the file does not give it.
+    /// Default if the file does not give the number.
     pub default: Option<f64>,
-    /// Where it comes from.
+    /// Source of the number.
     pub from: Source,
 }
 
-/// What is known of a number whatever the arm.
+/// Properties of a number that do not depend on the arm.
 pub(super) struct Kind {
     pub name: &'static str,
     pub unit: &'static str,
@@ -66,10 +67,11 @@ const FRICTION: [(&str, &str); 6] = [
     ("friction_polynomial.c5", "°C"),
 ];
 
-/// Numbers of one thing: what each is, and where it stands there.
+/// Numbers of a type `T`: properties of each number, and a function that reads it.
 pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
-/// A setting of each joint or of the controller: its range is that of the table, and what the drives can do of it.
+/// Returns the properties of a setting of the joints or the controller; the range is that of the settings table, limited to the
+/// range of the drives.
 fn setting(row: &Setting, drives: &Config) -> Kind {
     let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
     let (low, high) = match row.name {
@@ -83,16 +85,16 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "position_error_max_rad" => Some(POSITION_ERROR_DEFAULT),
         "rotor_inertia_kg_m2" => Some(0.0),
         "torque_gain" => Some(1.0),
-        // It follows from the torque limit, which differs from joint to joint.
+        // The default depends on the torque limit, which differs from joint to joint.
         "teach_damping_nm_s_rad" => None,
-        // An arm file has to give them.
+        // These numbers are mandatory in an arm file.
         _ if row.of_joint() => None,
         _ => row.get(drives, 0),
     };
     Kind { default, ..kind(row.name, row.unit, Some(low), Some(high)) }
 }
 
-/// What the gains of a joint are.
+/// Returns the properties of the gains of a joint.
 pub(super) fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
     let (none, least, most) = (Some(0.0), Some(-bounds.integral_max), Some(bounds.integral_max));
     [
@@ -104,13 +106,13 @@ pub(super) fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
     ]
 }
 
-/// A number of no joint and no link.
+/// Creates a number that belongs to no joint and no link.
 fn value(kind: Kind, value: Option<f64>, from: Source) -> ArmValue {
     let Kind { name, unit, min, max, default } = kind;
     ArmValue { name, joint: None, link: None, value, unit, min, max, default, from }
 }
 
-/// Numbers of a list, which the file gives.
+/// Creates the numbers of a list that the file gives.
 fn listed(
     names: &[&'static str],
     unit: &'static str,
@@ -126,8 +128,8 @@ fn listed(
 }
 
 impl Arm {
-    /// Every number of the arm but friction tables, which are too many to look at: gravity, the joints' numbers, then frames and
-    /// links, and the settings that the controller has of its own.
+    /// Returns every number of the arm except the long friction tables: gravity, the numbers of the joints, frames and links, and
+    /// the controller's own settings.
     pub fn values(&self) -> Vec<ArmValue> {
         let (drives, config) = (Config::avena(), self.config());
         let gravity = self.gravity.map_or(Source::Default, |_| self.sources.of((None, "gravity_m_s2")));
@@ -170,7 +172,7 @@ impl Arm {
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
             all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
         }
-        // Settings of the controller, which it has of its own; gravity stands above.
+        // Settings of the controller itself; gravity is already in the list.
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {
@@ -209,7 +211,7 @@ mod tests {
         );
         assert_eq!((of("pid.kd", 1).from, of("pid.kd", 1).value), (Source::Proposed, Some(80.0)));
         assert_eq!(of("friction_polynomial.c0", 3).value, arm.polynomial.map(|c| c[2][0]));
-        // 3 of gravity, 19 of each joint, 6 of each frame, 13 of each link, and those of the controller.
+        // 3 numbers of gravity, 19 of each joint, 6 of each frame, 13 of each link, and the settings of the controller.
         let own = settings::count(true) - 6 * 8 - 3;
         assert_eq!(all.len(), 3 + 6 * 19 + 7 * 6 + 7 * 13 + own);
         let missing = Arm { pid: None, ..arm }.values();

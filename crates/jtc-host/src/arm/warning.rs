@@ -1,38 +1,38 @@
-//! What reading a file changed, filled in or left out.
+//! Changes made by reading a file: values changed, filled in or left out.
 
 use serde::Serialize;
 
-/// What kind of change it is.
+/// Kind of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Change {
-    /// Which frame is the base.
+    /// The base frame was chosen.
     Base,
-    /// Which frame is the flange.
+    /// The flange frame was chosen.
     Flange,
-    /// A joint's axis is turned to +z.
+    /// The axis of a joint was turned to +z.
     AxisTurned,
-    /// A fixed joint, or the body behind one, is part of what carries it.
+    /// A fixed joint, or its body, was merged into the link that carries it.
     Merged,
-    /// A joint that is none of the six is held at 0.
+    /// A joint outside the six is held at 0.
     LeftOut,
-    /// A limit is narrowed to what the drives can do.
+    /// A limit was narrowed to the range of the drives.
     LimitCut,
-    /// A limit is missing or of no use, and another is taken.
+    /// A limit is missing or unusable, and another value is used.
     LimitAssumed,
-    /// A number that an arm file has no place for.
+    /// An arm file has no place for the number.
     NotCarried,
-    /// A number of a robot description that is taken for a start only.
+    /// A number of a robot description is used only as a starting value.
     Doubtful,
     /// Numbers of the file are proposals of `jtc arm import`.
     Proposed,
-    /// Which of several files counts.
+    /// The loader chose between several files.
     Files,
 }
 
 impl Change {
-    /// A heading for changes of this kind.
+    /// Returns a heading for changes of this kind.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Base => "base",
@@ -52,14 +52,14 @@ impl Change {
     }
 }
 
-/// Something in a file that could not be carried over, or was filled in.
+/// Item in a file that could not be carried over, or was filled in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
-    /// What kind of change it is.
+    /// Kind of the change.
     pub change: Change,
-    /// Joint, link or key.
+    /// Name of the joint, link or key.
     pub place: String,
-    /// What is the matter and what was done.
+    /// Problem, and the change that was made.
     pub problem: String,
 }
 

@@ -1,4 +1,4 @@
-//! Problems summed by what causes them: which joints, at how many points, where it is first and where it is worst.
+//! Summary of problems by cause: joints, number of points, first place and worst place.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -9,31 +9,31 @@ use serde::Serialize;
 use super::kind::ProblemKind;
 use super::problem::{Problem, Seen};
 
-/// All problems of one kind.
+/// Summary of all problems of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cause {
-    /// What is wrong.
+    /// Kind of the problems.
     pub kind: ProblemKind,
-    /// The same in words.
+    /// Kind in words.
     pub words: &'static str,
     /// Unit of values and limits; empty for numbers.
     pub unit: &'static str,
-    /// None where it is the trajectory as a whole.
+    /// Joints with this problem; empty if the problem concerns the whole trajectory.
     pub joints: Vec<Joint>,
-    /// Points of the file at which it is, or after which it is before the next.
+    /// Number of points in the file at which the problem occurs, or after which it occurs before the next point.
     pub points: usize,
-    /// The first place along the path.
+    /// First place along the path.
     pub first: Seen,
-    /// The place where it is furthest beyond its limit.
+    /// Place with the largest excess over the limit.
     pub worst: Seen,
-    /// The trajectory can run all the same.
+    /// `true` if the trajectory can run despite the problem.
     pub warning: bool,
 }
 
-/// Points at which each kind is.
+/// Points of each kind of problem.
 pub(super) type Places = BTreeMap<ProblemKind, BTreeSet<usize>>;
 
-/// One cause for each kind of `problems`, in their order.
+/// Returns one cause for each kind of `problems`, in their order.
 pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     let mut excess = Vec::new();
@@ -71,7 +71,7 @@ pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
 }
 
 impl fmt::Display for Cause {
-    /// One line where it is at one place, or else three.
+    /// Writes one line for a single place, else three lines.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.warning {
             f.write_str("warning: ")?;
@@ -84,7 +84,7 @@ impl fmt::Display for Cause {
         if self.points > 1 {
             write!(f, ", at {} points", self.points)?;
         }
-        // The words stand in the line above.
+        // The line above already contains the words.
         let short = |words: &str| words.replacen(&format!("{}: ", self.words), "", 1);
         write!(f, "\n    worst: {}", short(&worst))?;
         if self.first != self.worst {
@@ -94,7 +94,7 @@ impl fmt::Display for Cause {
     }
 }
 
-/// "joint 2", "joints 1, 2 and 6".
+/// Formats joints: "joint 2", "joints 1, 2 and 6".
 fn joints(joints: &[Joint]) -> String {
     let names: Vec<String> = joints.iter().map(|joint| joint.number().to_string()).collect();
     match names.split_last() {

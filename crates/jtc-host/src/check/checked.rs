@@ -1,4 +1,4 @@
-//! A trajectory that passed the check, the only kind that a session uploads and executes.
+//! Trajectory that passed the check; a session uploads and executes no other kind.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,26 +13,26 @@ use crate::error::CheckError;
 use crate::plan::{PlanError, Planner};
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Counts the checks that were passed, so that two trajectories are never taken for one another.
+/// Number of the next check that passes, so that two trajectories are never confused.
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
-/// How a trajectory is checked for a run.
+/// Options for the check of a trajectory before a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CheckOptions {
-    /// Segments that it will be sent in; their number is part of the check.
+    /// Division into segments for the upload; the check includes the number of segments.
     pub upload: UploadOptions,
-    /// The values of the arm file that no frame carries (limits, gravity, rotor inertia) may differ from those of
-    /// the controller, and those of the controller are safe for this arm. Without it such an arm is refused (J-55).
+    /// `true` if the values that no frame carries (limits, gravity, rotor inertia) may differ between arm file and controller,
+    /// and the controller's values are safe for this arm. If `false`, such an arm is refused (J-55).
     pub accept_device_limits: bool,
-    /// Settings of the controller: by default those that are built in, and what [`Session::device_config`](crate::Session::device_config)
-    /// returns for one with extensions.
+    /// Settings of the controller. The default is the built-in settings; for a controller with extensions use the result of
+    /// [`Session::device_config`](crate::Session::device_config).
     pub device: Config,
 }
 
-/// A trajectory that may be run: it passed the check against an arm, from the pose in which the arm stood.
+/// Trajectory that may run: it passed the check against an arm, from the pose of the arm at that time.
 ///
-/// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) take nothing else, and
-/// [`CheckedTrajectory::check`] is the only way to make one, so a program that runs an unchecked trajectory does not compile:
+/// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) accept only this type, and only
+/// [`CheckedTrajectory::check`] creates it. So a program that runs an unchecked trajectory does not compile:
 ///
 /// ```compile_fail,E0308
 /// fn run<P: jtc_host::Port>(session: &mut jtc_host::Session<P>, trajectory: &jtc_host::Trajectory) {
@@ -40,7 +40,7 @@ pub struct CheckOptions {
 /// }
 /// ```
 ///
-/// Nor can one be put together from its parts, or be changed after the check:
+/// A program cannot build one from its parts, or change one after the check:
 ///
 /// ```compile_fail,E0616
 /// fn faster(checked: &mut jtc_host::CheckedTrajectory) {
@@ -50,14 +50,13 @@ pub struct CheckOptions {
 ///
 /// # Start pose
 ///
-/// The check compares the first point with the pose that it is given: no joint may be further from it than the start tolerance,
-/// 0.02 rad (J-34). Give it the pose that was measured just before, from the status that
-/// [`Session::wait_ready`](crate::Session::wait_ready) returns. An arm that stands elsewhere is moved to the first point by a
-/// trajectory of its own, which [`Planner::to`](crate::plan::Planner::to) makes and which is checked in the same way; after it the
-/// motion is checked from the pose that the approach ended in.
+/// The check compares the first point with the given pose: no joint may deviate by more than the start tolerance, 0.02 rad
+/// (J-34). Pass a pose that was measured just before, from the status that [`Session::wait_ready`](crate::Session::wait_ready)
+/// returns. If the arm is in another pose, [`Planner::to`](crate::plan::Planner::to) plans a trajectory to the first point, which
+/// is checked in the same way. Then check the motion from the final pose of that approach.
 ///
-/// The controller compares once more at the moment of execution. An arm that was moved after the check does not move by it:
-/// execution is refused with data status 8.
+/// The controller repeats the comparison at the moment of execution. If the arm was moved after the check, execution is refused
+/// with data status 8 and the arm does not move.
 #[derive(Clone)]
 pub struct CheckedTrajectory {
     trajectory: Arc<Trajectory>,
@@ -66,12 +65,12 @@ pub struct CheckedTrajectory {
     verdict: Verdict,
     delay_ticks: u8,
     number: u64,
-    /// What it was checked with.
+    /// Arm and settings that the check used.
     basis: Arc<(Arm, Config)>,
 }
 
 impl fmt::Debug for CheckedTrajectory {
-    /// Without its points, which are up to 12 000.
+    /// Writes a summary without the points (up to 12 000).
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Verdict { points, step_ms, duration_s, .. } = self.verdict;
         write!(
@@ -85,22 +84,22 @@ impl fmt::Debug for CheckedTrajectory {
 impl CheckedTrajectory {
     /// Checks `trajectory` for a run by `arm` from the measured pose `start` (rad, base to wrist).
     ///
-    /// The limits are the tighter ones of the arm and of the controller ([`Arm::config_on_device`]); the torques are those of the
-    /// arm model with the arm's friction, gravity and rotor inertia as the controller computes with them.
+    /// The limits are the tighter ones of the arm and the controller ([`Arm::config_on_device`]). The torques come from the arm
+    /// model, with the arm's friction and with the gravity and rotor inertia of the controller.
     ///
     /// # Errors
     ///
-    /// [`CheckError::DeviceLimits`] when the arm has values that the controller uses otherwise, unless the options accept them.
-    /// [`CheckError::Refused`] with the verdict when anything forbids to run it: a limit exceeded at or between points, a jump, not at rest
-    /// at its ends, too much torque, no room to stop, too many points or segments, or the arm not at the first point. An arm whose
-    /// numbers are not physical is [`CheckError::Arm`]. Nothing is sent in either case.
+    /// [`CheckError::DeviceLimits`] if the controller has other values than the arm, and the options do not accept that.
+    /// [`CheckError::Refused`] with the verdict if the trajectory may not run: a limit is exceeded at or between points, a jump,
+    /// motion at its ends, too much torque, no way to stop in time, too many points or segments, or an arm that is not at the
+    /// first point. [`CheckError::Arm`] if the numbers of the arm are not physical. In each case no frame was sent.
     pub fn check(
         trajectory: &Trajectory,
         arm: &Arm,
         start: &[f64; JOINTS],
         options: &CheckOptions,
     ) -> Result<Self, CheckError> {
-        // The fields of an arm are public: numbers that make the dynamics senseless would pass for any torque.
+        // The fields of an arm are public: with numbers that are not physical, any torque could pass.
         arm.is_physical()?;
         let differences = arm.device_differences(&options.device);
         if !differences.is_empty() && !options.accept_device_limits {
@@ -125,20 +124,20 @@ impl CheckedTrajectory {
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
                 basis: Arc::new((arm.clone(), config)),
             }),
-            // A number that no frame carries is among the problems of the verdict.
+            // The verdict already contains a problem for a number that no frame carries.
             _ => Err(CheckError::Refused(Box::new(verdict))),
         }
     }
 
-    /// Checks what remains of it from `from_ms` of its path on, at rest there, where the controller's settings or the payload are not
-    /// those any more that it was checked with (J-36, J-60).
+    /// Checks the remainder of the path from `from_ms` on, starting at rest. If neither the settings of the controller nor the
+    /// payload have changed since the check, there is nothing to do (J-36, J-60).
     ///
     /// # Errors
     ///
-    /// [`PlanError::Refused`] with the verdict of the rest.
+    /// [`PlanError::Refused`] with the verdict on the remainder.
     pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
         let (arm, checked_with) = &*self.basis;
-        // The speed on the path changes with no check: it can only be lower.
+        // A change of the path speed needs no check, because the speed can only be lower.
         let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
         if config == *checked_with {
             return Ok(());
@@ -149,37 +148,37 @@ impl CheckedTrajectory {
         planner.rest(&self.trajectory, from_ms, None).map(drop)
     }
 
-    /// What was checked.
+    /// Returns the trajectory that was checked.
     pub fn trajectory(&self) -> &Trajectory {
         &self.trajectory
     }
 
-    /// What the check found: figures of each joint, and warnings that do not forbid the run.
+    /// Returns the verdict: values of each joint, and warnings that do not prevent the run.
     pub fn verdict(&self) -> &Verdict {
         &self.verdict
     }
 
-    /// The segments that it will be sent in.
+    /// Returns the division into segments for the upload.
     pub fn upload_options(&self) -> &UploadOptions {
         &self.options
     }
 
-    /// Age of the controller's measurements, ticks (J-62).
+    /// Returns the age of the controller's measurements, ticks (J-62).
     pub(crate) fn delay_ticks(&self) -> u8 {
         self.delay_ticks
     }
 
-    /// As the wire carries it.
+    /// Returns the points as the wire carries them.
     pub(crate) fn raw(&self) -> &[RawPoint] {
         &self.raw
     }
 
-    /// The trajectory, to be kept by an observer.
+    /// Returns a shared copy of the trajectory for an observer.
     pub(crate) fn shared(&self) -> Arc<Trajectory> {
         Arc::clone(&self.trajectory)
     }
 
-    /// The number of this check; no other of the program has it.
+    /// Returns the number of this check, which is unique in the program.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }

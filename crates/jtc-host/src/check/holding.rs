@@ -1,8 +1,8 @@
-//! Whether the arm can be held where a path lets it stand: at its start, its end, and where it rests on the way.
+//! Check that the drives can hold the arm wherever the path stands still: at the start, at the end, and at rests between them.
 //!
-//! An arm that is held close to a torque limit falls later, without anything that moves: the noise of the encoders, by the gains,
-//! takes the commanded torque over the limit again and again, and more than 10 ms of that within 100 ms is an error (J-43). A path
-//! that only passes such a pose is not refused for it, although a pause there would stand in it.
+//! An arm that is held close to a torque limit falls after some time, even without a motion. Encoder noise, multiplied by the
+//! gains, takes the commanded torque over the limit repeatedly, and more than 10 ms over the limit within 100 ms is an error
+//! (J-43). A path that only passes such a pose is not refused, although a pause could stop in that pose.
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
@@ -10,11 +10,11 @@ use jtc_wire::Joint;
 
 use super::{HOLD_SHARE, ProblemKind, Verdict};
 
-/// Slower than this, rad/s, each joint stands: the wire's least velocity is some 0.1 mrad/s.
+/// Joint speed up to which a joint counts as standing, rad/s. The smallest velocity on the wire is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
-/// Adds a problem for every joint that takes more than [`HOLD_SHARE`] of its torque limit where the path stands. Where the arm
-/// `stands_at_start` already, its start is left out: it is held there whether it moves or not.
+/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit at a standstill of the path. If
+/// `stands_at_start` is set, the start is left out, because the arm is held there with or without the motion.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

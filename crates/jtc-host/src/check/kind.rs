@@ -1,14 +1,14 @@
-//! What can be wrong with a trajectory, in the order of what it does to an arm.
+//! Kinds of problems of a trajectory, ordered by their effect on an arm.
 
 use serde::Serialize;
 
-/// Share of a joint's torque limit that holding it may take, friction not counted: 98 % have been seen to fall.
+/// Share of a joint's torque limit that holding the arm may need, without friction; at 98 % arms have fallen.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Declares the kinds: meaning, name, words, and the unit of the numbers where they have one.
+/// Declares the kinds: meaning, name, words, and the unit of the numbers if there is one.
 macro_rules! kinds {
     ($($(#[$meaning:meta])* $name:ident, $words:literal $(in $unit:literal)?;)+) => {
-        /// What can be wrong.
+        /// Kind of a problem.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
         #[serde(rename_all = "snake_case")]
         pub enum ProblemKind {
@@ -16,17 +16,17 @@ macro_rules! kinds {
         }
 
         impl ProblemKind {
-            /// All of them.
+            /// All kinds.
             pub const ALL: [Self; [$($words),+].len()] = [$(Self::$name),+];
 
-            /// The kind in words, without the facts.
+            /// Returns the kind in words, without the facts.
             pub fn words(self) -> &'static str {
                 match self {
                     $(Self::$name => $words,)+
                 }
             }
 
-            /// Unit of the value and its limit; empty for a count.
+            /// Returns the unit of value and limit; empty for a count.
             pub(super) fn unit(self) -> &'static str {
                 match self {
                     $(Self::$name => concat!($($unit)?),)+
@@ -37,7 +37,7 @@ macro_rules! kinds {
 }
 
 kinds! {
-    /// No point.
+    /// The trajectory has no points.
     Empty, "no points";
     /// More points than the controller holds.
     TooManyPoints, "too many points";
@@ -45,7 +45,7 @@ kinds! {
     TooManySegments, "too many segments";
     /// Points per segment outside 1..1500.
     SegmentPoints, "points per segment";
-    /// Step time 0.
+    /// The step time is 0.
     StepTime, "step time of 0 ms";
     /// A position that no frame carries.
     PositionScale, "position outside what a frame carries" in "rad";
@@ -53,7 +53,7 @@ kinds! {
     VelocityScale, "velocity outside what a frame carries" in "rad/s";
     /// An acceleration that no frame carries.
     AccelerationScale, "acceleration outside what a frame carries" in "rad/s²";
-    /// Two points so far apart that the arm cannot get from one to the other in a step.
+    /// Two points are too far apart for the arm to move from one to the other in one step.
     Jump, "jump" in "rad";
     /// Position over its limit.
     Position, "position over its limit" in "rad";
@@ -63,21 +63,21 @@ kinds! {
     Acceleration, "acceleration over its limit" in "rad/s²";
     /// Torque by the arm model over its limit.
     Torque, "torque over its limit" in "N·m";
-    /// Holding the arm where the path stands takes nearly all of a joint's torque: it would fall later.
+    /// Holding the arm at a standstill of the path needs nearly all of a joint's torque, so the arm would fall later.
     HoldTorque, "nearly all torque to stand" in "N·m";
-    /// A velocity that the friction table does not have (J-36).
+    /// A velocity is outside the friction table (J-36).
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
-    /// A place from which Pause or Stop cannot bring the arm to rest in time with the torque that there is (J-33).
+    /// From this place Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).
     NoStop, "no stop in time" in "N·m";
-    /// Positions move faster than the velocity limit, whatever the given velocities are.
+    /// Positions move faster than the velocity limit, independent of the velocities in the file.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
-    /// Positions move at another speed than the given velocities; a warning at single places.
+    /// Positions move at another speed than the velocities in the file; a warning if this happens at single places.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";
     /// The first or last point is not at rest.
     NotAtRest, "not at rest at an end" in "rad/s";
     /// The arm is not at the first point (J-34).
     StartPose, "the arm is not at the first point" in "rad";
-    /// Velocities change otherwise than by the given accelerations.
+    /// Velocities change by other amounts than the accelerations in the file.
     AccelerationMismatch, "velocities and accelerations disagree" in "rad/s²";
 }
 
@@ -90,7 +90,7 @@ impl ProblemKind {
         }
     }
 
-    /// It ends the motion before anybody could stop it, or leaves no motion to stop.
+    /// Returns `true` if the problem ends the motion before an operator can stop it, or leaves no motion to stop.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
         !matches!(

@@ -1,4 +1,4 @@
-//! What a trajectory leaves of the torque limits.
+//! Margin between the torque of a trajectory and the torque limits.
 
 use std::fmt;
 
@@ -7,34 +7,34 @@ use serde::Serialize;
 
 use super::Verdict;
 
-/// Torque margin below which a check warns, % of the limit: with 10 % more mass and 20 % more friction than in its model, an arm then
-/// reaches the limit on its path.
+/// Torque margin below which a check warns, % of the limit. With less margin, 10 % more mass and 20 % more friction than in the
+/// model bring an arm to the limit on its path.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// The smallest share of a torque limit that a motion leaves unused, and where.
+/// Smallest share of a torque limit that a motion leaves unused, and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
-    /// What is left, % of the limit; negative where the torque is above it.
+    /// Margin, % of the limit; negative if the torque is above the limit.
     pub percent: f64,
-    /// Joint that has the least left.
+    /// Joint with the smallest margin.
     pub joint: Joint,
-    /// When, s from the start.
+    /// Time from the start, s.
     pub time_s: f64,
-    /// Torque by the model there, N·m.
+    /// Torque by the model at that time, N·m.
     pub torque_nm: f64,
     /// Torque limit, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature of its friction, the one that takes more, °C.
+    /// Bearing temperature for the friction, °C: of the temperatures checked, the one with the greater torque.
     pub temperature_c: f64,
 }
 
 impl TorqueMargin {
-    /// The margin is below [`MARGIN_LOW_PCT`].
+    /// Returns `true` if the margin is below [`MARGIN_LOW_PCT`].
     pub fn is_low(&self) -> bool {
         self.percent < MARGIN_LOW_PCT
     }
 
-    /// A warning where the margin is low.
+    /// Returns a warning if the margin is low.
     pub fn warning(&self) -> Option<String> {
         self.is_low().then(|| {
             format!(
@@ -58,7 +58,7 @@ impl fmt::Display for TorqueMargin {
 }
 
 impl Verdict {
-    /// Takes the torque of a joint, with the bearing temperature (°C), at a millisecond of the path.
+    /// Updates the margin with the torque of a joint, computed at a bearing temperature (°C), at a millisecond of the path.
     pub(super) fn take_margin(
         &mut self,
         joint: Joint,
@@ -73,7 +73,7 @@ impl Verdict {
         }
     }
 
-    /// The verdict with the smaller one of its margin and another one of the same trajectory.
+    /// Returns the verdict with the smaller of its own margin and `other`, a margin of the same trajectory.
     pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
         if let Some(other) = other
             && self.margin.is_none_or(|margin| other.percent < margin.percent)

@@ -1,9 +1,9 @@
-//! Verdicts on a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, torque in hand
-//! where the arm stands, room to stop, start pose.
+//! Check of a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, torque to hold the
+//! arm at a standstill of the path, ability to stop, start pose.
 //!
-//! Between points the controller's own interpolation runs, on the numbers as the wire carries them, once a millisecond: what
-//! passes here is what the controller will compute. The controller's own check (J-36) runs on the same numbers, so that what
-//! passes here is not refused there.
+//! Between points the check runs the controller's own interpolation once per millisecond, on the numbers as the wire carries
+//! them. So the check computes what the controller will compute. The controller's own check (J-36) uses the same numbers, so a
+//! trajectory that passes here is not refused there.
 
 mod cause;
 mod checked;
@@ -33,35 +33,35 @@ pub use verdict::{JointFigures, Suspicion, Verdict};
 use crate::plan::COLD;
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Bearing temperature that a check reckons with, °C.
+/// Bearing temperature that a check assumes, °C.
 pub const TEMPERATURE: f64 = 30.0;
 
-/// What a trajectory is checked against.
+/// Settings of a check.
 #[derive(Clone, Debug)]
 pub struct Checker<'a> {
     /// Limits, rotor inertia, gravity, payload, start tolerance.
     pub config: &'a Config,
     /// Model for the torque along the path; `None`: torque is not checked.
     pub model: Option<&'a ArmModel>,
-    /// Friction compensation that the controller will add to it.
+    /// Friction compensation that the controller will add to the model's torque.
     pub friction: Option<&'a Friction>,
     /// Bearing temperature for the friction, °C.
     pub temperature: f64,
-    /// Where the arm is, rad; `None`: the start pose is not checked.
+    /// Measured position of the arm, rad; `None`: the start pose is not checked.
     pub start: Option<[f64; JOINTS]>,
-    /// Segments that it will be sent in.
+    /// Division into segments for the upload.
     pub upload: UploadOptions,
 }
 
 /// Positions that the path may have (J-36).
 struct Positions {
     ranges: [PathRange; JOINTS],
-    /// Those of its first point.
+    /// Positions of the first point of the path.
     first: [f64; JOINTS],
 }
 
 impl Positions {
-    /// The limit that `position` of joint `j` is beyond.
+    /// Returns the limit that `position` of joint `j` exceeds.
     fn limit_beyond(&self, j: usize, position: f64) -> Option<f64> {
         let range = &self.ranges[j];
         let (low, high) = range.of_path(self.first[j]);
@@ -74,17 +74,18 @@ pub(crate) const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
 const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
 
 impl<'a> Checker<'a> {
-    /// Against the limits of `config` alone.
+    /// Creates a check against the limits of `config` only.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self { config, model: None, friction: None, temperature: TEMPERATURE, start: None, upload }
     }
 
-    /// Checks all of it and returns all that is wrong.
+    /// Checks the trajectory and returns all problems.
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
-        // As the controller will have them; a number that no frame carries is a problem, and the check goes on without rounding.
+        // Points as the controller will receive them. A number that no frame carries is a problem, and the check continues
+        // without rounding.
         let points: Vec<SetPoint> = trajectory
             .points
             .iter()
@@ -109,7 +110,7 @@ impl<'a> Checker<'a> {
             let stands_there = self.start.is_some();
             holding::holds(self.config, dynamics, trajectory.step_ms, &points, stands_there, &mut verdict);
         }
-        // Without a path that can be run there is none to stop on.
+        // A path that cannot run has no motion to stop.
         if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
         {
             stopping::stops(self.config, &dynamics, trajectory.step_ms, &points, &mut verdict);
@@ -117,7 +118,7 @@ impl<'a> Checker<'a> {
         verdict.done()
     }
 
-    /// What the controller's own check will find during the upload (J-36); what is known already stays as it is.
+    /// Adds the problems that the controller's own check will find during the upload (J-36); known problems stay as they are.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),
@@ -180,7 +181,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// J-34.
+    /// Checks that the arm is at the first point (J-34).
     fn start_pose(&self, first: &SetPoint, verdict: &mut Verdict) {
         for (joint, measured) in Joint::ALL.into_iter().zip(self.start.into_iter().flatten()) {
             let away = measured - first.position[joint.index()];
@@ -197,7 +198,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// The arm stands before and after.
+    /// Checks that the path begins and ends at rest.
     fn ends(&self, points: &[SetPoint], verdict: &mut Verdict) {
         for i in [0, points.len() - 1] {
             for (joint, v) in Joint::ALL.into_iter().zip(&points[i].velocity) {
@@ -220,7 +221,7 @@ impl<'a> Checker<'a> {
             self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
-            // Also where a point lies in the middle of a step of one or two milliseconds.
+            // A step of 1 ms has no millisecond inside, so its middle is checked.
             for k in 1..step_ms.max(2) {
                 let u = f64::from(k) / f64::from(step_ms.max(2));
                 for (figures, speed) in verdict.joints.iter_mut().zip(position_speed(a, b, h, u)) {
@@ -233,14 +234,14 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Jumps and contradictions between two points; true when what lies between them makes no sense.
+    /// Finds jumps and contradictions between two points; returns `true` if the motion between them is not meaningful.
     fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
         let mut senseless = false;
         for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
             let j = joint.index();
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
-            // What the velocities of both points allow, with rounding.
+            // Displacement that the velocities of both points allow, including rounding.
             let expected = 0.5 * h * (v0 + v1);
             let slack = 3.0 * POSITION_BIT
                 + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)
@@ -262,7 +263,7 @@ impl<'a> Checker<'a> {
         senseless
     }
 
-    /// Limits at one millisecond.
+    /// Checks the limits at one millisecond.
     fn moment(
         &self,
         s: &SetPoint,

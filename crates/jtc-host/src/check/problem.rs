@@ -1,4 +1,4 @@
-//! One thing that is wrong with a trajectory: what, in which joint, where first and where worst.
+//! Problem of a trajectory: kind, joint, first place and worst place.
 
 use std::fmt;
 
@@ -7,56 +7,56 @@ use serde::Serialize;
 
 use super::kind::{HOLD_SHARE, ProblemKind};
 
-/// A place of the path where something is wrong.
+/// Place of the path with a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Seen {
-    /// `None`: the trajectory as a whole.
+    /// Joint; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// Point (from 0); with `ms` > 0 between this and the next.
+    /// Point (from 0); with `ms` > 0 the place is between this point and the next.
     pub point: usize,
-    /// ms after `point`.
+    /// Time after `point`, ms.
     pub ms: f64,
     /// Time along the path, s.
     pub time_s: f64,
-    /// In the unit of its kind.
+    /// Value, in the unit of the kind of problem.
     pub value: f64,
-    /// Its limit, or the value of the other channel.
+    /// Limit of the value, or the value of the other channel.
     pub limit: f64,
 }
 
 /// Problems of one kind in one joint; jumps are listed one by one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Problem {
-    /// What is wrong.
+    /// Kind of the problem.
     pub kind: ProblemKind,
-    /// `None`: the trajectory as a whole.
+    /// Joint; `None` if the problem concerns the whole trajectory.
     pub joint: Option<Joint>,
-    /// Where it is first along the path.
+    /// First place along the path.
     pub first: Seen,
-    /// Point (from 0) where it is worst.
+    /// Point (from 0) of the worst place.
     pub point: usize,
-    /// ms after `point` where it is worst.
+    /// Time from `point` to the worst place, ms.
     pub ms: f64,
-    /// Time along the path where it is worst, s.
+    /// Time along the path of the worst place, s.
     pub time_s: f64,
-    /// Worst value, in the unit of its kind.
+    /// Worst value, in the unit of the kind of problem.
     pub value: f64,
-    /// Its limit, or the value of the other channel.
+    /// Limit of the value, or the value of the other channel.
     pub limit: f64,
-    /// Milliseconds (or points, or steps) in which it is.
+    /// Number of milliseconds (or points, or steps) with the problem.
     pub count: usize,
-    /// The trajectory can run all the same; only the feed-forward is not what it could be.
+    /// `true` if the trajectory can run despite the problem; only the feed-forward is less good.
     pub warning: bool,
 }
 
 impl Problem {
-    /// Where it is worst.
+    /// Returns the worst place.
     pub(super) fn worst(&self) -> Seen {
         let Self { joint, point, ms, time_s, value, limit, .. } = *self;
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// How far it is over its limit, as a multiple of that where there is one.
+    /// Returns the excess over the limit, as a multiple of the limit if there is one.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
@@ -80,7 +80,7 @@ impl fmt::Display for Problem {
 }
 
 impl Seen {
-    /// What is wrong there, with value, limit, point and time.
+    /// Describes the problem at this place, with value, limit, point and time.
     pub(super) fn words(&self, kind: ProblemKind) -> String {
         use ProblemKind::*;
         let Self { joint, point, ms, time_s, value, limit } = self;
@@ -126,10 +126,10 @@ impl Seen {
     }
 }
 
-/// A number with three significant digits.
+/// Formats a number with three significant digits.
 fn three_digits(value: f64) -> String {
     let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
-    // A tenth of a micro-unit is less than any grid that a frame has.
+    // A tenth of a micro-unit is finer than the resolution of every frame.
     let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -1,8 +1,8 @@
-//! Whether the arm can stop from every place of a path within the time that Pause and Stop have (J-33).
+//! Check that the arm can stop from every place of a path within the stop time of Pause and Stop (J-33).
 //!
-//! Along a path that is run at the rate r, with its slope s, the model's torque is g + r²·f + s·h: what holds the arm, what its
-//! motion at full speed adds, and what a change of the rate costs (Bobrow 1985; Pham & Pham 2018). All three are computed once
-//! per place, so that a ramp to standstill from each of them is only a few sums.
+//! Along a path that runs at the rate r with the slope s, the model's torque is g + r²·f + s·h: the torque to hold the arm, the
+//! torque of its motion at full speed, and the torque of a rate change (Bobrow 1985; Pham & Pham 2018). All three are computed
+//! once per place, so that a ramp to standstill from each place needs only a few sums.
 
 use std::collections::VecDeque;
 
@@ -12,16 +12,16 @@ use jtc_wire::Joint;
 
 use super::{ProblemKind, Verdict};
 
-/// Distance of the places looked at, along the path and along each ramp, ms.
+/// Distance between the places checked, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Ramps tried from every place, as shares of the time allowed: one that is possible suffices.
+/// Lengths of the ramps tried from every place, as shares of the allowed time; one possible ramp is sufficient.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of a ramp over which its slope rises, and over which it falls.
+/// Share of a ramp over which its slope rises, and over which the slope falls.
 const CORNER: f64 = 0.2;
 
-/// The parts of the torque at a place of the path, N·m.
+/// Parts of the torque at a place of the path, N·m.
 struct Place {
-    /// Point before it, and ms after that.
+    /// Point before the place, and time after that point in ms.
     point: usize,
     ms: f64,
     hold: [f64; JOINTS],
@@ -29,7 +29,7 @@ struct Place {
     slope: [f64; JOINTS],
 }
 
-/// The joint that comes closest to its limit on a ramp.
+/// Load of the joint that comes closest to its limit on a ramp.
 #[derive(Clone, Copy)]
 struct Load {
     share: f64,
@@ -37,8 +37,8 @@ struct Load {
     torque: f64,
 }
 
-/// Adds a problem for every place from which no ramp of `config.stop_ms` keeps the model's torque, friction not counted, within
-/// the limits.
+/// Adds a problem for every place from which no ramp of `config.stop_ms` keeps the model's torque, without friction, within the
+/// limits.
 pub(super) fn stops(
     config: &Config,
     dynamics: &Dynamics,
@@ -49,7 +49,7 @@ pub(super) fn stops(
     let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
     let last = (end / SPACING).ceil() as usize;
     let stop_ms = f64::from(config.stop_ms).max(SPACING);
-    // A ramp takes half of its time at full speed.
+    // A ramp covers half of its time at full speed.
     let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
     let mut window = VecDeque::with_capacity(ahead + 1);
     let mut next = 0;
@@ -90,7 +90,7 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
     }
 }
 
-/// The highest load of a ramp of `length` ms from the first place of `window`.
+/// Returns the highest load of a ramp of `length` ms from the first place of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
@@ -120,7 +120,7 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     worst
 }
 
-/// How much of a ramp is done at the share `x` of its time, and how steep it is there: a straight line with rounded ends.
+/// Returns the completed share of a ramp at the share `x` of its time, and its slope there: a straight line with rounded ends.
 fn profile(x: f64) -> (f64, f64) {
     let steepest = 1.0 / (1.0 - CORNER);
     let end = 1.0 - x;

@@ -1,4 +1,4 @@
-//! Verdicts on made and existing trajectories.
+//! Verdicts on generated and on existing trajectories.
 
 use jtc_core::Config;
 
@@ -47,7 +47,7 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     assert!(!Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
 }
 
-/// J-32: both points are within limits, and what the controller computes between them is not.
+/// J-32: both points are within the limits, but the controller's interpolation between them is not.
 #[test]
 fn j32_limits_are_checked_between_points() {
     let at = |q: f64, v: f64| Point {
@@ -55,7 +55,7 @@ fn j32_limits_are_checked_between_points() {
         velocity: [0.0, v, 0.0, 0.0, 0.0, 0.0],
         ..Point::default()
     };
-    // A swing over the position limit of joint 2 (1.57 rad) that both points stay below.
+    // A swing over the position limit of joint 2 (1.57 rad); both points stay below the limit.
     let t =
         Trajectory { step_ms: 1000, points: vec![at(1.5, 0.0), at(1.5, 1.0), at(1.5, -1.0), at(1.5, 0.0)] };
     let verdict = check(&t);
@@ -93,7 +93,7 @@ fn all_problems_are_reported_with_their_worst_place() {
     );
 }
 
-/// A file whose velocities are all 0 would stop and go at every point.
+/// With all velocities 0 the arm would stop at every point.
 #[test]
 fn channels_that_contradict_each_other_all_along_are_refused() {
     let mut t = smooth();
@@ -125,7 +125,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     let arm = Arm::avena();
     let mut config = arm.config();
     config.joints[1].torque_max = 100.0;
-    // Stretched out sideways, joint 2 carries some 130 N·m.
+    // In the horizontal pose joint 2 carries about 130 N·m.
     let t = plan::joint_move(&[0.0; 6], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     let verdict = Checker { model: Some(&arm.model), ..Checker::new(&config) }.check(&t);
     assert_eq!(
@@ -135,7 +135,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     );
 }
 
-/// Two points that nothing can follow: named as too fast, with the speed that works.
+/// Two points that no arm can follow are reported as too fast, with the speed that works.
 #[test]
 fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     let to = Point { position: [0.0, 0.0, 2.5, 0.0, 0.0, 0.0], ..Point::default() };
@@ -152,7 +152,7 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
     assert!(slow.is_ok(), "{slow}");
-    // Already at half of its speed, the percentage is still that of the file.
+    // At half of the file's speed, the advised percentage still refers to the file's own speed.
     let half = check(&plan::at_speed(&t, 50.0).unwrap());
     assert!(
         half.hint_for("my.csv", 50.0).to_string().contains("traj check my.csv --speed 9`"),
@@ -174,12 +174,12 @@ fn degrees_are_recognised() {
     assert!(verdict.to_string().lines().count() < 30, "{verdict}");
 }
 
-/// One cause for all joints and all points, with where it is first and where it is worst.
+/// A single cause covers all joints and all points, with its first and its worst place.
 #[test]
 fn long_lists_are_summed_by_cause() {
     let mut t = smooth();
     let n = t.points.len();
-    // Joint 2 too fast at three points in the middle, joint 6 at one before them.
+    // Joint 2 is too fast at three points in the middle, joint 6 at one point before them.
     for (i, joint, velocity) in [(n / 2, 1, 1.6), (n / 2 + 1, 1, -1.9), (n / 2 + 2, 1, 1.7), (n / 4, 5, 1.8)]
     {
         t.points[i].velocity[joint] = velocity;
@@ -194,7 +194,7 @@ fn long_lists_are_summed_by_cause() {
         "{verdict}"
     );
     assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
-    // Between points the controller's velocity passes the limit before it is at the point.
+    // The controller's velocity exceeds the limit between points, before it reaches the point.
     assert_eq!((cause.first.joint, cause.first.point), (Joint::from_number(6), n / 4 - 1), "{verdict}");
     let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
     assert_eq!(cause.first.time_s, time);
@@ -212,7 +212,7 @@ fn long_lists_are_summed_by_cause() {
     assert_eq!(config.joints[1].velocity_max, 1.5);
 }
 
-/// J-36: what the controller refuses is refused here, with the same words for all of it.
+/// J-36: a trajectory that the controller refuses is refused here, with the same words in all cases.
 #[test]
 fn j36_nothing_passes_that_the_controller_refuses() {
     let mut t = smooth();
@@ -230,14 +230,15 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
-/// An arm whose joint 2 has limits that lie between two positions of the wire: the nearest ones are 1.150041 and -0.550044 rad, outside.
+/// Returns settings in which the limits of joint 2 lie between two positions of the wire: the nearest ones are 1.150041 and
+/// -0.550044 rad, outside the limits.
 fn between_steps() -> Config {
     let mut config = Config::avena();
     (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
     config
 }
 
-/// A motion of joint 2.
+/// Returns a motion of joint 2.
 fn of_joint_2(from: f64, to: f64) -> Trajectory {
     gentle(&[0.0, from, 0.0, 0.0, 0.0, 0.0], &[0.0, to, 0.0, 0.0, 0.0, 0.0], 2.25)
 }
@@ -250,12 +251,12 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
             let verdict = Checker::new(&config).check(&t);
             assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
         }
-        // A step further is outside.
+        // The next position of the wire is outside.
         let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
     }
-    // Planned as well: the motion is there, and stays what it is.
+    // A planned motion also exists, and its end stays the limit.
     let planned = plan::joint_move(&[0.0; 6], &[0.0, 1.15, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     assert_eq!(planned.points.last().unwrap().position[1], 1.15);
 }
@@ -278,7 +279,7 @@ fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     }
 }
 
-/// As the controller: where the arm stands outside, by up to the start tolerance, a path leads back inside.
+/// Like the controller, the check accepts a path that leads back inside from up to the start tolerance outside the limits.
 #[test]
 fn j36_j58_a_path_from_outside_the_limits_inwards_passes() {
     let config = between_steps();
@@ -316,7 +317,7 @@ fn j36_the_friction_table_bounds_the_speed() {
     assert!(verdict.hint().to_string().contains("--speed"), "{}", verdict.hint());
 }
 
-/// A quintic from rest to rest.
+/// Returns a quintic from rest to rest.
 fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     let steps = (seconds * 100.0).round() as usize;
     let point = |k: usize| {
@@ -333,17 +334,17 @@ fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     Trajectory { step_ms: 10, points: (0..=steps).map(point).collect() }
 }
 
-/// J-33: the torque suffices for the motion, but not for stopping it: lowering the stretched arm.
+/// J-33: the torque is sufficient for the motion, but not for a stop while the stretched arm moves down.
 #[test]
 fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     let arm = Arm::avena();
     let mut config = arm.config();
-    // Up to 1.1 rad/s through the horizontal, and gently in and out of it.
+    // Up to 1.1 rad/s through the horizontal, with a smooth start and end.
     let t = gentle(&[0.0, 0.2, 0.0, 0.0, 0.0, 0.0], &[0.0, 1.5, 0.0, 0.0, 0.0, 0.0], 2.25);
     let verdict = |config: &Config| Checker { model: Some(&arm.model), ..Checker::new(config) }.check(&t);
     let peak = verdict(&config).joints[1].torque_peak_nm.unwrap();
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
-    // All that the motion itself takes, and not more.
+    // The limit is just above the torque of the motion itself.
     config.joints[1].torque_max = peak + 0.5;
     let refused = verdict(&config);
     let stop = refused.refusals().next().expect("refused");
@@ -354,12 +355,12 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
         "{}",
         refused.hint()
     );
-    // With a second to stop in it is another matter.
+    // With a stop time of 5 s the path passes.
     config.stop_ms = 5_000;
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
-/// An arm that stands at nearly all of a torque limit is dropped later, with nothing that moves.
+/// An arm that stands at nearly all of a torque limit falls later, even without a motion.
 #[test]
 fn j43_torque_is_in_hand_where_the_arm_stands() {
     let arm = Arm::avena();
@@ -386,7 +387,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     let last = there.points.len() - 1;
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
-        // The last points are so slow that they stand.
+        // The last points are slow enough to count as standing.
         assert!(
             joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
             "{point} of {last}"
@@ -403,7 +404,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
             "{point} of {last}"
         );
         assert!(refusal(&back, share, None).is_some(), "at its start");
-        // Where the arm stands there already, to leave is right.
+        // If the arm already stands in that pose, a motion away is accepted.
         assert_eq!(refusal(&back, share, Some(high)), None);
         assert!(refusal(&there, share, Some(low)).is_some());
     }
@@ -415,7 +416,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
         text.contains("joint 2: standing still at point") && text.contains("98.0 % of the torque limit"),
         "{text}"
     );
-    // While joint 1 turns about the vertical, the arm does not stand there.
+    // While joint 1 turns about the vertical, the arm does not stand still in that pose.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();
@@ -441,7 +442,7 @@ fn the_existing_trajectories_pass() {
         let checker =
             Checker { model: Some(&arm.model), friction: friction.as_ref(), ..Checker::new(&config) };
         let verdict = checker.check(&t);
-        // Five seams where the positions are a sample ahead of the velocities.
+        // At five seams the positions are one sample ahead of the velocities.
         assert!(verdict.is_ok(), "{name}: {verdict}");
         assert!(
             verdict.warnings().all(|p| p.kind == ProblemKind::VelocityMismatch && p.count == 5),

@@ -1,4 +1,4 @@
-//! All that a check found, grouped, worst first.
+//! Result of a check: all problems, grouped, the worst first.
 
 use std::fmt;
 
@@ -12,21 +12,21 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Places with contradicting channels that existing files have where their pieces meet.
+/// Number of places with contradicting channels that is tolerated, because existing files have them between their pieces.
 const SEAMS: usize = 20;
 
-/// What a joint does along the path.
+/// Values of a joint along the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct JointFigures {
-    /// rad.
+    /// Lowest position, rad.
     pub position_min_rad: f64,
-    /// rad.
+    /// Highest position, rad.
     pub position_max_rad: f64,
-    /// rad/s.
+    /// Peak velocity, rad/s.
     pub velocity_peak_rad_s: f64,
-    /// rad/s².
+    /// Peak acceleration, rad/s².
     pub acceleration_peak_rad_s2: f64,
-    /// N·m by the model; `None`: not computed.
+    /// Peak torque by the model, N·m; `None`: not computed.
     pub torque_peak_nm: Option<f64>,
 }
 
@@ -54,42 +54,42 @@ impl JointFigures {
     }
 }
 
-/// What a refused trajectory looks like.
+/// Probable fault of a refused trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Suspicion {
-    /// Nothing in particular.
+    /// No particular fault.
     Nothing,
-    /// Positions far outside of what a joint can have, which would be usual ones were they divided by 57.3.
+    /// Positions far outside the range of a joint, which would be normal after a division by 57.3.
     Degrees,
-    /// Put together from pieces that do not meet.
+    /// The trajectory consists of pieces that do not meet.
     Pieces,
-    /// At another speed it would pass, perhaps.
+    /// The trajectory may pass at another speed.
     TooFast,
 }
 
 /// Result of a check.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// ms.
+    /// Step time, ms.
     pub step_ms: u16,
-    /// First to last point, s.
+    /// Time from the first to the last point, s.
     pub duration_s: f64,
-    /// What is wrong, worst first: of each kind and joint one, and each jump.
+    /// Problems, worst first: one for each kind and joint, and each jump.
     pub problems: Vec<Problem>,
-    /// The same summed by kind: what does most to an arm first.
+    /// Problems summarised by kind: the kind with the strongest effect on an arm first.
     pub causes: Vec<Cause>,
     #[serde(skip)]
     places: Places,
-    /// What the joints do along the path.
+    /// Values of the joints along the path.
     pub joints: [JointFigures; JOINTS],
-    /// The smallest torque margin by the model, friction at 20 °C and at the temperature of the check; `None`: not computed.
+    /// Smallest torque margin by the model, with friction at 20 °C and at the temperature of the check; `None`: not computed.
     pub margin: Option<TorqueMargin>,
 }
 
-/// Points this far apart, ms, are waypoints and no samples of a motion.
+/// Step time, ms, from which points are waypoints and not samples of a motion.
 const WAYPOINTS_MS: u16 = 100;
 
 impl Verdict {
@@ -134,7 +134,7 @@ impl Verdict {
         }
     }
 
-    /// Kinds in the order of what they do to an arm, jumps in the order of the path, others by how far they are over.
+    /// Sorts the problems: kinds by their effect on an arm, jumps along the path, other problems by their excess.
     pub(super) fn done(mut self) -> Self {
         self.part_haste_from_seams();
         let seams = SEAMS.max(self.points / 50);
@@ -156,16 +156,17 @@ impl Verdict {
         self
     }
 
-    /// Pieces that do not meet make single jumps from one sample to the next. Where every fifth step or more is one, the path is too
-    /// fast all along, or not in radians; a long way in a long step between waypoints, or in many steps in a row, is a move that is too
-    /// fast. It is one line per joint.
+    /// Separates moves that are too fast from pieces that do not meet. Pieces that do not meet cause single jumps from one sample
+    /// to the next. If at least every fifth step has a jump, the whole path is too fast, or not in radians. A jump in a step of
+    /// 100 ms or more between waypoints, or one of three or more jumps in a row, is a move that is too fast. Such moves become
+    /// one problem per joint.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();
         places.sort_unstable();
         places.dedup();
         let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
-        // Pieces meet at one step; a way of many steps in a row is one move.
+        // Pieces meet at one step; jumps in many steps in a row are one move.
         let on_the_way = |point: usize| {
             let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
             let (before, after) = (point.checked_sub(1), Some(point + 1));
@@ -186,17 +187,17 @@ impl Verdict {
         }
     }
 
-    /// Nothing forbids to run it.
+    /// Returns `true` if no problem prevents the run.
     pub fn is_ok(&self) -> bool {
         self.problems.iter().all(|p| p.warning)
     }
 
-    /// The arm does not stand at the first point, and nothing else forbids to run it.
+    /// Returns `true` if the only problem that prevents the run is an arm that is not at the first point.
     pub fn is_only_elsewhere(&self) -> bool {
         !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
     }
 
-    /// What the whole of the problems looks like.
+    /// Returns the fault that the problems together suggest.
     pub fn suspicion(&self) -> Suspicion {
         use ProblemKind::*;
         let too_fast = |p: &Problem| {
@@ -226,19 +227,19 @@ impl Verdict {
         }
     }
 
-    /// The joint that goes furthest from zero, and where to, rad.
+    /// Returns the joint that goes furthest from zero, and its position there, rad.
     fn furthest(&self) -> Option<(Joint, f64)> {
         let ends = Joint::ALL.into_iter().zip(&self.joints);
         let ends = ends.flat_map(|(j, f)| [(j, f.position_min_rad), (j, f.position_max_rad)]);
         ends.filter(|(_, q)| q.is_finite()).max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// What forbids to run it.
+    /// Returns the problems that prevent the run.
     pub fn refusals(&self) -> impl Iterator<Item = &Problem> {
         self.problems.iter().filter(|p| !p.warning)
     }
 
-    /// What does not.
+    /// Returns the problems that do not prevent the run.
     pub fn warnings(&self) -> impl Iterator<Item = &Problem> {
         self.problems.iter().filter(|p| p.warning)
     }
@@ -252,7 +253,7 @@ impl fmt::Display for Verdict {
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
             write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
-            // What else is wrong comes from that.
+            // The other problems follow from the degrees.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);
         }

@@ -1,4 +1,4 @@
-//! Pages about what a check of a trajectory finds, and about what a controller still waits for.
+//! Pages about the problems that a check of a trajectory finds, and about parameters that a controller still needs.
 
 use super::{Family, Page, page};
 use crate::check::ProblemKind;
@@ -27,8 +27,8 @@ pub(super) const MISSING: &[Page] = &[
     ),
 ];
 
-/// Declares the pages of the check: kind and name, then what it means, what usually causes it, what to do, and the next command where
-/// it is not another check.
+/// Declares the pages of the check: kind and name, then meaning, usual cause, remedy, and the next command if it is not another
+/// check.
 macro_rules! found {
     (@next) => { "jtc traj check FILE" };
     (@next $command:literal) => { $command };

@@ -1,4 +1,4 @@
-//! One page for each code that a controller, a drive or this library reports: what it means, why, what to do, the next command.
+//! Pages for the codes that a controller, a drive or this library reports, each with meaning, cause, remedy and next command.
 
 mod check;
 mod controller;
@@ -11,10 +11,10 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKi
 use crate::check::ProblemKind;
 use crate::words;
 
-/// Declares the families of numbers: meaning, name, what stands before the colon in `can:0x100`, in words.
+/// Declares the families of numbers: meaning, name, key before the colon in `can:0x100`, title.
 macro_rules! families {
     ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
-        /// Which number a page is about.
+        /// Family of the number that a page explains.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
         #[serde(rename_all = "snake_case")]
         pub enum Family {
@@ -22,17 +22,17 @@ macro_rules! families {
         }
 
         impl Family {
-            /// All, in the order in which a bare number is looked up.
+            /// All families, in the order of the search for a bare number.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
-            /// What stands before the colon in `can:0x100`.
+            /// Returns the key before the colon in `can:0x100`.
             pub fn key(self) -> &'static str {
                 match self {
                     $(Self::$name => $key,)+
                 }
             }
 
-            /// In words.
+            /// Returns the family in words.
             pub fn title(self) -> &'static str {
                 match self {
                     $(Self::$name => $title,)+
@@ -65,16 +65,16 @@ families! {
     Tes "tes", "trajectory execution state";
     /// States of a node.
     NodeState "node-state", "state of a node";
-    /// Bits of what a controller has not been given.
+    /// Bits of the parameters that a controller has not received.
     Missing "missing", "word of missing parameters";
-    /// Kinds of what the check of a trajectory finds.
+    /// Kinds of problems that the check of a trajectory finds.
     Check "check", "kind of a problem of a trajectory";
-    /// Kinds of what ends in a held stop.
+    /// Causes of a held stop.
     Stop "stop", "cause of a held stop";
 }
 
 impl Family {
-    /// Its number is a set of bits, not one code.
+    /// Returns `true` if the number is a set of bits, `false` if it is one code.
     pub fn is_bits(self) -> bool {
         matches!(
             self,
@@ -89,32 +89,32 @@ impl Family {
     }
 }
 
-/// One page.
+/// Page about one code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Page {
-    /// Which number.
+    /// Family of the code.
     pub family: Family,
-    /// Bit number, or the code itself.
+    /// Bit number, or the code.
     pub code: u32,
-    /// Name, unique.
+    /// Unique name.
     pub name: &'static str,
-    /// What it means.
+    /// Meaning of the code.
     pub meaning: &'static str,
-    /// What usually causes it.
+    /// Usual cause.
     pub cause: &'static str,
-    /// What to do.
+    /// Remedy.
     pub remedy: &'static str,
-    /// The next command.
+    /// Next command.
     pub command: &'static str,
 }
 
 impl Page {
-    /// The number as it stands in its word: a mask for bits.
+    /// Returns the number as in its word: a mask for bits.
     pub fn number(&self) -> u32 {
         if self.family.is_bits() { 1 << self.code } else { self.code }
     }
 
-    /// As it stands on a screen; its name where no screen shows it.
+    /// Returns the words that a screen shows for the code, or the name if no screen shows the code.
     pub fn title(&self) -> String {
         own_words(self).unwrap_or_else(|| self.name.replace('-', " "))
     }
@@ -135,7 +135,7 @@ impl std::fmt::Display for Page {
     }
 }
 
-/// Declares pages, family by family: number and name, then what it means, what usually causes it, what to do, the next command.
+/// Declares pages, family by family: number and name, then meaning, usual cause, remedy, next command.
 macro_rules! entries {
     ($($family:ident { $($code:literal $name:literal: $($text:literal),+;)+ })+) => {
         pub(super) const PAGES: &[super::Page] =
@@ -149,26 +149,26 @@ const fn page(family: Family, code: u32, name: &'static str, texts: [&'static st
     Page { family, code, name, meaning, cause, remedy, command }
 }
 
-/// All pages.
+/// Returns all pages.
 pub fn pages() -> impl Iterator<Item = &'static Page> + Clone {
     let own = controller::PAGES.iter().chain(nodes::PAGES).chain(link::PAGES);
     own.chain(check::MISSING).chain(check::FOUND).chain(stops::HELD_STOP).chain(stops::CAUSES)
 }
 
-/// The page with this name.
+/// Returns the page with this name.
 pub fn named(name: &str) -> Option<&'static Page> {
     pages().find(|page| page.name == name)
 }
 
-/// Names of the pages about the bits that are set in a word of a family.
+/// Returns the names of the pages about the bits that are set in a word of a family.
 pub fn names(family: Family, word: u32) -> Vec<&'static str> {
     let own = pages().filter(|page| page.family == family && word & page.number() != 0);
     own.map(|page| page.name).collect()
 }
 
-/// The words that commands print for this code.
+/// Returns the words that commands print for this code.
 fn shown(page: &Page) -> Vec<String> {
-    // A frame that is decoded names nodes as the wire counts them.
+    // A decoded frame uses the wire's numbers of the nodes.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }
@@ -195,21 +195,21 @@ fn own_words(page: &Page) -> Option<String> {
     }
 }
 
-/// As typed from a screen or from memory: case, spaces and signs do not count.
+/// Reduces a text to lower-case letters and digits, so that case, spaces and signs do not count.
 fn letters(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// Pages for a name (`joint-position-error`), the words that a screen shows (`HoldPos`, `over-current`), a number of one family
-/// (`can:0x100`, `data:7`), a bare number (looked up in every family), or words of a name. Empty: nothing fits.
+/// Finds pages for a name (`joint-position-error`), the words on a screen (`HoldPos`, `over-current`), a number of one family
+/// (`can:0x100`, `data:7`), a bare number (searched in every family), or words of a name. Returns an empty list if no page fits.
 pub fn find(query: &str) -> Vec<&'static Page> {
-    // A line of errors names the joint of each.
+    // In a line of errors each error begins with its joint.
     let query = match query.split_once(": ") {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // A whole family, also one whose key is a word on a screen.
+    // A query for a whole family, also if its key is also a word on a screen.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }
@@ -222,7 +222,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         return exact;
     }
     let by_name = by_name_or_number(query);
-    // Part of what a screen shows: "does not answer".
+    // The query is a part of the words on a screen: "does not answer".
     if by_name.is_empty() && as_shown.len() > 3 {
         on_screen(|text, asked| text.contains(asked))
     } else {
@@ -259,7 +259,7 @@ fn by_name_or_number(query: &str) -> Vec<&'static Page> {
     pages().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
 }
 
-/// All set bits have a page: else the number belongs to another family.
+/// Returns `true` if all set bits have a page; if not, the number belongs to another family.
 fn known_bits(family: Family, number: u32) -> bool {
     let known = pages().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
     number & !known == 0
@@ -295,7 +295,7 @@ mod tests {
         assert!(find("no-such-thing").is_empty() && find("").is_empty() && find("bogus:1").is_empty());
     }
 
-    /// Each word that a screen shows leads to the page of its code, as it stands there.
+    /// Each text that a screen shows finds the page of its code.
     #[test]
     fn every_word_on_a_screen_finds_its_page() {
         use jtc_wire::words as w;
@@ -322,7 +322,7 @@ mod tests {
         }
         for kind in ProblemKind::ALL {
             has(kind.words(), Family::Check, kind as usize);
-            // As JSON names it.
+            // The name in JSON.
             let key = serde_json::to_value(kind).unwrap().as_str().unwrap().to_owned();
             has(&key, Family::Check, kind as usize);
         }
@@ -348,7 +348,7 @@ mod tests {
         assert_eq!(find("HoldPos").len(), 1);
     }
 
-    /// A bit has as many names as it has words, in the same order, and each leads to its page alone.
+    /// A word has as many names as set bits, in the same order as the texts, and each name finds only its page.
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [
@@ -363,7 +363,7 @@ mod tests {
         assert!(pages().all(|page| !page.title().is_empty() && named(page.name) == Some(page)));
     }
 
-    /// No bit and no code without a page, no page twice.
+    /// Every bit and every code has exactly one page.
     #[test]
     fn every_code_has_one_page() {
         use jtc_wire::words as w;
@@ -378,7 +378,7 @@ mod tests {
         assert_eq!(count(Family::Tes), TrajectoryState::ALL.len());
         assert_eq!(count(Family::Missing), w::JTC_INIT.len());
         assert_eq!(count(Family::Check), ProblemKind::ALL.len());
-        // The held stop itself has a page, too.
+        // The held stop itself also has a page.
         assert_eq!(count(Family::Stop), 1 + StopKind::ALL.len());
         assert_eq!((count(Family::Data), count(Family::Frame)), (9, 6));
         for (i, p) in pages().enumerate() {
@@ -387,7 +387,7 @@ mod tests {
                 "{}",
                 p.name
             );
-            // Another one may have the same words on a screen.
+            // A page of another family may have the same words on a screen.
             let found = find(p.name);
             assert!(
                 found.contains(&p) && found.iter().all(|q| q.family != p.family || q == &p),

@@ -1,8 +1,8 @@
-//! Before a board is flashed: what its controller does, and whether it may be stopped.
+//! Check of a board before it is flashed: the state of its controller, and whether the controller may be stopped.
 //!
-//! A flash resets the processor. The drives get no more frames, and an arm that is held falls. So a board whose controller
-//! reports torque is never flashed; and of one that does not report all of it, or of which it is not certain that it is this controller,
-//! a person has to answer for it.
+//! A flash resets the processor. Then the drives receive no more frames, and an arm that the drives hold falls. So a board whose
+//! controller reports torque is never flashed. If the report is incomplete, or may come from another controller, an operator must
+//! confirm the flash.
 
 use std::time::Duration;
 
@@ -14,40 +14,40 @@ use crate::error::LinkError;
 use crate::port::Port;
 use crate::session::{Session, Timeouts};
 
-/// A controller sends a status each 40 ms; one that sends none for this time does not run.
+/// Time without a status after which no controller runs on the line; a controller sends a status every 40 ms.
 const SILENT: Duration = Duration::from_millis(1_500);
 
-/// What the controller on a serial line reported.
+/// Report of the controller on a serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
-    /// Nothing that could be read: no firmware, another one, or another rate.
+    /// No readable data: no firmware, another firmware, or another rate.
     Nothing {
-        /// Bytes that arrived all the same.
+        /// Number of bytes received.
         bytes: u64,
     },
-    /// A controller.
+    /// A controller answers.
     Controller {
-        /// Its state.
+        /// State of the controller.
         state: Code<ControllerState>,
-        /// The arm has torque.
+        /// `true` if the arm has torque.
         torque: bool,
-        /// Joints that do not answer the controller: what they do is not known.
+        /// Joints that do not answer the controller, so that their torque is unknown.
         silent: Vec<Joint>,
-        /// The gripper is on: it may hold a part.
+        /// `true` if the gripper is on, so that it may hold a part.
         grips: bool,
-        /// Who it is; `None` where it did not report it, be it without extensions or not understood.
+        /// Identity of the controller; `None` if it was not reported (no extensions), or not understood.
         info: Option<Box<Info>>,
     },
 }
 
-/// A serial line that was asked.
+/// Serial line over which the board was asked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
-    /// Its port.
+    /// Name of the port.
     pub port: String,
-    /// Line and drive are of one USB device, so of one board; `None` where the system does not say.
+    /// `true` if line and drive belong to one USB device, so to one board; `None` if the system does not know.
     pub same_device: Option<bool>,
-    /// What the controller on it reported.
+    /// Report of the controller on the line.
     pub answers: Answers,
 }
 
@@ -59,12 +59,12 @@ impl Asked {
         }
     }
 
-    /// It is the board's own line.
+    /// Returns `true` if the line belongs to the board with the drive.
     fn is_own(&self) -> bool {
         self.same_device == Some(true)
     }
 
-    /// What speaks against a flash without a question, beside whose line it is.
+    /// Returns the reasons against a flash without confirmation, apart from the question whose line it is.
     fn doubts(&self) -> Option<String> {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,
@@ -86,31 +86,31 @@ impl Asked {
     }
 }
 
-/// What is known of a board before it is flashed: what was reported on each line that was asked. No line: nobody was asked.
+/// Knowledge about a board before it is flashed: the report on each line that was asked. Without lines, no controller was asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Before {
-    /// The lines.
+    /// Lines that were asked.
     pub lines: Vec<Asked>,
 }
 
 impl Before {
-    /// Who the controllers on the board's own lines are.
+    /// Returns the identities of the controllers on the board's own lines.
     pub fn own_info(&self) -> impl Iterator<Item = &Info> {
         self.lines.iter().filter(|line| line.is_own()).filter_map(Asked::info)
     }
 
-    /// Who the controller is: the board's own, or else another one that was asked.
+    /// Returns the identity of the controller: the board's own, or else another controller that was asked.
     pub fn info(&self) -> Option<&Info> {
         self.own_info().next().or_else(|| self.lines.iter().find_map(Asked::info))
     }
 
-    /// The board keeps an arm that a flash might take away.
+    /// Returns `true` if the board stores an arm, which a flash might remove.
     pub fn stored_arm(&self) -> Option<bool> {
         self.info().map(|info| info.store == StoreState::Stored)
     }
 
-    /// What somebody has to answer for before the board is flashed with this image; `None` when its own controller reports that the arm
-    /// has no torque, each of its joints answers, and the gripper is off.
+    /// Returns the statement that an operator must confirm before the board is flashed with this image. `None` if the board's own
+    /// controller reports that the arm has no torque, each joint answers, and the gripper is off.
     pub fn to_confirm(&self, image: &Image) -> Option<String> {
         let reports = |line: &Asked| matches!(line.answers, Answers::Controller { .. });
         let mut doubts: Vec<String> = self.lines.iter().filter_map(Asked::doubts).collect();
@@ -140,20 +140,20 @@ impl Before {
     }
 }
 
-/// What a person has answered for beforehand.
+/// Statements that the operator has confirmed beforehand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Permissions {
-    /// The drive that does not name its board is that of the image's board.
+    /// The drive without a board name belongs to the image's board.
     pub assume_board: bool,
-    /// The board's solder bridges are set to the core supply of the image.
+    /// The board's solder bridges are set for the core supply of the image.
     pub accept_supply: bool,
 }
 
-/// Asks the controller on a line what it does now.
+/// Requests the present state from the controller on a line.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Port`] when the port is gone.
+/// [`FirmwareError::Port`] if the port is lost.
 pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError> {
     session.timeouts = Timeouts { status: SILENT, confirmation: Duration::from_millis(300), tries: 3 };
     let before = session.statistics().bytes_received;
@@ -162,7 +162,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     if answered(session.poll(SILENT))?.flatten().is_none() {
         return silent(session);
     }
-    // Waiting for the answer passes over all that had arrived while nobody read, which may be minutes of a question.
+    // The wait for the answer skips all statuses buffered while the line was not read, which may be minutes during a question.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),
@@ -170,7 +170,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     }
 }
 
-/// What the line returned; `None` where it was not understood. A port that has gone is an error.
+/// Returns the result of the line; `None` if the answer was not understood. A lost port is an error.
 fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -181,7 +181,7 @@ fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError>
 
 fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     let flag = |joint: &Joint| status.can_current & can_flag::no_answer(joint.index()) != 0;
-    // One that has not answered yet has the state with which all begin.
+    // A joint that has not answered yet is in the state in which all joints begin.
     let begins = |joint: &Joint| status.joints[joint.index()].state == NodeState::START;
     let grips = status.gripper.is_some_and(|gripper| gripper.pump != 0 || !is_idle(gripper.state));
     Answers::Controller {
@@ -193,14 +193,14 @@ fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     }
 }
 
-/// The arm has torque, or may have: by the state of the controller, or of a drive.
+/// Returns `true` if the arm has torque, or may have torque, by the state of the controller or of a drive.
 fn has_torque(status: &Status) -> bool {
     let idle = [ControllerState::Init, ControllerState::Error].into_iter().any(|idle| status.state == idle);
     !idle || status.joints.iter().any(|joint| !is_idle(joint.state))
 }
 
-/// The motor of this node is off. Not so on the way to and from *enabled*, in the reaction to a fault, and in all that later drives may
-/// report: they may hold, align or calibrate.
+/// Returns `true` if the motor of this node is off. In the transitions to and from *enabled*, in the reaction to a fault, and in
+/// unknown states of later drives, a motor may hold, align or calibrate, so the result is `false`.
 fn is_idle(state: NodeState) -> bool {
     [
         NodeState::START,
@@ -213,12 +213,12 @@ fn is_idle(state: NodeState) -> bool {
     .contains(&state)
 }
 
-/// Whether this image may go onto this drive's board.
+/// Checks that this image may be written to this drive's board.
 ///
 /// # Errors
 ///
 /// [`FirmwareError::HasTorque`], [`FirmwareError::OtherBoard`], [`FirmwareError::OtherController`],
-/// [`FirmwareError::UnnamedBoard`] and [`FirmwareError::Supply`]: nothing was written.
+/// [`FirmwareError::UnnamedBoard`] and [`FirmwareError::Supply`]: no byte was written.
 pub fn may_flash(
     image: &Image,
     drive: &Drive,
@@ -242,7 +242,7 @@ pub fn may_flash(
         let named = drive.board().map(|(name, _)| name.to_owned()).unwrap_or_default();
         return Err(FirmwareError::OtherBoard { drive: drive.path.clone(), named, board: board.clone() });
     }
-    // A controller on the drive's own USB device names the board, too.
+    // A controller on the drive's own USB device also names the board.
     let named = fit == Fit::Same || before.own_info().next().is_some();
     if !named && !permissions.assume_board {
         return Err(FirmwareError::UnnamedBoard {
@@ -251,7 +251,7 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // What runs on the board has its supply; nothing else says how its solder bridges are.
+    // A running program shows that the board has its supply; the solder bridges cannot be read in another way.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

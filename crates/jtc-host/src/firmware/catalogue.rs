@@ -1,4 +1,4 @@
-//! The images that were installed beside the programs: a folder with `firmware.json`.
+//! Catalogue of the installed images: a folder with `firmware.json`.
 
 use std::env;
 use std::fs;
@@ -10,28 +10,28 @@ use super::{FLASH, FirmwareError, Image};
 
 /// Name of the file that lists the images.
 const FILE: &str = "firmware.json";
-/// Where packages put them.
+/// Folder in which packages install the images.
 const INSTALLED: &str = "share/openjtc/firmware";
-/// Names a folder in place of those that are looked at else.
+/// Environment variable with a folder that replaces the default folders.
 const VARIABLE: &str = "OPENJTC_FIRMWARE";
 
-/// An image of the catalogue.
+/// Image of the catalogue.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct CatalogueImage {
-    /// Board that it is for.
+    /// Board of the image.
     pub board: String,
     /// Name of the file, in the folder of the catalogue.
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Where its first byte goes.
+    /// Address of its first byte.
     pub address: u32,
-    /// Bytes of the file.
+    /// Size of the file, bytes.
     pub bytes: u64,
 }
 
 impl CatalogueImage {
-    /// What a file holds is what is listed.
+    /// Checks that the content of a file matches the catalogue.
     fn check(&self, path: &Path, bytes: &[u8]) -> Result<(), FirmwareError> {
         let sha256: String = Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         if bytes.len() as u64 == self.bytes && sha256.eq_ignore_ascii_case(&self.sha256) {
@@ -46,21 +46,21 @@ impl CatalogueImage {
     }
 }
 
-/// What `firmware.json` lists.
+/// Content of `firmware.json`.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 pub struct Catalogue {
-    /// Version of the release that the images are of.
+    /// Release version of the images.
     pub version: String,
-    /// The images.
+    /// Images.
     pub images: Vec<CatalogueImage>,
-    /// The folder.
+    /// Folder of the catalogue.
     #[serde(skip)]
     pub folder: PathBuf,
 }
 
 impl Catalogue {
-    /// The folders in which a catalogue is looked for: the one that the environment names, or beside the program's installation and
-    /// where packages put it.
+    /// Returns the folders in which a catalogue is searched: the folder in the environment variable, or else the installation
+    /// prefix of the program and the install folder of packages.
     pub fn folders() -> Vec<PathBuf> {
         if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
             return vec![folder.into()];
@@ -75,11 +75,11 @@ impl Catalogue {
         folders
     }
 
-    /// The first catalogue of these folders.
+    /// Returns the first catalogue in these folders.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoCatalogue`], and those of [`Catalogue::read`].
+    /// [`FirmwareError::NoCatalogue`], and the errors of [`Catalogue::read`].
     pub fn find(folders: &[PathBuf]) -> Result<Self, FirmwareError> {
         match folders.iter().find(|folder| folder.join(FILE).exists()) {
             Some(folder) => Self::read(folder),
@@ -87,7 +87,7 @@ impl Catalogue {
         }
     }
 
-    /// The catalogue of a folder.
+    /// Reads the catalogue of a folder.
     ///
     /// # Errors
     ///
@@ -113,12 +113,12 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// A catalogue in the folder of this file lists it, and it is the file that is listed. A folder without a catalogue, and one that cannot be
-    /// read, list nothing.
+    /// Returns `true` if a catalogue in the folder of this file lists the file, and the content matches. A folder without a
+    /// readable catalogue lists no file.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Damaged`] when another file is listed by this name.
+    /// [`FirmwareError::Damaged`] if the catalogue lists another content for this name.
     pub(super) fn lists(path: &Path, bytes: &[u8]) -> Result<bool, FirmwareError> {
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
         let Ok(catalogue) = Self::read(folder) else { return Ok(false) };
@@ -128,12 +128,12 @@ impl Catalogue {
         }
     }
 
-    /// The image of a board, once its file was found to be the one that was released.
+    /// Returns the image of a board after its file was verified against the catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoBoard`], [`FirmwareError::Damaged`], [`FirmwareError::BadCatalogue`] when the file is for another board, and
-    /// those of [`Image::read`].
+    /// [`FirmwareError::NoBoard`], [`FirmwareError::Damaged`], [`FirmwareError::BadCatalogue`] if the file is for another board,
+    /// and the errors of [`Image::read`].
     pub fn image(&self, board: &str) -> Result<Image, FirmwareError> {
         let Some(listed) = self.images.iter().find(|image| image.board == board) else {
             return Err(FirmwareError::NoBoard {
@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(found.image("nucleo-h743zi2").unwrap().record().board, "nucleo-h743zi2");
         let said = found.image("nucleo-f401re").unwrap_err().to_string();
         assert!(said.contains("nucleo-f401re") && said.contains("nucleo-h745zi-q, nucleo-h743zi2"), "{said}");
-        // One bit of the file.
+        // Changes one bit of the file.
         let path = folder.path().join("nucleo-h743zi2.bin");
         let mut bytes = fs::read(&path).unwrap();
         bytes[0x800] ^= 1;

@@ -1,4 +1,4 @@
-//! What helps where an image was not written to a board, or does not run there.
+//! Advice for an image that was not written to a board, or does not run there.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 

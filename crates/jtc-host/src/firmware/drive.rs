@@ -1,19 +1,19 @@
-//! The drive that an ST-LINK shows on USB: which board it belongs to, and what it reports.
+//! Drive that an ST-LINK shows on USB: its board, and its files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::FirmwareError;
 
-/// Longest label that the file system of the drive has; longer ones are cut.
+/// Longest label in the file system of the drive; longer labels are cut.
 const LABEL_MAX: usize = 11;
-/// Most that is read of the drive's small files.
+/// Maximum number of bytes read from the drive's small files.
 const TEXT_MAX: usize = 4096;
 
-/// What stands in front of the board in a label: firmware of the ST-LINK from 2019 on, and of before.
+/// Prefixes of the board name in a label: ST-LINK firmware from 2019 on, and older firmware.
 const PREFIXES: [&str; 2] = ["NOD_", "NODE_"];
 
-/// Numbers of boards as `MBED.HTM` has them, and what their labels call them.
+/// Board numbers as in `MBED.HTM`, and the board names in labels.
 const CODES: [(&str, &str); 6] = [
     ("0813", "H743ZI"),
     ("0836", "H743ZI2"),
@@ -23,52 +23,53 @@ const CODES: [(&str, &str); 6] = [
     ("0847", "H745I-DISCO"),
 ];
 
-/// A drive, and what it says of itself.
+/// Drive with its own description.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drive {
-    /// Where it is mounted.
+    /// Mount point.
     pub path: PathBuf,
-    /// Its label, where the system knows it.
+    /// Label, if the system knows it.
     pub label: Option<String>,
-    /// Number of the board in `MBED.HTM`, where it has one.
+    /// Number of the board in `MBED.HTM`, if there is one.
     pub code: Option<String>,
-    /// `DETAILS.TXT`: version of the ST-LINK, and when it was built; a line each.
+    /// Content of `DETAILS.TXT`: version and build date of the ST-LINK, one line each.
     pub details: String,
-    /// The device that is mounted there, such as `/dev/sda`, where the system says so.
+    /// Device that is mounted there, such as `/dev/sda`, if the system knows it.
     pub device: Option<PathBuf>,
-    /// The USB device that it is a function of, where the system says so.
+    /// USB device to which the drive belongs, if the system knows it.
     pub usb: Option<UsbDevice>,
-    /// Number of the file system at the path, where systems number them: another one is there once the drive has gone.
+    /// Number of the file system at the path, if the system numbers file systems. After the drive was removed, the path has
+    /// another file system.
     pub volume: Option<u64>,
 }
 
-/// A USB device: of the ST-LINK of a board, which is a drive, a serial port and a debugger at once.
+/// USB device of the ST-LINK of a board, which is a drive, a serial port and a debugger at the same time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// Its folder in the system's tree of devices, which names the connector that it is plugged into.
+    /// Folder in the system's device tree; the folder names the USB connector.
     pub folder: PathBuf,
-    /// Its number on the bus: another one each time that it is plugged in.
+    /// Number on the bus, which changes each time the device is plugged in.
     pub number: String,
 }
 
-/// Whether a drive is that of a board.
+/// Result of the comparison of a drive with a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// It is.
+    /// The drive belongs to the board.
     Same,
-    /// It does not name its board, or not the whole name.
+    /// The drive does not name its board, or not with the whole name.
     Unknown,
-    /// It is that of another board.
+    /// The drive belongs to another board.
     Other,
 }
 
 impl Drive {
-    /// The drive at a folder.
+    /// Reads the drive at a folder.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NoDrive`] when the folder has none of the files of such a drive.
+    /// [`FirmwareError::NoDrive`] if the folder has none of the files of such a drive.
     pub fn at(path: &Path) -> Result<Self, FirmwareError> {
         let no_drive = |why: &str| FirmwareError::NoDrive { path: path.to_owned(), why: why.to_owned() };
         if !path.is_dir() {
@@ -80,7 +81,7 @@ impl Drive {
         }
         Ok(Self {
             path: path.to_owned(),
-            // Where it is mounted by itself the folder has its name.
+            // The system names the folder of an automatic mount after the label.
             label: path.file_name().map(|name| name.to_string_lossy().into_owned()),
             code: page.as_deref().and_then(code),
             details: details.unwrap_or_default(),
@@ -90,13 +91,14 @@ impl Drive {
         })
     }
 
-    /// The same with what the system knows of it. Where the device is known, its own label counts and no name of a folder: who mounts a
-    /// second drive of a label appends a digit, and `NODE_H743ZI2` would be the first board of that name.
+    /// Adds the system's knowledge of the drive. For a known device only its own label counts, not a folder name. A second drive
+    /// with the same label is mounted with a digit appended, and `NODE_H743ZI2` would be the first board of that name.
     pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {
         Self { device: Some(device), label, usb, ..self }
     }
 
-    /// The board, as labels call it: `H745ZIQ`; and whether that is its whole name. `None` when it is not named.
+    /// Returns the board name as in labels (`H745ZIQ`), and `true` if the name is complete; `None` if the drive does not name its
+    /// board.
     pub fn board(&self) -> Option<(&str, bool)> {
         let by_code =
             |code: &String| CODES.iter().find(|(known, _)| known == code).map(|(_, name)| (*name, true));
@@ -113,7 +115,7 @@ impl Drive {
         })
     }
 
-    /// Whether it is the drive of a board, which is named as in its firmware: `nucleo-h745zi-q`.
+    /// Compares the drive with a board, which is named as in its firmware: `nucleo-h745zi-q`.
     pub fn fit(&self, board: &str) -> Fit {
         let wanted = short_name(board);
         match self.board() {
@@ -125,43 +127,43 @@ impl Drive {
         }
     }
 
-    /// What `FAIL.TXT` says; `None` when there is none.
+    /// Returns the content of `FAIL.TXT`; `None` if the file does not exist.
     pub fn failure(&self) -> Option<String> {
         text(&self.path, "FAIL.TXT").map(|text| text.trim().to_owned())
     }
 
-    /// It is there.
+    /// Returns `true` if the drive is present.
     pub fn is_there(&self) -> bool {
         ["DETAILS.TXT", "MBED.HTM"].iter().any(|file| self.path.join(file).exists())
     }
 }
 
-/// The file system in which a file or folder is.
+/// Returns the number of the file system of a file or folder.
 #[cfg(unix)]
 pub(super) fn volume(found: &fs::Metadata) -> Option<u64> {
     use std::os::unix::fs::MetadataExt as _;
     Some(found.dev())
 }
 
-/// The file system in which a file or folder is; this system does not number them.
+/// Returns `None`, because this system does not number its file systems.
 #[cfg(not(unix))]
 pub(super) fn volume(_: &fs::Metadata) -> Option<u64> {
     None
 }
 
-/// A board as labels call it: `nucleo-h745zi-q-ldo` is the same board as `nucleo-h745zi-q`, `H745ZIQ`.
+/// Returns the board name as in labels: `nucleo-h745zi-q-ldo` is the same board as `nucleo-h745zi-q`, `H745ZIQ`.
 fn short_name(board: &str) -> String {
     let name = same_board(board);
     name.strip_prefix("nucleo-").unwrap_or(name).replace('-', "").to_uppercase()
 }
 
-/// The board without how its core is supplied.
+/// Returns the board name without the kind of core supply.
 pub(super) fn same_board(board: &str) -> &str {
     board.strip_suffix("-ldo").unwrap_or(board)
 }
 
-/// The core of this board can be supplied in two ways, and an image is for one of them: `-q` in the maker's names stands for a
-/// switching regulator beside the linear one.
+/// Returns `true` if the core of this board can be supplied in two ways; an image is built for one of them. In ST's names `-q`
+/// stands for a switching regulator in addition to the linear one.
 pub(super) fn has_two_supplies(board: &str) -> bool {
     same_board(board).ends_with("-q") || same_board(board) != board
 }
@@ -171,14 +173,14 @@ fn text(folder: &Path, file: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_MAX)]).into_owned())
 }
 
-/// The first four digits behind `code=` are those of the board.
+/// Returns the first four digits after `code=`, which are the number of the board.
 fn code(page: &str) -> Option<String> {
     let (_, behind) = page.split_once("code=")?;
     let code = behind.get(..4)?;
     code.bytes().all(|byte| byte.is_ascii_hexdigit()).then(|| code.to_owned())
 }
 
-/// The chip of this board has a second core, which starts wherever bank 2 of the flash begins.
+/// Returns `true` if the chip of this board has a second core, which starts at the beginning of bank 2 of the flash.
 pub(super) fn has_second_core(board: &str) -> bool {
     ["nucleo-h745", "nucleo-h755"].iter().any(|chip| board.starts_with(chip))
 }
@@ -206,7 +208,8 @@ mod tests {
         for (label, code, of_h745, of_h743) in [
             ("NOD_H745ZIQ", None, Same, Other),
             ("NOD_H743ZI2", None, Other, Same),
-            // The older board of this name is another one, with other LEDs; its label and the cut label of the newer are alike.
+            // The older board of this name is a different board with other LEDs; its label equals the cut label of the newer
+            // board.
             ("NODE_H743ZI", None, Other, Unknown),
             ("NODE_H743ZI", Some("0836"), Other, Same),
             ("NODE_H743ZI", Some("0813"), Other, Other),

@@ -1,22 +1,22 @@
-//! The bytes that an ELF file puts into flash: as much of the format as that needs.
+//! Bytes that an ELF file loads into flash; parses only the necessary part of the format.
 
 use super::image::{ERASED, FLASH, STORED_ARM};
 
-/// Begins an ELF file for 32 bits, the low byte first.
+/// First bytes of a 32-bit little-endian ELF file.
 const MAGIC: [u8; 6] = [0x7F, b'E', b'L', b'F', 1, 1];
-/// Its type of a segment that is loaded.
+/// ELF type of a segment that is loaded.
 const PT_LOAD: u32 = 1;
-/// Machine: Arm.
+/// ELF machine number of Arm.
 const EM_ARM: u16 = 40;
-/// More segments than a program has.
+/// Maximum number of segments; a program has fewer.
 const SEGMENTS_MAX: u16 = 64;
 
-/// The file is ELF, of whatever kind.
+/// Returns `true` if the file is an ELF file of any kind.
 pub(super) fn is_elf(bytes: &[u8]) -> bool {
     bytes.starts_with(&MAGIC[..4])
 }
 
-/// What the file puts into flash, from the first byte of the flash on; gaps are as erased flash.
+/// Returns the flash content of the file from the first byte of the flash on; gaps are filled like erased flash.
 pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let damaged = || "an ELF file that is cut off or damaged".to_owned();
     let half =
@@ -62,7 +62,7 @@ pub(super) fn flat(bytes: &[u8]) -> Result<Vec<u8>, String> {
 mod tests {
     use super::*;
 
-    /// A file with these segments: address, bytes.
+    /// Builds a file with these segments: address, bytes.
     fn file(segments: &[(u32, &[u8])]) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.resize(52, 0);
@@ -86,7 +86,7 @@ mod tests {
     fn segments_stand_where_they_are_loaded() {
         let bytes = file(&[(FLASH + 8, &[1, 2]), (FLASH, &[3, 4, 5])]);
         assert_eq!(flat(&bytes).unwrap(), [3, 4, 5, 255, 255, 255, 255, 255, 1, 2]);
-        // What has no bytes in the file is no part of the flash.
+        // A segment without bytes in the file is not part of the flash.
         assert_eq!(flat(&file(&[(0x2000_0000, &[]), (FLASH, &[7])])).unwrap(), [7]);
     }
 
@@ -102,7 +102,7 @@ mod tests {
         let mut other = bytes.clone();
         other[18] = 62;
         assert!(flat(&other).unwrap_err().contains("another processor"));
-        // Numbers of any size.
+        // Arbitrary numbers must not cause a panic.
         for at in 28..bytes.len() - 4 {
             let mut wild = bytes.clone();
             wild[at..at + 4].fill(0xFF);

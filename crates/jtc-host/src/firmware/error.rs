@@ -1,4 +1,4 @@
-//! Why an image was not written to a board, or does not run there.
+//! Errors of writing an image to a board and of verifying that it runs there.
 
 use std::io;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use jtc_wire::{Code, ControllerState};
 use super::{CatalogueImage, DriveAfter};
 use crate::port::PortError;
 
-/// Why a board was not flashed, or is not known to run what was flashed.
+/// Reason why a board was not flashed, or is not known to run the flashed image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
@@ -17,82 +17,82 @@ pub enum FirmwareError {
     File {
         /// The file.
         path: PathBuf,
-        /// The system's words.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The file is no firmware of these boards.
+    /// The file is not firmware for these boards.
     #[error("{}: no firmware for a board of this project: {why}", path.display())]
     NoImage {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of the file.
         why: String,
     },
     /// No images are installed.
     #[error("no firmware images are installed: no firmware.json in {}", listed(folders))]
     NoCatalogue {
-        /// Where it was looked for.
+        /// Folders that were searched.
         folders: Vec<PathBuf>,
     },
-    /// The catalogue of images is none, or does not fit its images.
+    /// The catalogue of images is invalid, or does not match its images.
     #[error("{}: {why}", path.display())]
     BadCatalogue {
         /// The catalogue.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of the catalogue.
         why: String,
     },
     /// No image of the catalogue is for this board.
     #[error("no image for the board {board}; there are those for {}", known.join(", "))]
     NoBoard {
-        /// The board asked for.
+        /// Requested board.
         board: String,
         /// The boards of the catalogue.
         known: Vec<String>,
     },
-    /// A file is not the one that was released.
+    /// A file differs from the released file.
     #[error(
         "{}: {bytes} bytes with the SHA-256 {sha256}, and {} with {} were released", path.display(), listed.bytes, listed.sha256
     )]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Its digest.
+        /// SHA-256 of the file.
         sha256: String,
-        /// Its length.
+        /// Length of the file, bytes.
         bytes: u64,
-        /// What the catalogue lists.
+        /// Entry of the catalogue.
         listed: Box<CatalogueImage>,
     },
-    /// A folder is no drive of an ST-LINK.
+    /// The folder is not a drive of an ST-LINK.
     #[error("{}: no drive of an ST-LINK: {why}", path.display())]
     NoDrive {
         /// The folder.
         path: PathBuf,
-        /// What was found.
+        /// Reason.
         why: String,
     },
-    /// No drive is there.
+    /// No drive is mounted.
     #[error("no drive of an ST-LINK is mounted")]
     NoneFound,
-    /// No drive was named, and several are there.
+    /// No drive was named, and several are mounted.
     #[error("several drives of ST-LINKs are mounted: {}", listed(drives))]
     Several {
-        /// Where.
+        /// Mount points of the drives.
         drives: Vec<PathBuf>,
     },
-    /// A serial port has to be asked before the board is flashed, and cannot be used.
+    /// The board must be asked over a serial port before it is flashed, and the port cannot be used.
     #[error("the board has to be asked over {port} before it is flashed: {source}")]
     NotAsked {
         /// The port.
         port: String,
-        /// Why it cannot be used.
+        /// Reason why the port cannot be used.
         source: PortError,
     },
-    /// What was looked at before is not what is there.
+    /// The drive or board has changed since it was checked.
     #[error("{what}")]
     Changed {
-        /// What is another one.
+        /// Description of the change.
         what: String,
     },
     /// The arm has torque.
@@ -100,17 +100,17 @@ pub enum FirmwareError {
         "the controller at {port} holds an arm (state {state}); flashing resets the board, and the arm falls"
     )]
     HasTorque {
-        /// Its port.
+        /// Port of the controller.
         port: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The controller on the line is no board for this image.
+    /// The controller on the line runs on a board for which the image is not built.
     #[error("the controller at {port} runs on {runs}, and the image is for {board}")]
     OtherController {
-        /// Its port.
+        /// Port of the controller.
         port: String,
-        /// What it reports.
+        /// Board that the controller reports.
         runs: String,
         /// Board of the image.
         board: String,
@@ -120,7 +120,7 @@ pub enum FirmwareError {
     OtherBoard {
         /// The drive.
         drive: PathBuf,
-        /// What the drive calls its board.
+        /// Board name on the drive.
         named: String,
         /// Board of the image.
         board: String,
@@ -130,47 +130,47 @@ pub enum FirmwareError {
     UnnamedBoard {
         /// The drive.
         drive: PathBuf,
-        /// Its label.
+        /// Label of the drive.
         label: Option<String>,
         /// Board of the image.
         board: String,
     },
-    /// The image may supply the core in another way than the board is wired for.
+    /// The image may use another core supply than the board is wired for.
     #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
         /// Board of the image.
         board: String,
-        /// What the board runs now, where it reports it and it is another image.
+        /// Board of the running program, if the controller reports it and it differs from the image.
         runs: Option<String>,
     },
-    /// The drive takes no file of this size.
+    /// The drive has no space for a file of this size.
     #[error("{}: the drive has no room for {bytes} bytes{}", drive.display(), with_failure(failure))]
     DriveFull {
         /// The drive.
         drive: PathBuf,
-        /// Bytes of the image.
+        /// Size of the image, bytes.
         bytes: usize,
-        /// Its `FAIL.TXT`.
+        /// Content of `FAIL.TXT`.
         failure: Option<String>,
     },
-    /// No file can be made on the drive.
+    /// The file on the drive cannot be created.
     #[error("{}: {}: {source}", path.display(), cannot_open(source))]
     NotOpened {
         /// The file on the drive.
         path: PathBuf,
-        /// The device that is mounted there, where it is known.
+        /// Device that is mounted there, if it is known.
         device: Option<PathBuf>,
-        /// The system's words.
+        /// Error of the operating system.
         source: io::Error,
     },
-    /// The copying ended early.
+    /// The copying was interrupted.
     #[error("{}: {source} after {written} bytes; the board may hold a part of the image", path.display())]
     NotWritten {
         /// The file on the drive.
         path: PathBuf,
-        /// Bytes until then.
+        /// Number of bytes written before the error.
         written: usize,
-        /// The system's words.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The ST-LINK reports that it could not write the image.
@@ -178,28 +178,28 @@ pub enum FirmwareError {
     Refused {
         /// The drive.
         drive: PathBuf,
-        /// What `FAIL.TXT` says.
+        /// Content of `FAIL.TXT`.
         text: String,
     },
-    /// The drive does not behave as one does that has taken an image.
+    /// The drive does not behave like a drive that has accepted an image.
     #[error("the image was copied, and {seen}{}", with_doubt(doubt))]
     NotTaken {
-        /// What became of the drive.
+        /// Behaviour of the drive.
         seen: DriveAfter,
-        /// What the system reported of the copying.
+        /// Error that the system reported during the copying.
         doubt: Option<String>,
     },
-    /// The program that runs is another one.
+    /// Another program than the image runs.
     #[error("the board does not run {}: {why}; it reports {runs}", path.display())]
     OtherProgram {
         /// The image.
         path: PathBuf,
         /// Version and board that the controller reports.
         runs: String,
-        /// In what its flash differs.
+        /// Difference between its flash and the image.
         why: String,
     },
-    /// The program that runs does not report its flash.
+    /// The running program does not report its flash.
     #[error(
         "the board runs {runs}, which does not report what is in its flash: it is not proved that it is the image"
     )]
@@ -216,11 +216,11 @@ pub enum FirmwareError {
         with_doubt(doubt)
     )]
     NotStarted {
-        /// How long was waited, s.
+        /// Waiting time, s.
         waited_s: f64,
-        /// What was seen last.
+        /// Last observation.
         last: String,
-        /// What the system reported of the copying.
+        /// Error that the system reported during the copying.
         doubt: Option<String>,
     },
     /// The serial port cannot be used.

@@ -1,4 +1,4 @@
-//! For tests: images, a board behind a line, and the drive of its ST-LINK.
+//! Test doubles: images, a board on a line, and the drive of its ST-LINK.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,15 +14,16 @@ use super::{Drive, Image};
 use crate::port::test::ScriptedPort;
 use crate::port::{Port, PortError};
 
-/// Bytes of the program in an image.
+/// Size of the program in an image, bytes.
 const PROGRAM: usize = 0x1000;
 
-/// An image of a board, with a content that depends on `seed`; with a program for the second core where the board has one.
+/// Returns an image of a board, with a content that depends on `seed`; includes a program for the second core if the board has
+/// one.
 pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
     bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
-    // An interrupt at the end of the program.
+    // Entry of an interrupt at the end of the program.
     bytes[20..24].copy_from_slice(&0x0800_0F05u32.to_le_bytes());
     let record = &mut bytes[0x400..0x460];
     record[..8].copy_from_slice(b"OPENJTC\0");
@@ -43,7 +44,7 @@ pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     bytes
 }
 
-/// What a device reports that has this image in flash; bit by bit, as the definition has it.
+/// Returns the report of a device with this image in flash; the CRC is computed bit by bit, as defined.
 pub fn program_of(image: &[u8]) -> Program {
     let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
@@ -56,7 +57,7 @@ pub fn program_of(image: &[u8]) -> Program {
     Program { bytes: bytes.len() as u32, crc32: !register }
 }
 
-/// A folder with images of these boards and their catalogue.
+/// Creates a folder with images of these boards and their catalogue.
 pub fn catalogue(folder: &Path, boards: &[&str]) {
     use sha2::{Digest, Sha256};
     let images: Vec<_> = boards
@@ -74,23 +75,23 @@ pub fn catalogue(folder: &Path, boards: &[&str]) {
     fs::write(folder.join("firmware.json"), text).unwrap();
 }
 
-/// A processor and what is in its flash.
+/// Processor and the content of its flash.
 #[derive(Clone)]
 pub struct Board(Arc<Mutex<Flashed>>);
 
 struct Flashed {
-    /// The ST-LINK holds the processor.
+    /// `true` while the ST-LINK holds the processor.
     held: bool,
     program: Option<Program>,
     board: String,
     started: Instant,
-    /// Time that it had run before the test began, ms.
+    /// Running time before the test began, ms.
     before_ms: u64,
     status: Status,
 }
 
 impl Board {
-    /// One that has run this image for an hour, with an arm that is configured and has no torque.
+    /// Creates a board that has run this image for an hour; the arm is configured and has no torque.
     pub fn running(board: &str, program: Option<Program>) -> Self {
         let mut status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
         status.joints.iter_mut().for_each(|joint| joint.state = jtc_wire::NodeState::READY);
@@ -104,17 +105,17 @@ impl Board {
         })))
     }
 
-    /// From now on it sends this.
+    /// Changes the status that the board sends from now on.
     pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.0.lock().unwrap().status);
     }
 
-    /// Nothing comes from it.
+    /// Holds the processor, so that the board sends no data, or releases it.
     pub fn hold(&self, held: bool) {
         self.0.lock().unwrap().held = held;
     }
 
-    /// The same; what it ran until then, and the name of the board in that.
+    /// Like [`Board::hold`]; returns the program that ran until then, and its board name.
     fn hold_with(&self, held: bool) -> (Option<Program>, String) {
         self.hold(held);
         let flashed = self.0.lock().unwrap();
@@ -144,7 +145,7 @@ impl Board {
         (!flashed.held).then_some(flashed.status)
     }
 
-    /// A line to it.
+    /// Returns a line to the board.
     pub fn port(&self) -> Box<dyn Port> {
         let board = self.clone();
         let mut next = Duration::ZERO;
@@ -165,31 +166,31 @@ impl Board {
         }))
     }
 
-    /// Opens it.
+    /// Returns a function that opens a line to the board.
     pub fn opener(&self) -> impl FnMut() -> Result<Box<dyn Port>, PortError> {
         let board = self.clone();
         move || Ok(board.port())
     }
 }
 
-/// What an ST-LINK does with a file.
+/// Reaction of an ST-LINK to a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Behaviour {
-    /// Writes it into the flash; the drive vanishes and comes back.
+    /// Writes the file into the flash; the drive vanishes and comes back.
     Takes,
-    /// The same, with a part of the flash left empty, as it happens where the bytes come in another order.
+    /// Like `Takes`, but leaves a part of the flash empty, as happens if the bytes arrive in another order.
     LeavesHole,
-    /// The same, and the program of before starts anew before the ST-LINK stops it.
+    /// Like `Takes`, but the previous program restarts before the ST-LINK stops it.
     StartsBeforeAnew,
-    /// `FAIL.TXT` appears.
+    /// Creates `FAIL.TXT`.
     Fails(&'static str),
-    /// Nothing happens.
+    /// Ignores the file.
     Ignores,
 }
 
-/// The drive of a board, and a thread that is its ST-LINK.
+/// Drive of a board, and a thread that acts as its ST-LINK.
 pub struct StLink {
-    /// Removed with it.
+    /// Temporary folder, removed together with the drive.
     _folder: tempfile::TempDir,
     pub path: PathBuf,
     stop: Arc<AtomicBool>,
@@ -197,7 +198,7 @@ pub struct StLink {
 }
 
 impl StLink {
-    /// A drive with this label at this board.
+    /// Creates a drive with this label for this board.
     pub fn new(label: &str, board: &Board, behaviour: Behaviour) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(label);
@@ -208,12 +209,12 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
-                // A device in its place has no end: reading one takes all memory of the computer.
+                // A device at this path has no end, and reading it would take all memory of the computer.
                 let file = at.join("openjtc.bin");
                 if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
                     continue;
                 }
-                // As long as a file grows it is not whole.
+                // A file that still grows is not complete.
                 let Ok(bytes) = fs::read(&file) else { continue };
                 if Image::parse(&file, bytes.clone()).is_err() || bytes.len() != length {
                     length = bytes.len();
@@ -227,7 +228,7 @@ impl StLink {
         Self { _folder: folder, path, stop, thread: Some(thread) }
     }
 
-    /// It, as a program sees it.
+    /// Returns the drive as a program sees it.
     pub fn drive(&self) -> Drive {
         Drive::at(&self.path).unwrap()
     }
@@ -256,7 +257,7 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
-            // No processor starts within what the clocks may differ by.
+            // The start must be later than the tolerance between the clocks.
             thread::sleep(Duration::from_millis(400));
             if *behaviour == Behaviour::StartsBeforeAnew {
                 board.start_with(&name, before);

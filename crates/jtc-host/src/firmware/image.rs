@@ -1,4 +1,4 @@
-//! An image of the flash of a board: read from a file, and looked at before it goes anywhere.
+//! Flash image of a board: read from a file, and checked before it is used.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,43 +12,45 @@ use super::{Catalogue, FirmwareError};
 
 /// First address of the flash.
 pub const FLASH: u32 = 0x0800_0000;
-/// Bytes of bank 1, which holds the program.
+/// Size of bank 1, which holds the program, in bytes.
 pub(super) const BANK1: usize = 1024 * 1024;
-/// Where the memory of the stored arm begins: an image ends before it.
+/// Offset of the memory for the stored arm; an image must end before it.
 pub(super) const STORED_ARM: usize = 0x1C_0000;
-/// Words at the beginning of a program that are a stack and entries: of the core, and of the chip's interrupts.
+/// Number of words in the vector table at the beginning of a program: stack, and entries of the core and of the chip's
+/// interrupts.
 const VECTORS: usize = 166;
-/// What erased flash reads as.
+/// Value of erased flash.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Memories in which a stack can be: the tightly coupled one, and that of the AXI bus; first byte, and the one behind the last.
+/// Memories that can hold a stack: the tightly coupled memory and the memory on the AXI bus; first address, and first address
+/// after the end.
 const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// The record in the image that says what it is.
+/// Record in the image that describes it.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Record {
     /// Version of the firmware.
     pub version: String,
-    /// Board that it is built for.
+    /// Board of the image.
     pub board: String,
-    /// Commit, with `+` when files were changed since.
+    /// Commit, with `+` if files had changed since that commit.
     pub build: String,
-    /// Rate of its serial lines, Bd.
+    /// Rate of the serial lines, Bd.
     pub baud: u32,
 }
 
 impl Record {
-    /// Where it stands in the image.
+    /// Offset of the record in the image.
     pub const OFFSET: usize = 0x400;
     const MAGIC: &[u8] = b"OPENJTC\0";
-    /// Bytes of its first form; later ones are longer.
+    /// Size of the first version of the record, bytes; later versions are longer.
     const LEN: usize = 96;
-    /// Rates that a build can have, Bd.
+    /// Valid rates of a build, Bd.
     const RATES: std::ops::RangeInclusive<u32> = 9_600..=15_000_000;
 
-    /// From an image; `None` when there is none at its place.
+    /// Reads the record of an image; `None` if the offset does not contain a record.
     pub fn parse(image: &[u8]) -> Option<Self> {
         let bytes = image.get(Self::OFFSET..Self::OFFSET + Self::LEN)?;
         let size = u16::from_le_bytes([bytes[10], bytes[11]]);
@@ -68,7 +70,7 @@ impl Record {
     }
 }
 
-/// An image of the flash, from its first byte on.
+/// Flash image, from the first byte of the flash on.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Image {
     path: PathBuf,
@@ -84,12 +86,12 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// Reads a binary or an ELF file, and looks whether it is firmware of a board of this project. Where a catalogue beside it lists it, it
-    /// has to be the file that is listed.
+    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in its folder
+    /// lists the file, the content must match the catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] when it cannot be read, [`FirmwareError::NoImage`] when it is no such firmware, and
+    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if it is not such firmware, and
     /// [`FirmwareError::Damaged`].
     pub fn read(path: &Path) -> Result<Self, FirmwareError> {
         let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
@@ -98,13 +100,13 @@ impl Image {
         Ok(if listed { image.listed() } else { image })
     }
 
-    /// The same of what the file at `path` holds.
+    /// Like [`Image::read`], from the content of the file at `path` and without a catalogue.
     ///
     /// # Errors
     ///
     /// [`FirmwareError::NoImage`].
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        // An ELF file says where each of its parts ends.
+        // An ELF file contains the end of each of its parts.
         let whole = elf::is_elf(&bytes);
         let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
@@ -113,38 +115,38 @@ impl Image {
         Ok(Self { path: path.to_owned(), bytes, record, whole })
     }
 
-    /// A catalogue lists its length and its digest.
+    /// Marks the image as complete, because a catalogue lists its length and digest.
     pub(super) fn listed(self) -> Self {
         Self { whole: true, ..self }
     }
 
-    /// It is known that nothing is missing at its end: by the form of the file, or by a catalogue. What a binary file by itself shows is that it
-    /// is not *certainly* cut.
+    /// Returns `true` if the image is known to be complete, either by the file format or by a catalogue. For a binary file alone,
+    /// the check finds only some cuts.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
 
-    /// The file that it was read from.
+    /// Returns the file from which the image was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What is written from [`FLASH`] on.
+    /// Returns the bytes that are written from [`FLASH`] on.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// What it says of itself.
+    /// Returns the record of the image.
     pub fn record(&self) -> &Record {
         &self.record
     }
 
-    /// What a device that runs it reports of its flash is this image (J-67): the CRC of as many bytes as the device has read is that of
-    /// the image, and the image has nothing behind them in bank 1 but what fills up gaps.
+    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read must
+    /// be that of the image. After those bytes the image may contain only filler in bank 1.
     ///
     /// # Errors
     ///
-    /// Why it is not.
+    /// Returns the difference in words.
     pub fn is_what_runs(&self, program: Program) -> Result<(), String> {
         let bank1 = &self.bytes[..self.bytes.len().min(BANK1)];
         let Some((read, rest)) = bank1.split_at_checked(program.bytes as usize) else {
@@ -167,7 +169,7 @@ impl Image {
     }
 }
 
-/// What the image says it is; else why it is no firmware that may go onto a board.
+/// Returns the record of the image, or the reason why the image must not be written to a board.
 fn examine(bytes: &[u8]) -> Result<Record, String> {
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let (Some(stack), Some(reset)) = (word(0), word(4)) else {
@@ -202,11 +204,11 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
     Ok(record)
 }
 
-/// The program of the second core, at the beginning of bank 2, is there with the instructions at which it starts.
+/// Returns `true` if the program of the second core is present at the beginning of bank 2, including its first instructions.
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // Two instructions, the second of which leads back to the first.
+    // Two instructions; the second one jumps back to the first.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -267,7 +269,7 @@ mod tests {
             let said = parsed(good[..end].to_vec()).unwrap_err();
             assert!(said.contains("cut short") && said.contains("second core"), "{end}: {said}");
         }
-        // The other board has one core.
+        // The other board has only one core.
         assert_eq!(image_bytes("nucleo-h743zi2", 7).len(), 0x1000);
         assert!(parsed(image_bytes("nucleo-h743zi2", 7)).is_ok());
     }
@@ -278,14 +280,14 @@ mod tests {
         let path = folder.path().join("nucleo-h743zi2.bin");
         fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
-        // A list of other files, or one that is none, says nothing about it.
+        // A catalogue of other files, or an invalid catalogue, says nothing about the file.
         catalogue(folder.path(), &["nucleo-h745zi-q"]);
         assert!(!Image::read(&path).unwrap().is_whole());
         fs::write(folder.path().join("firmware.json"), "{").unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // Cut where nothing of the file itself shows it.
+        // Cuts the file at a place that the file itself does not reveal.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
@@ -297,7 +299,7 @@ mod tests {
         let image = parsed(image_bytes("nucleo-h743zi2", 7)).unwrap();
         let program = program_of(image.bytes());
         assert_eq!(image.is_what_runs(program), Ok(()));
-        // The two words of the second core, far behind the program, change nothing; nor does what fills up the gap.
+        // The two words of the second core, far after the program, do not matter, and neither does filler in the gap.
         for gap in [0, 0xFF] {
             let mut longer = image.bytes().to_vec();
             longer.resize(BANK1, gap);

@@ -1,7 +1,7 @@
-//! The serial lines over which a board is asked before it is flashed.
+//! Serial lines over which the controller of a board is asked before the board is flashed.
 //!
-//! The drive belongs to an ST-LINK, and so does the serial port of the same USB device: it leads to the very board that is flashed, and is
-//! always asked. Another port can be named beside it, as the controller may be used over its RS422 line.
+//! Drive and serial port of an ST-LINK belong to the same USB device. So this port leads to the board that is flashed, and is
+//! always asked. The caller can name another port in addition, because the controller may be in use over its RS422 line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,10 +11,11 @@ use super::{Drive, FirmwareError, Places};
 use crate::port::{Port, PortError};
 use crate::session::Session;
 
-/// Opens a serial port for this program alone.
+/// Function that opens a serial port for this program alone.
 pub type OpenLine<'a> = dyn FnMut(&str) -> Result<Box<dyn Port>, PortError> + 'a;
 
-/// Lines that are asked. As long as they are open no other program, and no agent, gets at the controller through them.
+/// Lines over which controllers are asked. While they are open, no other program and no agent can reach the controller through
+/// them.
 pub struct Lines(Vec<Line>);
 
 struct Line {
@@ -24,12 +25,12 @@ struct Line {
 }
 
 impl Lines {
-    /// Opens the serial ports of the drive's own USB device, and the one that is named.
+    /// Opens the serial ports of the drive's own USB device, and the named port.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NotAsked`] when a port of the drive's own device cannot be opened, or the named one is in use;
-    /// [`FirmwareError::Port`] when the named one cannot be opened for another reason.
+    /// [`FirmwareError::NotAsked`] if a port of the drive's own device cannot be opened, or the named port is in use;
+    /// [`FirmwareError::Port`] if the named port cannot be opened for another reason.
     pub fn open(
         places: &Places,
         drive: &Drive,
@@ -53,11 +54,11 @@ impl Lines {
         Ok(Self(lines))
     }
 
-    /// What is reported on each of them now.
+    /// Returns the present report on each line.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NotAsked`] when a port has gone.
+    /// [`FirmwareError::NotAsked`] if a port is lost.
     pub fn look(&mut self) -> Result<Before, FirmwareError> {
         let ask = |line: &mut Line| {
             let answers = look(&mut line.session).map_err(|error| match error {
@@ -69,7 +70,8 @@ impl Lines {
         Ok(Before { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
-    /// The line over which a board proves what it runs: its own, or else the one that was named; and whether it is of the drive's device.
+    /// Returns the line over which the board verifies its program: its own line, or else the named one. The second value is
+    /// `true` if the line belongs to the drive's device.
     pub fn proving(&self) -> Option<(&str, Option<bool>)> {
         self.0.first().map(|line| (line.port.as_str(), line.same_device))
     }
@@ -79,7 +81,7 @@ fn not_asked(port: &str, source: PortError) -> FirmwareError {
     FirmwareError::NotAsked { port: port.to_owned(), source }
 }
 
-/// The node that a name leads to.
+/// Returns the device node to which a name leads.
 fn real(port: &str) -> PathBuf {
     fs::canonicalize(port).unwrap_or_else(|_| port.into())
 }

@@ -1,13 +1,15 @@
-//! Firmware images of the controller's boards: what a file holds, how it gets onto a board by the drive of its ST-LINK, and how the
-//! program that runs there proves that it is that file (J-67).
+//! Firmware images of the controller's boards: content of a file, writing to a board through the drive of its ST-LINK, and
+//! verification that the running program is that file (J-67).
 //!
-//! The debugger on a Nucleo board shows a *drive* on USB. A binary file that is copied there is written to the flash of the
-//! processor from its first byte on, and the processor is reset. The drive is no real memory: it shows two small files about itself, and
-//! `FAIL.TXT` when it could not do it. That it shows none is no proof: where the bytes arrive in another order than it expects, parts of the
-//! flash stay empty and nothing is reported. So what is in flash is asked of the controller itself, over its serial line.
+//! The debugger on a Nucleo board shows a *drive* on USB. The ST-LINK writes a binary file that is copied there to the flash of
+//! the processor, from the first byte of the flash on, and then resets the processor. The drive is not a real memory: it shows
+//! two small files about itself, and `FAIL.TXT` after a failure. A missing `FAIL.TXT` is not a verification: if the bytes arrive
+//! in an unexpected order, parts of the flash stay empty without a report. So the controller itself must report its flash over
+//! its serial line.
 //!
-//! The order of a flash is [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`], [`prove`]. Where a
-//! person is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] come once more, directly before [`put`].
+//! The order of a flash is [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
+//! [`prove`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated
+//! directly before [`put`].
 
 mod before;
 mod catalogue;

@@ -1,27 +1,27 @@
-//! Where the drives of boards are mounted, and which serial ports are on the same USB device.
+//! Mount points of the drives of boards, and serial ports on the same USB device.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Drive, FirmwareError, UsbDevice};
 
-/// Places of the system in which drives and ports are looked for.
+/// Places of the operating system in which drives and ports are searched.
 #[derive(Clone, Debug)]
 pub struct Places {
-    /// The table of mounts, as Linux has it.
+    /// Mount table in the format of Linux.
     pub mounts: PathBuf,
-    /// Links from labels to devices.
+    /// Folder with links from labels to devices.
     pub by_label: PathBuf,
-    /// Folders in which each folder may be a drive.
+    /// Folders whose subfolders may be drives.
     pub folders: Vec<PathBuf>,
-    /// Classes of devices, with links into the tree of devices.
+    /// Folder of the device classes, with links into the device tree.
     pub classes: PathBuf,
-    /// Nodes of devices.
+    /// Folder of the device nodes.
     pub nodes: PathBuf,
 }
 
 impl Places {
-    /// Those of this computer.
+    /// Returns the places of this computer.
     pub fn of_system() -> Self {
         let mut folders: Vec<PathBuf> = vec!["/Volumes".into()];
         if cfg!(windows) {
@@ -36,7 +36,7 @@ impl Places {
         }
     }
 
-    /// The drives of ST-LINKs that are mounted, by path.
+    /// Returns the mounted drives of ST-LINKs, sorted by path.
     pub fn drives(&self) -> Vec<Drive> {
         let mounted = self.mounted().into_iter();
         let mut drives: Vec<Drive> =
@@ -53,11 +53,11 @@ impl Places {
         drives
     }
 
-    /// The drive at a folder that was named, with what the system knows of it.
+    /// Returns the drive at a named folder, with the system's knowledge of the drive.
     ///
     /// # Errors
     ///
-    /// Those of [`Drive::at`].
+    /// Returns the errors of [`Drive::at`].
     pub fn at(&self, path: &Path) -> Result<Drive, FirmwareError> {
         let drive = Drive::at(path)?;
         let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -68,11 +68,11 @@ impl Places {
         })
     }
 
-    /// The drive that was looked at is still there, and no other one in its place.
+    /// Checks that the drive is still present and was not replaced by another one.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Changed`]: nothing was written.
+    /// [`FirmwareError::Changed`]: no byte was written.
     pub fn still_there(&self, drive: &Drive) -> Result<(), FirmwareError> {
         let what = match self.at(&drive.path) {
             Ok(now) if now == *drive => return Ok(()),
@@ -82,11 +82,12 @@ impl Places {
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }
 
-    /// The drive as it is now: at its path, or in another folder when it was plugged out and in meanwhile and its USB device is known.
+    /// Returns the drive in its present state: at its path, or in another folder if the drive was replugged and its USB device is
+    /// known.
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
-        // One that has gone from USB may still be mounted.
+        // A drive that was removed from USB may still be mounted.
         let here = self.at(&drive.path).ok().filter(|found| connector(found) == own);
         here.or_else(|| {
             own.as_ref()?;
@@ -99,7 +100,8 @@ impl Places {
         drive.of_system(device, label, usb)
     }
 
-    /// Devices and where they are mounted, of file systems that such a drive can have. Of several at one place the last one is seen.
+    /// Returns devices and mount points of file systems that such a drive can have. Only the last of
+    /// several mounts at one place is visible.
     fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
         let table = fs::read(&self.mounts).unwrap_or_default();
         let mount = |line: &[u8]| {
@@ -129,8 +131,8 @@ impl Places {
         links.into_iter().find_map(label)
     }
 
-    /// The serial ports that are functions of the drive's USB device, by name: those of its own board. Empty where the system does not
-    /// say it; Linux does.
+    /// Returns the names of the serial ports that belong to the drive's USB device, so to its own board. Empty if the system does
+    /// not know; Linux does.
     pub fn ports_of(&self, drive: &Drive) -> Vec<String> {
         let Some(usb) = &drive.usb else { return Vec::new() };
         let entries = fs::read_dir(self.classes.join("tty")).into_iter().flatten().flatten();
@@ -141,17 +143,18 @@ impl Places {
         ports
     }
 
-    /// A serial port and a drive are functions of one USB device, so of one board. `None` where the system does not say; Linux does.
+    /// Returns `true` if a serial port and a drive belong to one USB device, so to one board. `None` if the system does not know;
+    /// Linux does.
     pub fn same_usb_device(&self, port: &str, drive: &Drive) -> Option<bool> {
         let of_port = self.usb_device("tty", Path::new(port))?;
         Some(of_port.folder == drive.usb.as_ref()?.folder)
     }
 
-    /// The USB device that a node of a device is a function of.
+    /// Returns the USB device to which a device node belongs.
     fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
         let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
         let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
-        // The device itself is what has the number of its maker.
+        // The USB device is the folder with the vendor id.
         while !folder.join("idVendor").exists() {
             folder = folder.parent()?.to_owned();
         }
@@ -160,7 +163,7 @@ impl Places {
     }
 }
 
-/// Bytes of a path as the table of mounts writes it: `\040` is a blank.
+/// Decodes the bytes of a path from the mount table: `\040` is a blank.
 fn unescaped(text: &[u8]) -> Vec<u8> {
     let mut plain = Vec::new();
     let mut rest = text;
@@ -180,14 +183,14 @@ fn unescaped(text: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// A path of these bytes, whatever they are.
+/// Returns a path of these bytes, whether or not they are valid text.
 #[cfg(unix)]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;
     Some(std::ffi::OsString::from_vec(bytes).into())
 }
 
-/// A path of these bytes, where they are a text.
+/// Returns a path of these bytes if they are valid text.
 #[cfg(not(unix))]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     String::from_utf8(bytes).ok().map(Into::into)
@@ -202,7 +205,7 @@ mod tests {
     use super::super::Fit;
     use super::*;
 
-    /// Two boards at USB, with drive and serial port each, and the places of a system that has them.
+    /// Two boards on USB, each with a drive and a serial port, and the places of a system with them.
     struct Desk {
         folder: tempfile::TempDir,
         places: Places,
@@ -226,7 +229,7 @@ mod tests {
                 fs::write(at(usb).join("idVendor"), "0483\n").unwrap();
                 fs::write(at(usb).join("devnum"), "7\n").unwrap();
             }
-            // A port that is on no USB device.
+            // A port that does not belong to a USB device.
             fs::create_dir_all(at("platform/ttyS0")).unwrap();
             symlink(at("platform/ttyS0"), at("class/tty/ttyS0")).unwrap();
             let places = Places {
@@ -243,7 +246,7 @@ mod tests {
             self.folder.path().join(name)
         }
 
-        /// A drive at a folder of this name.
+        /// Creates a drive at a folder of this name.
         fn mount(&mut self, device: &str, name: &[u8], kind: &str) -> PathBuf {
             let path = self.folder.path().join(OsStr::from_bytes(name));
             fs::create_dir_all(&path).unwrap();
@@ -279,7 +282,7 @@ mod tests {
             found,
             [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
         );
-        // One that is named is the same drive, with the label of its device.
+        // A named drive is the same drive, with the label of its device.
         let named = desk.places.at(&one).unwrap();
         assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
         assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
@@ -297,7 +300,7 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // The second NUCLEO-H743ZI of a desk: its label is that of the first, with a digit from the one who mounted it.
+        // The second NUCLEO-H743ZI at a desk: its folder has the label of the first board with an appended digit.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
@@ -315,7 +318,7 @@ mod tests {
         assert_eq!(same(&port("ttyACM0")), Some(true));
         assert_eq!(same(&port("ttyACM1")), Some(false));
         assert_eq!((same("/dev/ttyS0"), same("/tmp/jtc")), (None, None));
-        // A drive of which nothing is known has none.
+        // An unknown drive has no ports.
         let unknown = Drive::at(&path).unwrap();
         assert_eq!(desk.places.ports_of(&unknown), [""; 0]);
         assert_eq!(desk.places.same_usb_device(&port("ttyACM0"), &unknown), None);
@@ -329,7 +332,7 @@ mod tests {
         let drive = desk.places.at(&path).unwrap();
         let again = |desk: &Desk| desk.places.again(&drive).map(|found| found.path);
         assert_eq!(again(&desk), Some(path));
-        // The device has gone, and whoever mounts drives has not noticed.
+        // The device was removed, but the system still has the drive mounted.
         fs::remove_file(desk.at("class/block/sda")).unwrap();
         assert_eq!(again(&desk), None);
         let elsewhere = desk.mount("dev/sdd", b"one1", "vfat");
@@ -349,15 +352,15 @@ mod tests {
             let error = desk.places.still_there(&drive).unwrap_err();
             assert!(matches!(error, FirmwareError::Changed { .. }), "{error}");
         };
-        // It was unplugged and plugged in again.
+        // The device was unplugged and plugged in again.
         fs::write(desk.at("1-2/devnum"), "8\n").unwrap();
         refused(&desk);
         fs::write(desk.at("1-2/devnum"), "7\n").unwrap();
         desk.places.still_there(&drive).unwrap();
-        // Another board is mounted there.
+        // Another board is mounted at that place.
         desk.mount("dev/sdb", b"one", "vfat");
         refused(&desk);
-        // Nothing is mounted there, and the folder is one of this computer's disk.
+        // No drive is mounted at that place, and the folder is on this computer's disk.
         fs::write(desk.at("mounts"), "").unwrap();
         refused(&desk);
         fs::remove_dir_all(&path).unwrap();

@@ -1,4 +1,5 @@
-//! After an image was copied to a drive: what the drive reports, and what the program that runs now reports of the flash that it runs from.
+//! Verification after an image was copied to a drive: the report of the drive, and the report of the running program about its
+//! flash.
 
 use std::fmt;
 use std::thread::sleep;
@@ -11,44 +12,45 @@ use crate::error::LinkError;
 use crate::port::{Port, PortError};
 use crate::session::{Session, Timeouts};
 
-/// A device has read its flash within this time after its start (J-67).
+/// Time after its start within which a device has read its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// What two clocks may differ by: a share, and what a start may be seen late.
+/// Tolerance between two clocks: a relative difference, and the delay until a start is observed.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
-/// Within this time after the copying another program may run yet: the one of before, which the ST-LINK stops only then.
+/// Time after the copying in which another program may still run: the previous program, which the ST-LINK stops only then.
 const OTHER_STOPS: Duration = Duration::from_secs(10);
-/// Most time that is waited for a controller to read its flash, by the clock of the line.
+/// Longest wait for a controller to read its flash, by the clock of the line.
 const READS_NOW: Duration = Duration::from_secs(5);
 
-/// How long is waited.
+/// Waiting times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// For the controller to start with the image, all in all.
+    /// Total wait for the controller to start with the image.
     pub wait: Duration,
-    /// Between two attempts.
+    /// Pause between two attempts.
     pub pause: Duration,
 }
 
 impl Default for Limits {
-    /// A megabyte takes the ST-LINK half a minute, and a system that mounts drives some seconds more.
+    /// Returns 120 s and 250 ms: the ST-LINK needs half a minute for a megabyte, and a system needs some more seconds to mount a
+    /// drive.
     fn default() -> Self {
         Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
     }
 }
 
-/// Opens the serial port of the board.
+/// Function that opens the serial port of the board.
 pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
 
-/// What became of the drive.
+/// Behaviour of the drive after the copying.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveAfter {
-    /// It vanished and came back, as it does when an image was taken.
+    /// The drive vanished and came back, as after an accepted image.
     CameBack,
-    /// It vanished, and has not come back; where nobody mounts drives it does not.
+    /// The drive vanished and has not come back, as on a system that does not mount drives automatically.
     Gone,
-    /// It was there all the time.
+    /// The drive was present all the time.
     Stayed,
 }
 
@@ -62,27 +64,27 @@ impl fmt::Display for DriveAfter {
     }
 }
 
-/// A controller that has proved that it runs the image.
+/// Controller that has proved that it runs the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
-    /// Who it is.
+    /// Identity of the controller.
     pub info: Info,
-    /// What it read of its flash.
+    /// Report of the controller about its flash.
     pub program: Program,
-    /// What became of the drive.
+    /// Behaviour of the drive.
     pub drive: DriveAfter,
-    /// Time from the copying to the proof.
+    /// Time from the copying to the verification.
     pub took: Duration,
 }
 
 impl Proof {
-    /// The board keeps an arm.
+    /// Returns `true` if the board stores an arm.
     pub fn stored_arm(&self) -> bool {
         self.info.store == StoreState::Stored
     }
 }
 
-/// Looks at a drive again and again.
+/// Observes a drive repeatedly.
 struct Watch<'a> {
     places: &'a Places,
     drive: &'a Drive,
@@ -91,7 +93,7 @@ struct Watch<'a> {
 }
 
 impl Watch<'_> {
-    /// An error when the drive reports one.
+    /// Returns an error if the drive reports one.
     fn look(&mut self) -> Result<(), FirmwareError> {
         let now = self.places.again(self.drive);
         self.seen = match (&now, self.seen) {
@@ -102,7 +104,7 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // A report of before, which it shows until it has vanished, is none of this image.
+        // A previous report, which the drive shows until it vanishes, is not about this image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -113,12 +115,13 @@ impl Watch<'_> {
     }
 }
 
-/// Waits until the drive has come back, or all the time; for boards without a serial line. What it returns is no proof.
+/// Waits until the drive has come back, or until the time limit; for boards without a serial line. The result is not a
+/// verification.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] when the drive has not vanished, or has not come back and the system could not confirm
-/// that all was written.
+/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not vanished, or has not come back and the system
+/// could not confirm that all bytes were written.
 pub fn wait_for_drive(
     places: &Places,
     drive: &Drive,
@@ -136,18 +139,19 @@ pub fn wait_for_drive(
     let (seen, doubt) = (watch.seen, written.doubt.clone());
     match seen {
         DriveAfter::CameBack => Ok(seen),
-        // Where nobody mounts drives it does not come back.
+        // On a system without automatic mounting the drive does not come back.
         DriveAfter::Gone if doubt.is_none() => Ok(seen),
         DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
     }
 }
 
-/// Waits until the controller on the line has started with the image, and proves it.
+/// Waits until the controller on the line has started with the image, and verifies the image.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`] by the drive, [`FirmwareError::OtherProgram`] when something else runs, [`FirmwareError::NotReported`] when
-/// the program does not report its flash, [`FirmwareError::NotStarted`] when none started in time.
+/// [`FirmwareError::Refused`] by the drive, [`FirmwareError::OtherProgram`] if another program runs,
+/// [`FirmwareError::NotReported`] if the program does not report its flash, [`FirmwareError::NotStarted`] if no program started
+/// in time.
 pub fn prove(
     places: &Places,
     image: &Image,
@@ -166,7 +170,7 @@ pub fn prove(
             Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
             Ok(Some(info)) => match compare(image, &info) {
                 Ok(program) => {
-                    // The drive may have come back meanwhile, with a report.
+                    // The drive may have come back in the meantime, with a report.
                     watch.look()?;
                     return Ok(Proof { info, program, drive: watch.seen, took: written.began.elapsed() });
                 }
@@ -184,7 +188,8 @@ pub fn prove(
     }
 }
 
-/// What runs now is what stays. Before the ST-LINK begins to write, and when it only has reset the processor, the program of before starts anew.
+/// Returns `true` if the running program is final. Before the ST-LINK begins to write, and after a reset alone, the previous
+/// program restarts.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -192,22 +197,23 @@ fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
         || written.began.elapsed() >= limits.wait
 }
 
-/// The device has started within this time.
+/// Returns `true` if the device has started within this time.
 fn started_since(info: &Info, time: Duration) -> bool {
     let (share, late) = CLOCKS_DIFFER;
     Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
 }
 
-/// It has started just now, and may report its flash yet.
+/// Returns `true` if the device has started a moment ago, and may still report its flash.
 fn still_reads(info: &Info) -> bool {
     info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
 }
 
-/// Who the controller is, once it has read its flash, or has not for five seconds; `None` for a device without extensions.
+/// Returns the identity of the controller after it has read its flash, or after five seconds; `None` for a device without
+/// extensions.
 ///
 /// # Errors
 ///
-/// Those of [`Session::info`].
+/// Returns the errors of [`Session::info`].
 pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Info>, LinkError> {
     let end = session.now() + READS_NOW;
     loop {
@@ -218,16 +224,16 @@ pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Inf
     }
 }
 
-/// Who is there; impatiently, for it is asked again.
+/// Returns the identity of the controller, with short timeouts because the caller repeats the request.
 fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
     let mut session = Session::new(port);
     session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
-    // A request while the ST-LINK holds the processor would be waited for in vain.
+    // While the ST-LINK holds the processor, a request would only time out.
     session.next_status()?;
     session.info()
 }
 
-/// The program that the controller reports is the image (J-67).
+/// Checks that the program that the controller reports is the image (J-67).
 ///
 /// # Errors
 ///
@@ -252,7 +258,7 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // It ran for a moment when the copying began, and its clock is slow by a twentieth.
+        // The device had just started when the copying began, and its clock is 5 % slow.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

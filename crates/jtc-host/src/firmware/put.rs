@@ -8,34 +8,34 @@ use std::time::Instant;
 use super::drive::volume;
 use super::{Drive, FirmwareError, Image};
 
-/// Name of the file on the drive. It does not last: the ST-LINK takes its bytes as they come.
+/// Name of the file on the drive. The file does not last, because the ST-LINK consumes its bytes as they arrive.
 const FILE: &str = "openjtc.bin";
-/// So many bytes are handed to the system at once, to show how far it is. In which order they get to the drive is the system's affair:
-/// waiting for each piece would write the length of a part of the file into its directory, which the ST-LINK may take for the whole. What
-/// comes of another order is found by what the program reads of its flash.
+/// Number of bytes per write, so that the progress can be shown. The system decides in which order the bytes reach the drive. A
+/// flush after each piece would write the length of a partial file into the directory, and the ST-LINK may take that part for the
+/// whole file. The flash report of the program reveals damage from another order.
 const PIECE: usize = 32 * 1024;
 
-/// An image that is on its way into the flash.
+/// Image that was handed over to the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// When the copying began: a controller that started before runs what was there.
+    /// Time when the copying began; a controller that started before runs the previous program.
     pub began: Instant,
-    /// When this computer had handed over all bytes.
+    /// Time when this computer had handed over all bytes.
     pub ended: Instant,
-    /// `FAIL.TXT` as it was before.
+    /// Content of `FAIL.TXT` before the copying.
     pub failure_before: Option<String>,
-    /// Why the system could not confirm that all was written. The drive vanishes when it has all bytes, and some systems report that as an
-    /// error; what is in the flash shows what it was.
+    /// Reason why the system could not confirm that all bytes were written. The drive vanishes after the last byte, and some
+    /// systems report that as an error; the content of the flash shows the truth.
     pub doubt: Option<String>,
 }
 
-/// Copies the image to the drive; `progress` gets the bytes so far. Nothing is written where the drive has gone meanwhile, and its folder is
-/// one of this computer's own disk.
+/// Copies the image to the drive; `progress` receives the number of bytes so far. If the drive was removed in the meantime and
+/// its folder is on this computer's own disk, no byte is written.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`]: nothing was written. [`FirmwareError::DriveFull`] and
-/// [`FirmwareError::NotWritten`]: the board has the program of before, or a part of one.
+/// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`]: no byte was written. [`FirmwareError::DriveFull`] and
+/// [`FirmwareError::NotWritten`]: the board has the previous program, or a part of one.
 pub fn put(drive: &Drive, image: &Image, progress: &mut dyn FnMut(usize)) -> Result<Written, FirmwareError> {
     let failure_before = drive.failure();
     let path = drive.path.join(FILE);
@@ -67,7 +67,7 @@ pub fn put(drive: &Drive, image: &Image, progress: &mut dyn FnMut(usize)) -> Res
     Ok(Written { began, ended: Instant::now(), failure_before, doubt })
 }
 
-/// The new file on the drive, and on nothing else.
+/// Opens the new file on the drive, and never on another file system.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let gone = || FirmwareError::Changed { what: format!("{}: the drive has gone", drive.path.display()) };
     let is_drive = |found: &fs::Metadata| drive.volume.is_none() || volume(found) == drive.volume;
@@ -77,12 +77,12 @@ fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let not_opened =
         |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
-    // It may have gone in between. From here on the open file keeps its file system.
+    // The drive may have been removed in between. From here on the open file keeps its file system.
     if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
         return Ok(file);
     }
     drop(file);
-    // Empty, and on a disk of this computer.
+    // The file is empty, and on a disk of this computer.
     let _ = fs::remove_file(path);
     Err(gone())
 }

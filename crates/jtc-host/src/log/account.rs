@@ -1,4 +1,4 @@
-//! A log that was run again, with what it says and the recording that is made of it.
+//! A replayed log with its timeline and the recording made from it.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -8,24 +8,24 @@ use crate::arm::Arm;
 use crate::recording::{Ending, RecordingError, RecordingInfo, write_with_log};
 use crate::report::RunFailure;
 
-/// A log, and what it says.
+/// A log with its replay, timeline and recording information.
 #[derive(Debug)]
 pub struct Account {
     /// The log.
     pub log: FlightLog,
-    /// Every tick of it.
+    /// All ticks of the log, replayed.
     pub replayed: Replayed,
-    /// What happened.
+    /// Events of the log in order.
     pub story: Story,
-    /// What the recording is of.
+    /// Header of the recording.
     pub info: RecordingInfo,
-    /// What broke first, where something did.
+    /// First error with its consequences; `None` if the log contains no error.
     pub failure: Option<RunFailure>,
 }
 
 impl Account {
-    /// Runs a log again. `other` is the arm that it is of, with its image, where that is not the one that came with it; `source` is where
-    /// it was read.
+    /// Replays a log. `other` is the arm of the log, with its image, if this arm differs from the one stored with the
+    /// log. `source` is the location that the log was read from.
     pub fn of(log: FlightLog, other: Option<(Arm, Vec<u8>)>, source: &str) -> Self {
         let (arm, image) = other.unzip();
         let replayed = log.replay(image.as_deref());
@@ -45,11 +45,11 @@ impl Account {
         Self { log, replayed, story, info, failure }
     }
 
-    /// Writes the recording, with the log in it, as MCAP; `path` is what errors call it.
+    /// Writes the recording, including the log, as MCAP; error messages use `path` as its name.
     ///
     /// # Errors
     ///
-    /// Those of [`write_with_log`].
+    /// Returns the errors of [`write_with_log`].
     pub fn write(&self, file: impl Write + Seek + Send, path: &Path) -> Result<(), RecordingError> {
         write_with_log(file, path, &self.info, &self.replayed.samples(), &self.log.to_bytes())
     }

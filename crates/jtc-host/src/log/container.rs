@@ -1,4 +1,4 @@
-//! A log as bytes: what a recording carries of it, so that it can be replayed from the file.
+//! A log as bytes. A recording carries these bytes, so that the log can be replayed from the file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,10 +8,10 @@ use jtc_wire::{LogState, POINT_LEN, RawPoint};
 use super::{FlightLog, blocks_of};
 use crate::recording::{self, RecordingError};
 
-/// First bytes, with the version.
+/// Magic bytes at the start, including the version.
 const MAGIC: &[u8; 8] = b"JTCLOG\0\x01";
 
-/// What the parts are.
+/// Kinds of the parts.
 mod part {
     pub const STATE: u8 = 1;
     pub const BLOCKS: u8 = 2;
@@ -22,13 +22,13 @@ mod part {
     pub const DEVICE: u8 = 7;
 }
 
-/// Why a file gives no log.
+/// Reason why a file yields no log.
 #[derive(Debug, thiserror::Error)]
 pub enum LogFileError {
-    /// It cannot be read, or is no recording.
+    /// The file cannot be read or is not a recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// It is a recording of something else.
+    /// The recording contains no log.
     #[error("{}: it holds no log of a flight recorder", path.display())]
     NoLog {
         /// The file.
@@ -50,7 +50,7 @@ impl Diagnose for LogFileError {
 }
 
 impl FlightLog {
-    /// As bytes.
+    /// Encodes the log as bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         let mut put = |kind: u8, data: &[u8]| {
@@ -70,18 +70,18 @@ impl FlightLog {
         bytes
     }
 
-    /// From a file that `jtc log fetch` wrote.
+    /// Reads the log from a file that `jtc log fetch` wrote.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, or that holds no log.
+    /// Returns an error if the file cannot be read or contains no log.
     pub fn load(path: &Path) -> Result<Self, LogFileError> {
         let bytes = recording::read_log(path)?;
         let log = bytes.as_deref().and_then(Self::from_bytes);
         log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
     }
 
-    /// From bytes; what a later version adds is passed over. `None` when they are no log.
+    /// Decodes a log; skips parts that a later version added. Returns `None` if the bytes are not a valid log.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut rest = bytes.strip_prefix(MAGIC)?;
         let mut log = Self::default();

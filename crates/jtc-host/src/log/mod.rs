@@ -1,8 +1,9 @@
-//! The flight recorder's log: fetched from a device, kept in a file, and run through the controller again (J-56).
+//! The flight recorder's log: fetched from a device, stored in a file, and replayed through the controller (J-56).
 //!
-//! [`FlightLog`] is what a device returns: the blocks of its log, the arm that it has in use, and the points of the trajectory that the log
-//! needs. [`FlightLog::replay`] gives every tick of it with everything that the controller computed, and says which of them are known to be
-//! what was, bit for bit. [`Story`] puts what happened in order, what broke first in front.
+//! [`FlightLog`] is the answer of a device: the blocks of its log, the active arm, and the trajectory points that the
+//! log needs. [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the
+//! ticks that are known to match the original bit for bit. [`Story`] lists the events in order, with the first error at
+//! the top.
 
 mod account;
 mod container;
@@ -17,41 +18,41 @@ pub use story::{Event, Story};
 use jtc_core::recorder::{BLOCK_WORDS, Block, Log, Record};
 use jtc_wire::{LogState, RawPoint};
 
-/// Ticks that follow a snapshot at most until the next.
+/// Maximum distance from a snapshot to the next, in ticks.
 const SPAN_MS: f64 = 1_100.0;
 
-/// What a device returned of its flight recorder.
+/// Flight recorder data that a device returned.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FlightLog {
-    /// Why the log ends.
+    /// Reason why the log ends.
     pub state: LogState,
     /// Blocks, oldest first.
     pub blocks: Vec<Block>,
-    /// The arm in use when it was fetched: a [`jtc_wire::ArmImage`].
+    /// Active arm at the time of the fetch: a [`jtc_wire::ArmImage`].
     pub arm: Vec<u8>,
-    /// Number of the first of these points in the trajectory.
+    /// Index in the trajectory of the first of these points.
     pub first_point: usize,
-    /// Points of the trajectory, as many as the log needs.
+    /// Points of the trajectory that the log needs.
     pub points: Vec<RawPoint>,
     /// Hash of all points in the memory of the device.
     pub points_hash: u32,
-    /// Device and firmware, in words.
+    /// Device and firmware as text.
     pub device: String,
 }
 
 impl FlightLog {
-    /// The blocks as a log.
+    /// Returns the blocks as a log.
     pub fn log(&self) -> Log<'_> {
         Log::new(&self.blocks)
     }
 
-    /// Nothing is in it.
+    /// Returns `true` if the log contains no record.
     pub fn is_empty(&self) -> bool {
         self.log().next().is_none()
     }
 
-    /// The points that the ticks of the log need of the trajectory in the device's memory, which has this hash: first and how many; none
-    /// where no motion along it was recorded.
+    /// Returns the points of the trajectory in the device's memory (with this hash) that the log needs: index of the
+    /// first, and number. Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
         let mut need = |from: f64, to: f64| {
@@ -82,13 +83,13 @@ impl FlightLog {
         }
         let (low, high) = needed?;
         let first = (low.max(0.0) as usize).saturating_sub(1).min(total);
-        // The last point stands for all behind it.
+        // Times after the end use the last point.
         let end = ((high as usize).saturating_add(3)).min(total);
         (end > first).then_some((first, end - first))
     }
 }
 
-/// Blocks from their bytes, as pages bring them; a rest that is no whole block is left out.
+/// Splits bytes of log pages into blocks; drops an incomplete block at the end.
 pub(crate) fn blocks_of(bytes: &[u8]) -> Vec<Block> {
     let words = bytes.as_chunks::<4>().0;
     words.as_chunks::<BLOCK_WORDS>().0.iter().map(|block| block.map(u32::from_le_bytes)).collect()

@@ -1,4 +1,4 @@
-//! A log run through the controller again.
+//! Replay of a log through the controller.
 
 use jtc_bus::{Answer, Scale};
 use jtc_core::recorder::{Outcome, Record, RecordedInputs, Replay, Step, Unsure};
@@ -9,17 +9,17 @@ use serde::Serialize;
 use super::FlightLog;
 use crate::sample::{JointSample, Sample};
 
-/// What a tick of a replay is worth.
+/// Reliability of a replayed tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Worth {
-    /// What was, bit for bit.
+    /// Identical to the original, bit for bit.
     Same,
-    /// The controller did something else then.
+    /// The original controller computed different outputs.
     Differs,
-    /// Computed without something that went in: up to the next snapshot it may differ. What was measured is what was measured.
+    /// Computed with an input missing: the values may differ from the original until the next snapshot. Measured values are correct.
     Unsure,
-    /// Not computed, for want of the arm or the trajectory of that time: what was measured, and nothing else.
+    /// Not computed, because the arm or the trajectory of that time is missing: only the measured values are present.
     Measured,
 }
 
@@ -30,63 +30,63 @@ pub struct Tick {
     pub tick: u64,
     /// Starts of the device.
     pub boots: u32,
-    /// The values; time is that of `tick`.
+    /// Values; their time is that of `tick`.
     pub sample: Sample,
-    /// What a status would have reported, with the errors of the drives; as far as it was computed.
+    /// Status that the controller would have reported, with the errors of the drives, as far as computed.
     pub status: Status,
-    /// What went in; none for the state at a snapshot.
+    /// Inputs of the tick; `None` for the state at a snapshot.
     pub inputs: Option<RecordedInputs>,
-    /// What it is worth.
+    /// Reliability of the tick.
     pub worth: Worth,
 }
 
-/// Ticks that are not in a log.
+/// Ticks that are missing in a log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Gap {
-    /// The tick before it.
+    /// Last tick before the gap.
     pub after: u64,
-    /// The tick behind it.
+    /// First tick after the gap.
     pub before: u64,
 }
 
-/// The first tick that differs.
+/// First tick that differs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Ticks since the start of the device.
     pub tick: u64,
     /// State of the controller in the replay.
     pub state: &'static str,
-    /// What the replay computes, and the log does not have.
+    /// Outputs of the replay that the log does not contain.
     pub replayed: String,
 }
 
-/// A log that was replayed.
+/// A replayed log.
 #[derive(Clone, Debug, Default)]
 pub struct Replayed {
-    /// In order.
+    /// Ticks in order.
     pub ticks: Vec<Tick>,
-    /// Of a controller with the arm of the log.
+    /// Configuration of a controller with the arm of the log.
     pub config: Option<Box<Config>>,
-    /// Ticks that are known to be what was.
+    /// Number of ticks that are known to match the original.
     pub same: usize,
-    /// The first that is not.
+    /// First tick that differs from the original.
     pub difference: Option<Difference>,
-    /// Ticks that were computed without something that went in.
+    /// Number of ticks that were computed with an input missing.
     pub unsure: usize,
-    /// Ticks of another arm than the one at hand.
+    /// Number of ticks recorded with an arm other than the available one.
     pub other_arm: usize,
-    /// Ticks along a trajectory that is not at hand.
+    /// Number of ticks along a trajectory that is not available.
     pub other_points: usize,
-    /// Where ticks are missing.
+    /// Gaps in the log.
     pub gaps: Vec<Gap>,
-    /// Hashes of arms in the log that are not the one at hand.
+    /// Hashes of arms in the log other than the available one.
     pub arms: Vec<u64>,
-    /// The log holds a state that no controller reaches: the replay ends there.
+    /// `true` if the log contains a state that no controller reaches; the replay ends there.
     pub broken: bool,
 }
 
 impl FlightLog {
-    /// A controller with the arm of the log, and the points that came with it.
+    /// Builds a controller with the arm of the log and the points stored with it.
     fn controller(&self, arm: &[u8]) -> Controller<Vec<RawPoint>> {
         let mut controller = Controller::new(Config::avena(), vec![RawPoint::default(); POINTS_MAX]);
         controller.load_arm(arm);
@@ -94,7 +94,7 @@ impl FlightLog {
         controller
     }
 
-    /// Runs the log through the controller; `arm`: the image of another arm than the one that came with the log.
+    /// Replays the log through the controller; `arm` is the image of an arm that replaces the one stored with the log.
     pub fn replay(&self, arm: Option<&[u8]>) -> Replayed {
         let controller = self.controller(arm.unwrap_or(&self.arm));
         let points = (!self.points.is_empty()).then_some(self.points_hash);
@@ -102,7 +102,7 @@ impl FlightLog {
             Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
         let mut replay = Replay::new(self.log(), controller, points);
         let own = replay.arm();
-        // A file that was made up may hold a state that no controller reaches: its replay ends there.
+        // A forged file may contain a state that no controller reaches: its replay ends there.
         let all = std::panic::AssertUnwindSafe(|| {
             while let Some(step) = replay.next() {
                 let tick = tick(&step, &replay);
@@ -144,7 +144,7 @@ impl Replayed {
         self.ticks.push(tick);
     }
 
-    /// Its samples.
+    /// Returns the samples of the ticks.
     pub fn samples(&self) -> Vec<Sample> {
         self.ticks.iter().map(|tick| tick.sample).collect()
     }
@@ -176,7 +176,7 @@ fn tick(step: &Step, replay: &Replay<'_, Vec<RawPoint>>) -> Tick {
     Tick { tick: step.telemetry.tick, boots: step.boots, sample, status, inputs: step.inputs, worth }
 }
 
-/// What the answers of the drives say by themselves.
+/// Returns the values that the drives' answers contain.
 fn measured(sample: &Sample, inputs: Option<&RecordedInputs>, config: &Config) -> Sample {
     let mut joints = [JointSample::UNKNOWN; JOINTS];
     let scale = Scale { velocity: config.velocity_full_scale };

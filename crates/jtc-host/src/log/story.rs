@@ -1,4 +1,4 @@
-//! What happened in a log, in order, what broke first in front.
+//! Timeline of a log: the events in order, with the first error at the top.
 
 use std::fmt::Write;
 
@@ -13,32 +13,32 @@ use crate::report::RunFailure;
 use crate::sample::{JointSample, Sample};
 use crate::words;
 
-/// Something that happened.
+/// An event in a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Event {
     /// Ticks since the start of the device.
     pub tick: u64,
-    /// The same, s.
+    /// Time of `tick`, s.
     pub time_s: f64,
-    /// What.
+    /// Description.
     pub text: String,
-    /// An error begins here.
+    /// `true` if an error begins here.
     pub error: bool,
-    /// Of these joints.
+    /// Joints concerned.
     pub joints: Vec<Joint>,
 }
 
-/// What happened.
+/// Timeline of a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Story {
-    /// In order.
+    /// Events in order.
     pub events: Vec<Event>,
-    /// What broke first: one of the events; none in a log without an error.
+    /// Index of the first error in the events; `None` in a log without an error.
     pub first: Option<usize>,
 }
 
 impl Story {
-    /// Of a log that was replayed.
+    /// Builds the timeline of a replayed log.
     pub fn of(log: &Replayed) -> Self {
         let mut events = Vec::new();
         let mut narrator =
@@ -59,7 +59,7 @@ impl Story {
         Self { events, first }
     }
 
-    /// The first error and what came with it, for a report.
+    /// Returns the first error and the errors of the same tick, for a report.
     pub fn failure(&self, info: &RecordingInfo, samples: &[Sample]) -> Option<RunFailure> {
         let first = self.events.get(self.first?)?;
         let with = self.events.iter().filter(|event| event.error && event.tick == first.tick);
@@ -67,7 +67,7 @@ impl Story {
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
 
-    /// The first error and what followed, each with its time after it; then what had come before.
+    /// Returns the first error and the events after it, each with its delay; then the events before it.
     pub fn lines(&self) -> Vec<String> {
         let Some(first) = self.first else {
             return self
@@ -81,7 +81,7 @@ impl Story {
         for event in &self.events[first + 1..] {
             lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
         }
-        // The nearest first, and no more than a person reads.
+        // Nearest event first, limited to a readable number.
         let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
@@ -94,7 +94,7 @@ impl Story {
     }
 }
 
-/// What came before an error is listed as far back as this, and no more than so many.
+/// Time window before an error, ms, and maximum number of events listed from it.
 const BEFORE_MS: u64 = 3_000;
 const BEFORE: usize = 20;
 
@@ -106,7 +106,7 @@ fn after(ms: u64) -> String {
     if ms == 0 { "in the same tick".to_owned() } else { format!("{} later", span(ms)) }
 }
 
-/// Joints by name.
+/// Formats joint names.
 fn names(joints: &[Joint]) -> String {
     match joints {
         [joint] => joint.to_string(),
@@ -118,9 +118,9 @@ fn names(joints: &[Joint]) -> String {
     }
 }
 
-/// Frames of one kind that follow each other within this time are one event, ms.
+/// Time within which consecutive frames of the same type are one event, ms.
 const SAME_MS: u64 = 50;
-/// Ticks without an answer of a joint before it is worth a word.
+/// Ticks without an answer of a joint until the silence becomes an event.
 const SILENT: u32 = 3;
 
 struct Narrator<'a> {
@@ -128,7 +128,7 @@ struct Narrator<'a> {
     events: &'a mut Vec<Event>,
     /// Ticks for which each joint has not answered.
     silent: [u32; 6],
-    /// The last frame of a host, and when it was.
+    /// Last frame of a host and its tick.
     sent: Option<(FrameType, u64)>,
 }
 
@@ -138,7 +138,7 @@ impl Narrator<'_> {
         self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
     }
 
-    /// Something of a joint; what is the same for several joints in a tick is one event.
+    /// Adds an event of a joint; identical events of several joints in a tick are merged.
     fn push_joint(&mut self, tick: &Tick, error: bool, joint: Joint, text: impl Into<String>) {
         let text = text.into();
         let same =
@@ -154,7 +154,8 @@ impl Narrator<'_> {
         }
     }
 
-    /// A frame of a host. A long one is executed over some ticks, and one often follows another of its kind.
+    /// Adds an event for a frame of a host. The execution of a long frame takes several ticks, and frames of the same
+    /// type often follow each other.
     fn host_sends(&mut self, tick: &Tick, kind: FrameType) {
         let before = self.sent.replace((kind, tick.tick));
         let goes_on = before.is_some_and(|(last, at)| last == kind && tick.tick - at <= SAME_MS);
@@ -191,7 +192,7 @@ impl Narrator<'_> {
         }
     }
 
-    /// What went in.
+    /// Adds events for the inputs of a tick.
     fn inputs(&mut self, tick: &Tick) {
         let Some(inputs) = &tick.inputs else { return };
         let mut answered = [false; 6];
@@ -226,7 +227,7 @@ impl Narrator<'_> {
                     self.push(tick, false, format!("a bad frame of a host: {}", words::frame_status(status)));
                 }
                 (RecordedKind::Noise(_), _) | (_, None) => {}
-                // Requests that change nothing are no event.
+                // Requests that change nothing are not events.
                 (_, Some(kind)) if kind.is_extension() && kind < FrameType::SetSettings => {}
                 (_, Some(FrameType::GetArm | FrameType::GetLog | FrameType::GetPoints)) => {}
                 (_, Some(kind)) => self.host_sends(tick, kind),
@@ -234,7 +235,7 @@ impl Narrator<'_> {
         }
     }
 
-    /// Errors that begin.
+    /// Adds events for errors that begin in this tick.
     fn errors(&mut self, last: &Tick, tick: &Tick) {
         for joint in Joint::ALL {
             let bits =
@@ -273,7 +274,7 @@ impl Narrator<'_> {
                 self.push_joint(tick, false, joint, "safety line active");
             }
         }
-        // What no joint, bus or input explains.
+        // Errors without an explanation from a joint, the bus or an input.
         let begins = tick.sample.errors & !last.sample.errors;
         if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
             self.push(tick, true, words::errors(begins).join(", "));
@@ -308,11 +309,11 @@ impl Narrator<'_> {
         }
     }
 
-    /// An error that the controller found in a joint, with its value and limit.
+    /// Describes an error that the controller detected in a joint, with its value and limit.
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = words::joint_errors(bit).first().copied().unwrap_or("an error without a name");
         let j = joint.index();
-        // The tick of the error takes its torque away, and with it what was commanded.
+        // In the tick of the error the controller removes the torque, and with it the commanded value.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
             if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
@@ -346,7 +347,7 @@ impl Narrator<'_> {
     }
 }
 
-/// The torque that the control law wanted, which the limit has cut.
+/// Returns the torque of the control law before the limit.
 fn computed(s: &JointSample) -> f64 {
     s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
 }

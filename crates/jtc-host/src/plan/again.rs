@@ -1,4 +1,4 @@
-//! The way of a trajectory, planned anew within the limits of an arm.
+//! Replanning: a new motion along the path of a trajectory, within the limits of an arm.
 
 use jtc_plan::Waypoint;
 
@@ -7,22 +7,22 @@ use crate::plan::PlanError;
 use crate::trajectory::Trajectory;
 use crate::waypoints::thinned;
 
-/// Places this near to the legs between others are left out, rad: encoders and hands tremble less.
+/// Maximum distance of a dropped point from the leg between its neighbours, rad: noise of encoders and hands is smaller.
 const THINNED: f64 = 0.005;
-/// How far corners between legs are rounded, rad.
+/// Rounding of the corners between legs, rad.
 const BLEND: f64 = 0.02;
 
 impl Planner<'_> {
-    /// How far [`Planner::anew`] may leave the way, rad of the joint that is furthest.
+    /// Maximum deviation of [`Planner::anew`] from the path, rad, of the joint with the largest deviation.
     pub const ASIDE: f64 = THINNED + BLEND;
 
-    /// A motion along the way of a trajectory, whatever its times are: within the limits and at rest at both ends, at most
-    /// [`Planner::ASIDE`] beside it, and no faster than it was. For ways that were measured, whose spline shows the noise of the
-    /// encoders and whose ends may be cut off in motion.
+    /// Plans a motion along the path of a trajectory, independent of its times: within the limits, at rest at both
+    /// ends, with at most [`Planner::ASIDE`] of deviation, and not faster than the original. Meant for measured paths,
+    /// whose spline contains encoder noise and whose ends may lie in motion.
     ///
     /// # Errors
     ///
-    /// As [`Planner::through`]; its waypoints are those points of the trajectory that remain.
+    /// As [`Planner::through`]; the waypoint numbers refer to the points that remain after thinning.
     pub fn anew(&self, way: &Trajectory) -> Result<Planned, PlanError> {
         let positions: Vec<_> = way.points.iter().map(|point| point.position).collect();
         let place = |i: usize| positions.get(i).map(|q| Waypoint { position: *q, time: None });
@@ -32,7 +32,7 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // No limit binds a motion that is as slow as it was.
+            // No limit binds a motion at its original speed.
             planned.binding.clear();
         }
         Ok(planned)
@@ -48,7 +48,7 @@ mod tests {
     use crate::check::Checker;
     use crate::trajectory::fit::Samples;
 
-    /// A motion at twice the limit of velocity, cut off in the middle, and one that is slow: both are run along their ways.
+    /// Replans a motion at twice the velocity limit, interrupted in the middle, and a slow motion, each along its path.
     #[test]
     fn a_way_that_is_too_fast_is_gone_within_the_limits() {
         let arm = Arm::avena();
@@ -58,7 +58,7 @@ mod tests {
         for (seconds, too_fast) in [(0.6, true), (9.0, false)] {
             let shape = |u: f64| {
                 let q = 0.7 * (1.0 - (2.5 * u).cos());
-                // With a trembling of the encoders.
+                // Adds encoder noise.
                 let noise = 2e-4 * (u * 1e4).sin();
                 [q + noise, 0.3 * q, -0.5 * q - noise, 0.2 * q, 0.4 * q, noise]
             };

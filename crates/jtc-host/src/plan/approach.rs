@@ -1,4 +1,4 @@
-//! The way from where the arm stands to the first point of a trajectory.
+//! The path from the arm's position to the first point of a trajectory.
 
 use jtc_core::JOINTS;
 
@@ -8,26 +8,26 @@ use crate::check::{CheckOptions, CheckedTrajectory};
 use crate::error::CheckError;
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Fastest, % of what the limits allow: nobody has looked at this path for obstacles.
+/// Maximum speed, % of the limits: no user has checked this path for obstacles.
 const FASTEST_PCT: f64 = 50.0;
 
-/// Why there is no way to the first point; the trajectory itself may be sound.
+/// Reason why the first point cannot be reached; the trajectory itself may be valid.
 #[derive(Debug, thiserror::Error)]
 pub enum ApproachError {
-    /// No motion leads there.
+    /// No motion leads to the first point.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The motion that leads there does not pass the check.
+    /// The motion to the first point does not pass the check.
     #[error(transparent)]
     Check(#[from] CheckError),
 }
 
-/// A straight motion in joint space from `here` to the first point of `trajectory`, checked like any other one: at `speed_pct` of what
-/// the limits of `arm` on this controller allow, and at most at half of it.
+/// Plans a straight motion in joint space from `here` to the first point of `trajectory` and checks it like any other
+/// motion. The speed is `speed_pct` of the limits of `arm` on this controller, at most 50 %.
 ///
 /// # Errors
 ///
-/// [`ApproachError`].
+/// Returns an [`ApproachError`] if the motion cannot be planned or does not pass the check.
 pub fn approach(
     trajectory: &Trajectory,
     arm: &Arm,
@@ -44,7 +44,7 @@ pub fn approach(
         ..Planner::new(&config)
     };
     let path = planner.to(here, &first)?.trajectory;
-    // Segments that were asked for are those of the motion.
+    // The requested segments apply to the trajectory, not to this motion.
     let upload = UploadOptions { points_per_segment: None, ..options.upload };
     Ok(CheckedTrajectory::check(&path, arm, here, &CheckOptions { upload, ..options.clone() })?)
 }

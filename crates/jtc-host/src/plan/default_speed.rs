@@ -1,4 +1,4 @@
-//! The speed of a motion for which the user names none.
+//! Speed of a motion if the user names none.
 
 use jtc_wire::{Info, SIMULATOR};
 
@@ -6,7 +6,7 @@ use crate::error::LinkError;
 use crate::port::Port;
 use crate::session::Session;
 
-/// Default where the controller is a simulator, % of the limits.
+/// Default on a simulator, % of the limits.
 const SIMULATED_PCT: f64 = 25.0;
 /// Default on every other controller, % of the limits.
 const DEFAULT_PCT: f64 = 10.0;
@@ -16,20 +16,20 @@ const DEFAULT_PCT: f64 = 10.0;
 pub struct MoveSpeed {
     /// % of the limits.
     pub percent: f64,
-    /// The user named none.
+    /// `true` if the user named no speed.
     pub is_default: bool,
 }
 
 impl MoveSpeed {
-    /// The speed that the user named, or the default one for the controller with this identity: 25 % of the limits for a simulator, and
-    /// 10 % for every other controller, also for one that reports no identity.
+    /// Returns the speed that the user named, else the default for the controller with this identity: 25 % of the
+    /// limits for a simulator, and 10 % for every other controller, including a controller that reports no identity.
     pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
         let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
         let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };
         Self { percent: named.unwrap_or(default), is_default: named.is_none() }
     }
 
-    /// What the user is told of a default speed; `option` (empty: none) sets another one. `None` for a speed that the user named.
+    /// Returns the note on a default speed for the user; `option` (empty: none) sets another one. `None` if the user named a speed.
     pub fn note(&self, option: &str) -> Option<String> {
         let sets = if option.is_empty() { String::new() } else { format!("; {option} sets it") };
         self.is_default.then(|| format!("at {} % of the limits{sets}", self.percent))
@@ -37,11 +37,11 @@ impl MoveSpeed {
 }
 
 impl<P: Port> Session<P> {
-    /// The speed of a move or an approach on this controller: the one that the user named, or the default.
+    /// Returns the speed of a move or an approach on this controller: the value that the user named, or the default.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::info`], when the user named no speed.
+    /// Returns the errors of [`Session::info`] if the user named no speed.
     pub fn move_speed(&mut self, named: Option<f64>) -> Result<MoveSpeed, LinkError> {
         let info = if named.is_none() { self.info()? } else { None };
         Ok(MoveSpeed::of(named, info.as_ref()))
@@ -54,7 +54,7 @@ mod tests {
 
     use super::*;
 
-    /// Ten controllers: those that do not say that they are simulators are taken for real.
+    /// Controllers that do not report to be simulators count as real ones.
     #[test]
     fn the_default_speed_is_low_unless_the_controller_is_known_to_be_a_simulator() {
         let boards = [
@@ -74,7 +74,7 @@ mod tests {
         };
         for (board, percent) in boards {
             assert_eq!(of(board, None), MoveSpeed { percent, is_default: true }, "{board}");
-            // A speed that was named counts everywhere.
+            // A named speed applies to every controller.
             for named in [1.0, 5.0, 60.0, 100.0] {
                 assert_eq!(of(board, Some(named)), MoveSpeed { percent: named, is_default: false });
             }

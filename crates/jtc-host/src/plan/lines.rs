@@ -1,4 +1,4 @@
-//! Motions with the flange on lines and arcs, and how far others leave the line.
+//! Motions with the flange on lines and arcs, and the deviation of other motions from the line.
 
 use jtc_core::{JOINTS, SetPoint, interpolate};
 use jtc_dynamics::ArmModel;
@@ -8,23 +8,23 @@ use jtc_plan::{Limits, on_route};
 use super::{PlanError, Planned, Planner, corners};
 use crate::trajectory::Trajectory;
 
-/// How far the flange may be from its line between two points of a trajectory, m.
+/// Maximum deviation of the flange from its line between two points of a trajectory, m.
 const ASIDE_M: f64 = 1e-4;
-/// Places looked at between two points.
+/// Number of positions checked between two points.
 const PARTS: usize = 4;
 
-/// How far a leg in joint space leaves the straight line between its ends.
+/// Deviation of a leg in joint space from the straight line between its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aside {
-    /// Waypoint that the leg leads to, from 1.
+    /// Waypoint at the end of the leg, counted from 1.
     pub waypoint: usize,
-    /// Distance of the flange from the line where it is furthest, m.
+    /// Largest distance of the flange from the line, m.
     pub distance_m: f64,
 }
 
 impl Planner<'_> {
-    /// Through the waypoints of a route, from rest to rest, straight in joint space or with the flange on lines and arcs. Times that are
-    /// given are kept.
+    /// Plans a motion through the waypoints of a route, from rest to rest, straight in joint space or with the flange
+    /// on lines and arcs. Keeps given times.
     ///
     /// # Errors
     ///
@@ -33,11 +33,11 @@ impl Planner<'_> {
         self.along_route(route, times, None)
     }
 
-    /// From where the arm is at rest (rad) to `target`, straight in joint space or with the flange on a straight line.
+    /// Plans a motion from rest at `from` (rad) to `target`, straight in joint space or with the flange on a straight line.
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`]; [`PlanError::Plan`] for a pose that the arm does not reach, or a line that cannot be.
+    /// As [`Planner::to`]; [`PlanError::Plan`] if the arm does not reach the pose or cannot follow the line.
     pub fn to_target(
         &self,
         model: &ArmModel,
@@ -84,8 +84,8 @@ impl Planner<'_> {
     }
 }
 
-/// How far the flange is from its way, where the controller computes it between two points (J-32), m. Where it is ahead or behind on its way does
-/// not count.
+/// Returns the largest deviation of the flange from its path between two points, as the controller interpolates (J-32),
+/// m. A shift along the path does not count.
 fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -> [f64; JOINTS]) -> f64 {
     const MOMENT: f64 = 1e-4;
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
@@ -105,7 +105,7 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     most
 }
 
-/// Of the legs in joint space to the waypoints with these indices the one on which the flange leaves the straight line by most.
+/// Returns the leg with the largest deviation of the flange from the straight line, of the joint-space legs to the waypoints `legs`.
 pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
     let times = &planned.waypoint_times;
@@ -127,7 +127,7 @@ fn sub(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| a[i] - b[i])
 }
 
-/// Distance of `p` from the line through `a` along `direction`; from `a` where there is none.
+/// Returns the distance of `p` from the line through `a` along `direction`, or from `a` if `direction` is zero.
 fn from_line(p: &[f64; 3], a: &[f64; 3], direction: &[f64; 3]) -> f64 {
     let (off, squared) = (sub(p, a), direction.iter().map(|d| d * d).sum::<f64>());
     let along: f64 = off.iter().zip(direction).map(|(o, d)| o * d).sum();

@@ -1,9 +1,9 @@
-//! The torque margin of a plan: what it leaves of each torque limit for what the model does not know.
+//! Torque margin of a plan: the part of each torque limit that remains for effects that the model does not contain.
 //!
-//! A plan keeps the torque of the model, friction included, below (100 % − margin) of each limit. The smallest bearing temperature of
-//! the plan and the usual one both count. Where gravity and the friction of the first movement alone leave less of a limit, the motion
-//! may use a quarter of what they leave, and 2 % of the limit at least ([`ArmDynamics::usable_torque`]): a pose that can be held can be reached and left.
-//! [`Verdict::margin`](crate::check::Verdict::margin) reports what a motion leaves.
+//! A plan keeps the model torque, friction included, below (100 % − margin) of each limit, at the smallest bearing temperature of the
+//! plan and at the usual one. If gravity and breakaway friction alone leave less of a limit, the motion may use a quarter of the remaining
+//! torque, and at least 2 % of the limit ([`ArmDynamics::usable_torque`]): a pose that can be held can be reached and left.
+//! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
 
 use jtc_core::JOINTS;
 use jtc_plan::{ArmDynamics, Limits, State};
@@ -17,16 +17,16 @@ use crate::trajectory::Trajectory;
 pub const MARGIN_PCT: f64 = 15.0;
 /// Largest torque margin, % of each limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// By how much less than asked for, % of the limit, a margin has a note.
+/// Shortfall of the margin from which a note is written, % of the limit.
 const SHORT_PCT: f64 = 0.1;
-/// Rounding that is no excess, as a share of the torque.
+/// Rounding that does not count as excess, as a share of the torque.
 const ROUNDING: f64 = 1e-9;
 
 /// Reads a torque margin, % of each limit.
 ///
 /// # Errors
 ///
-/// The reason in words, for text that is not a number and numbers outside 0 to [`MARGIN_PCT_MAX`].
+/// Returns the reason as text if `text` is not a number or is outside 0 to [`MARGIN_PCT_MAX`].
 pub fn margin_of(text: &str) -> Result<f64, String> {
     let Ok(percent) = text.trim().parse::<f64>() else {
         return Err(format!(
@@ -40,20 +40,20 @@ pub fn margin_of(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 ///
-/// [`PlanError::Margin`].
+/// Returns [`PlanError::Margin`] if the value is out of range.
 pub fn margin_in_range(percent: f64) -> Result<(), PlanError> {
     if (0.0..=MARGIN_PCT_MAX).contains(&percent) { Ok(()) } else { Err(PlanError::Margin { percent }) }
 }
 
-/// A joint whose torque is above what the margin of its plan leaves.
+/// A joint whose torque violates the margin of its plan.
 pub(super) struct Excess {
     /// The joint.
     pub joint: Joint,
-    /// Factor of the time with which the torque suffices.
+    /// Factor of the motion's time that makes the torque sufficient.
     pub stretch: f64,
 }
 
-/// A note on a margin that is smaller than the one that was asked for, because of what gravity takes.
+/// Returns a note if gravity makes the margin smaller than requested.
 pub(super) fn note(
     verdict: &Verdict,
     margin_pct: f64,
@@ -69,8 +69,8 @@ pub(super) fn note(
     ))
 }
 
-/// Returns the joint that needs the slowest motion to keep the margin of `limits`, at each millisecond of the trajectory as the controller
-/// computes it; `None` where all joints keep it.
+/// Returns the joint that needs the slowest motion to keep the margin of `limits`, at each millisecond of the
+/// trajectory as the controller computes it; `None` if all joints keep it.
 pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics) -> Option<Excess> {
     let mut worst = None::<Excess>;
     let end = (trajectory.duration_s() * 1e3).round() as u32;
@@ -89,7 +89,7 @@ pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics
             if torque[j].abs() <= usable * (1.0 + ROUNDING) {
                 continue;
             }
-            // What a slower motion does not change: gravity, and nearly all of the friction.
+            // Torque that a slower motion does not reduce: gravity and nearly all of the friction.
             let still = (slow[j] * torque[j].signum()).min(torque[j].abs());
             let (needed, left) = (torque[j].abs() - still, usable - still);
             let stretch = if left > 0.0 { (needed / left).sqrt() } else { f64::INFINITY };

@@ -1,9 +1,9 @@
-//! Moves made here: to a place, through waypoints, and trajectories at another speed.
+//! Planner: moves to a goal, motions through waypoints, and trajectories at another speed.
 //!
-//! The motions are those of `jtc-plan`, as fast as the limits of velocity, acceleration, jerk and torque allow. Here they become
-//! trajectories, points at a fixed step as the wire carries them, and each passes the same [check](crate::check) as a file before it
-//! is given to anybody: where rounding, a pause on the path (J-33) or friction ask for more, the motion is slowed down and
-//! [`Planned::notes`] reports it.
+//! The motions come from `jtc-plan`, as fast as the limits of velocity, acceleration, jerk and torque allow. This
+//! module turns a motion into a trajectory with points at a fixed step, as on the wire. Each trajectory passes the same
+//! [check](crate::check) as a file before the planner returns it. If rounding, a pause on the path (J-33) or friction
+//! exceed a limit, the planner slows the motion down and reports it in [`Planned::notes`].
 //!
 //! ```
 //! use jtc_host::{Arm, plan::Planner};
@@ -54,79 +54,79 @@ use sampled::{least_s, sampled, step_ms};
 
 /// Step of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Time that the acceleration has to change where jerk is not limited, s: in less than two steps the position between the points (J-32)
-/// would accelerate more than the points do.
+/// Time for a change of acceleration without a jerk limit, s. With less than two steps the position between the points
+/// (J-32) would accelerate more than the points do.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
-/// Share of the velocity and acceleration limits that a plan uses: the rest is for the rounding of the wire.
+/// Share of the velocity and acceleration limits that a plan uses; the remainder covers the rounding of the wire.
 const SHARE: f64 = 0.98;
-/// Time in which the rest of a trajectory gets to its speed, s, and longer ones where the check refuses that.
+/// Time in which the remainder of a trajectory reaches its speed, s, and longer times to try if the check rejects it.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Bearing temperature that a plan reckons with, °C: that of a cold hall. Friction is higher there than at the usual temperature.
+/// Bearing temperature that a plan assumes, °C: a cold hall. Friction is higher than at the usual temperature.
 pub const COLD: f64 = 20.0;
-/// A motion that is slowed down by more than this is none any more.
+/// Maximum slow-down factor of a motion; the planner rejects a slower motion.
 const SLOWEST: f64 = 50.0;
-/// Least and most by which one step slows a motion down.
+/// Minimum and maximum slow-down factor of an iteration.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Least by which one step slows a motion down for the torque margin: it is exceeded by rounding alone.
+/// Minimum slow-down factor of an iteration for the torque margin: rounding alone exceeds the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
-/// A motion that is made slower than this for the torque margin, as a factor of its time, has a note.
+/// Factor of the time, needed for the torque margin, from which a note is written.
 const NOTED: f64 = 1.01;
 
-/// Makes motions for an arm, and checks them.
+/// Plans motions for an arm and checks them.
 #[derive(Clone, Debug)]
 pub struct Planner<'a> {
     /// Limits, rotor inertia, gravity, payload.
     pub config: &'a Config,
     /// Model for the torques; `None`: torque is neither planned nor checked.
     pub model: Option<&'a ArmModel>,
-    /// Friction compensation that the controller will add to it.
+    /// Friction compensation that the controller adds to the model torque.
     pub friction: Option<&'a Friction>,
-    /// Lowest bearing temperature, °C, at which the friction may have to be overcome.
+    /// Lowest bearing temperature, °C, for which friction is planned.
     pub temperature: f64,
-    /// Speed, 1 to 100 % of what the limits allow.
+    /// Speed, 1 to 100 % of the limits.
     pub speed_pct: f64,
-    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each waypoint.
+    /// Rounding of the corner at a waypoint, rad of the joint with the largest deviation; 0: the arm stops at each waypoint.
     pub blend: f64,
-    /// Whether jerk is limited, too; else the acceleration changes within two steps.
+    /// `true` if jerk is limited, too; else the acceleration changes within two steps.
     pub jerk: bool,
-    /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit: what the plan leaves for masses and friction that the model does not know.
+    /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit, for masses and friction that the model does not contain.
     pub margin_pct: f64,
-    /// Segments that the trajectory will be sent in.
+    /// Segments in which the trajectory will be sent.
     pub upload: UploadOptions,
 }
 
-/// Which limit a motion uses up, from when to when.
+/// The limit that binds a motion in an interval of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
-    /// s from the start.
+    /// Start of the interval, s from the start of the motion.
     pub from_s: f64,
-    /// s from the start.
+    /// End of the interval, s from the start of the motion.
     pub to_s: f64,
-    /// Which joint.
+    /// Joint concerned.
     pub joint: Joint,
-    /// "velocity", "acceleration", "jerk", "torque", "stop" (room to stop in time), "friction" (its table) or "given time".
+    /// "velocity", "acceleration", "jerk", "torque", "stop" (distance to stop in time), "friction" (its table) or "given time".
     pub limit: &'static str,
 }
 
 /// A motion that passed the check.
 #[derive(Clone, Debug)]
 pub struct Planned {
-    /// What is run.
+    /// Trajectory to run.
     pub trajectory: Trajectory,
-    /// What the check found: figures of each joint, warnings.
+    /// Result of the check: figures of each joint, warnings.
     pub verdict: Verdict,
-    /// What binds when, in the order of time.
+    /// Binding limits in order of time.
     pub binding: Vec<Bound>,
-    /// When the motion is nearest to each waypoint, s.
+    /// Time at which the motion is nearest to each waypoint, s.
     pub waypoint_times: Vec<f64>,
-    /// What was changed for the check, and which waypoints rounded corners miss, in words.
+    /// Changes made to pass the check, and waypoints that rounded corners miss, as text.
     pub notes: Vec<String>,
 }
 
 impl<'a> Planner<'a> {
-    /// Within the limits of `config` alone, as fast as they allow, with a stop at each waypoint. With a model it leaves [`MARGIN_PCT`] of
-    /// each torque limit.
+    /// Creates a planner with the limits of `config` alone, full speed and a stop at each waypoint. If a model is set,
+    /// the planner keeps [`MARGIN_PCT`] of each torque limit free.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self {
@@ -142,14 +142,14 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// From a place at rest to another one (rad, base to wrist), straight in joint space where that takes no longer. Where a joint stands
-    /// outside its limits by up to the start tolerance, the motion begins at the nearest place inside (J-58). A goal outside by no more than the
-    /// rounding of a frame is the limit itself (J-36).
+    /// Plans a motion from rest to rest between two positions (rad, base to wrist), straight in joint space if that is
+    /// not slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the nearest
+    /// position inside (J-58). A goal outside by no more than the rounding of a frame is moved to the limit (J-36).
     ///
     /// # Errors
     ///
-    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] for a place outside the limits or that no torque holds; [`PlanError::Refused`] when the
-    /// check finds what no speed mends.
+    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] if a position is outside the limits or cannot
+    /// be held by the torque; [`PlanError::Refused`] if the check finds a problem that no lower speed solves.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
         let first = self.nearest_inside(from);
@@ -158,8 +158,8 @@ impl<'a> Planner<'a> {
         self.checked(&motion, &first, Some(*from), false)
     }
 
-    /// The nearest place inside the limits from which the controller executes a motion of an arm that stands at `place`: joints that are
-    /// further outside than the start tolerance remain there.
+    /// Returns the nearest position inside the limits from which the controller executes a motion if the arm is at
+    /// `place`. Joints outside by more than the start tolerance keep their position.
     fn nearest_inside(&self, place: &[f64; JOINTS]) -> [f64; JOINTS] {
         std::array::from_fn(|j| {
             let inside = PathRange::of(self.config, j, 0).nearest_inside(place[j]);
@@ -167,12 +167,12 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Through waypoints, from rest to rest: straight legs in joint space, with corners rounded within the blend. Times that are given
-    /// are kept.
+    /// Plans a motion through waypoints, from rest to rest: straight legs in joint space, with corners rounded within
+    /// the blend. Keeps given times.
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`], with the waypoint that is meant; [`PlanError::Nowhere`], [`PlanError::Blend`], [`PlanError::TooLong`].
+    /// As [`Planner::to`], with the number of the waypoint; [`PlanError::Nowhere`], [`PlanError::Blend`], [`PlanError::TooLong`].
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
@@ -190,12 +190,12 @@ impl<'a> Planner<'a> {
         Ok(planned)
     }
 
-    /// The rest of a trajectory from `from_ms` of its path on, where the arm stands at `start`: on the same path, at its own times once it has
-    /// sped up, as fast as the check allows that.
+    /// Plans the remainder of a trajectory on the same path, from `from_ms` of the path with the arm at `start`. After
+    /// a ramp the motion keeps the times of the trajectory. The ramp is the shortest one that passes the check.
     ///
     /// # Errors
     ///
-    /// [`PlanError::Refused`] when the check refuses the rest however slowly it begins, [`PlanError::TooLong`].
+    /// [`PlanError::Refused`] if the check rejects the remainder with every ramp, [`PlanError::TooLong`].
     pub fn rest(
         &self,
         trajectory: &Trajectory,
@@ -216,8 +216,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Refuses what would be too long at the highest speed all the way, before it is planned. Positions outside the limits, and blends
-    /// that are none, are left to the plan.
+    /// Rejects a motion that would be too long even at the highest speed, before it is planned. The planner rejects
+    /// positions outside the limits and invalid blends.
     fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
         let limits = self.limits()?;
         let is_inside = |q: &[f64; JOINTS]| {
@@ -236,13 +236,13 @@ impl<'a> Planner<'a> {
             .map(|model| ArmDynamics::new(self.config, model, self.friction).at_temperatures(temperatures))
     }
 
-    /// The check before a run, where the arm stands at `start`.
+    /// Returns the checker for a run of an arm at `start`.
     fn checker(&self, start: Option<[f64; JOINTS]>) -> Checker<'a> {
         let Self { model, friction, upload, .. } = *self;
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// A motion within the limits of a plan. A joint whose margin leaves no torque for it has none.
+    /// Plans a motion within the limits. Drops the margin of a joint if the margin leaves it no torque for the motion.
     fn within(
         &self,
         plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
@@ -260,7 +260,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// What a plan keeps to.
+    /// Returns the limits that a plan keeps.
     fn limits(&self) -> Result<Limits, PlanError> {
         if !(1.0..=100.0).contains(&self.speed_pct) {
             return Err(PlanError::Speed { percent: self.speed_pct, most: 100.0 });
@@ -278,7 +278,8 @@ impl<'a> Planner<'a> {
         Ok(Limits { jerk: limits.acceleration.map(|a| a / JUMP_S), ..limits })
     }
 
-    /// The motion as a trajectory that passes the check, slowed down as far as it has to be; one that is `timed` is not.
+    /// Turns the motion into a trajectory that passes the check, and slows it down as far as necessary. A motion with
+    /// `timed` is not slowed down.
     fn checked(
         &self,
         within: &Within,
@@ -293,12 +294,12 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // Cold, and as before a run: where friction brakes, it is its lack that costs torque.
+            // Checks cold, then as before a run: if friction helps to brake, lower friction needs more torque.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // Corners closer than its steps are no motion that a longer trajectory could carry.
+            // If corners are closer than the steps, no longer trajectory can represent them.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -312,7 +313,7 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // Rounding to the wire's steps, and what lies between the samples of the plan.
+            // Excess comes from rounding to the wire's steps, and from times between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -350,7 +351,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The same place with each joint at its limit that is beyond it by no more than the rounding of a frame (J-36).
+/// Returns `place` with each joint moved to its limit if it is beyond by no more than the rounding of a frame (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);
@@ -364,7 +365,7 @@ struct Within {
     limits: Limits,
 }
 
-/// By how much a motion is slowed down for what is wrong with it; `None` where that does not mend it.
+/// Returns the slow-down factor that solves the problems found; `None` if a slower motion does not solve them.
 fn slower(verdict: &Verdict) -> Option<f64> {
     use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
     let factors = verdict.refusals().map(|p| {
@@ -372,7 +373,7 @@ fn slower(verdict: &Verdict) -> Option<f64> {
         match p.kind {
             Velocity | PositionSpeed | FrictionVelocity => Some(over),
             Acceleration => Some(over.sqrt()),
-            // Part of it is gravity, which no speed changes.
+            // Part of the torque is gravity, which no speed changes.
             Torque | NoStop => Some(over.max(1.03)),
             _ => None,
         }
@@ -391,7 +392,7 @@ fn limit_name(kind: ProblemKind) -> &'static str {
     }
 }
 
-/// What binds: the limits that the motion was planned by, or else what it was slowed down for.
+/// Returns the binding limits: those of the plan, or the problem for which the motion was slowed down.
 fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
     if let Some(problem) = slowed {
         let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));
@@ -410,11 +411,11 @@ fn slowed_words(problem: &Problem, stretch: f64) -> String {
     format!("slowed down to {:.0} % of the speed that was planned, for the check: {problem}", 100.0 / stretch)
 }
 
-/// A move between two places within the limits of `config` alone, at `speed_pct` of them: [`Planner::to`] without torques.
+/// Plans a move between two positions within the limits of `config` alone, at `speed_pct` of them: [`Planner::to`] without torques.
 ///
 /// # Errors
 ///
-/// Those of [`Planner::to`].
+/// Returns the errors of [`Planner::to`].
 pub fn joint_move(
     from: &[f64; JOINTS],
     to: &[f64; JOINTS],

@@ -1,4 +1,4 @@
-//! The rest of a trajectory that was broken off: from standstill on its path to its end, on the same path.
+//! The remainder of an interrupted trajectory: from standstill on its path to its end, on the same path.
 
 use jtc_core::{POINTS_MAX, SetPoint, interpolate};
 
@@ -6,16 +6,16 @@ use super::PlanError;
 use super::sampled::step_ms;
 use crate::trajectory::{Point, Trajectory};
 
-/// The path from `from_ms` on: it speeds up from standstill in `ramp_s` seconds, and then goes on at its own times. The first point is
-/// where the path is at `from_ms`, the last one that of the trajectory.
+/// Returns the path from `from_ms` on. The motion accelerates from standstill in `ramp_s` seconds, then keeps the times
+/// of the trajectory. The first point is the path's position at `from_ms`, the last one is the last of the trajectory.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] when it does not fit into the controller any more.
+/// [`PlanError::TooLong`] if the remainder does not fit into the controller.
 pub fn rest_of(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Trajectory, PlanError> {
     let from_s = f64::from(from_ms) * 1e-3;
     let left = (trajectory.duration_s() - from_s).max(0.0);
-    // At the end of the ramp half of its time of the path has passed.
+    // At the end of the ramp the path time has advanced by half of the ramp's time.
     let ramp = ramp_s.min(2.0 * left).max(1e-3);
     let seconds = left + 0.5 * ramp;
     let step_ms = step_ms(seconds)?;
@@ -40,7 +40,8 @@ pub fn rest_of(trajectory: &Trajectory, from_ms: u32, ramp_s: f64) -> Result<Tra
     Ok(Trajectory { step_ms, points })
 }
 
-/// Path time that has passed after `t` seconds, its rate, and how that changes: from 0 to 1 within `ramp` seconds.
+/// Returns the path time that has passed after `t` seconds, its rate, and the derivative of the rate. The rate rises
+/// from 0 to 1 in `ramp` s.
 fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
     let u = t / ramp;
     if u >= 1.0 {
@@ -49,7 +50,7 @@ fn ramped(t: f64, ramp: f64) -> (f64, f64, f64) {
     (ramp * u * u * u * (1.0 - 0.5 * u), u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u) / ramp)
 }
 
-/// Set values at `t` seconds of the path, as the controller computes them between points (J-32).
+/// Returns the set values at `t` seconds of the path, as the controller computes them between points (J-32).
 fn place(trajectory: &Trajectory, t: f64) -> SetPoint {
     let h = f64::from(trajectory.step_ms.max(1)) * 1e-3;
     let i = (t / h).max(0.0) as usize;
@@ -73,7 +74,7 @@ mod tests {
         (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max)
     }
 
-    /// From any place: it stands there, stays on the path, ends where that ends, and passes the check.
+    /// From any position the remainder begins at rest, stays on the path, ends at its end, and passes the check.
     #[test]
     fn the_rest_begins_at_rest_and_stays_on_the_path() {
         let (whole, config) = (demo_motion(), Config::avena());
@@ -87,7 +88,7 @@ mod tests {
             assert!(verdict.is_ok(), "{from_ms}: {verdict}");
             for ms in (0..(rest.duration_s() * 1e3) as u32).step_by(7) {
                 let at = rest.at_ms(ms).unwrap().position;
-                // Which path time it is does not matter here.
+                // The path time itself is not compared.
                 let aside = (from_ms.saturating_sub(5)..=10_000)
                     .map(|k| near(&at, &whole.at_ms(k).unwrap().position));
                 let aside = aside.fold(f64::INFINITY, f64::min);

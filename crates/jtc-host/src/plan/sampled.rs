@@ -1,4 +1,4 @@
-//! Motions as trajectories: points at a fixed step.
+//! Sampling of a motion as a trajectory: points at a fixed step.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate};
 use jtc_plan::{Motion, State};
@@ -6,34 +6,34 @@ use jtc_plan::{Motion, State};
 use super::{PlanError, STEP_MS};
 use crate::trajectory::{Point, Trajectory};
 
-/// Fewest steps of a motion, where its step can be short enough.
+/// Minimum number of steps of a motion, if its step can be short enough.
 const STEPS_MIN: f64 = 20.0;
-/// Shortest step, ms: in a shorter one the position moves less than it is rounded to.
+/// Shortest step, ms: in a shorter step the position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
 /// Longest step that a trajectory frame carries, ms.
 const STEP_MAX_MS: f64 = 1000.0;
-/// How far a trajectory may be from the motion between its points, rad.
+/// Maximum deviation of a trajectory from the motion between its points, rad.
 const ASIDE: f64 = 1e-3;
-/// Fewest points from one corner to the next, where a corner turns by more than this share of the way and its legs are longer than that, rad:
-/// with fewer the trajectory is further aside.
+/// Minimum number of points from a corner to the next, if a corner turns by more than this share of the path and its
+/// legs are longer than this length, rad. With fewer points the deviation of the trajectory is larger.
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
-/// Places looked at in each interval.
+/// Number of positions checked in each interval.
 const PARTS: usize = 4;
 
 /// A motion as a trajectory.
 pub(super) struct Sampled {
     pub trajectory: Trajectory,
-    /// Time of the trajectory for a time of the motion.
+    /// Factor from a time of the motion to the time of the trajectory.
     pub scale: f64,
 }
 
-/// The step for a motion of so many seconds, ms.
+/// Returns the step for a motion of this duration, ms.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooLong`] when it does not fit into the controller.
+/// [`PlanError::TooLong`] if the motion does not fit into the controller.
 pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     let fits = (seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil();
     let short = (seconds * 1e3 / STEPS_MIN).floor().clamp(STEP_MIN_MS, f64::from(STEP_MS));
@@ -41,12 +41,13 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
 }
 
-/// The motion in `stretch` times its time. It takes a whole number of steps: without given times it is stretched by what is missing;
-/// where they are to be `kept`, the arm rests for the rest of the last step. The first point is `first`, the last one exactly where the motion ends.
+/// Samples the motion, stretched in time by `stretch`. A trajectory has a whole number of steps. The motion is
+/// stretched to the full last step, or, if `kept`, the arm rests for the remainder of the last step. The first point is
+/// `first`, the last one is exactly the end of the motion.
 ///
 /// # Errors
 ///
-/// [`PlanError::TooFine`] where the step is too long for the motion's corners.
+/// [`PlanError::TooFine`] if the step is too long for the motion's corners.
 pub(super) fn sampled(
     motion: &Motion,
     first: &[f64; JOINTS],
@@ -62,7 +63,7 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // Both ends are what was asked for, to the last bit. Where the acceleration jumps at the start, either side of the jump is right.
+    // Both ends are exactly the requested ones. If the acceleration jumps at the start, both sides of the jump are correct.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }
@@ -74,7 +75,7 @@ pub(super) fn sampled(
     Ok(Sampled { trajectory: Trajectory { step_ms, points }, scale })
 }
 
-/// Refuses waypoints with more sharp corners than there can be points for.
+/// Rejects waypoints with more sharp corners than the points of a trajectory can represent.
 ///
 /// # Errors
 ///
@@ -94,7 +95,7 @@ pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<()
     if corners > most { Err(PlanError::TooManyCorners { corners, most }) } else { Ok(()) }
 }
 
-/// Time that no motion through `positions` is shorter than, s: each is reached within `blend` rad, at no more than `velocity` (rad/s).
+/// Returns a lower bound on the time of a motion through `positions`, s: each is reached within `blend` rad, at most at `velocity` (rad/s).
 pub(super) fn least_s(positions: &[[f64; JOINTS]], blend: f64, velocity: &[f64; JOINTS]) -> f64 {
     let leg = |pair: &[[f64; JOINTS]]| {
         let way = |j: usize| (pair[1][j] - pair[0][j]).abs() - 2.0 * blend;
@@ -111,7 +112,7 @@ fn slowed(state: &State, scale: f64) -> Point {
     }
 }
 
-/// How far the controller's curve between the points is from the motion, rad.
+/// Returns the largest deviation of the controller's curve between the points from the motion, rad.
 fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
     let mut most = 0.0f64;
     for (i, pair) in points.windows(2).enumerate() {

@@ -1,4 +1,4 @@
-//! A plan as the samples that its run would give, as far as they are known beforehand.
+//! A plan as the samples that its run would record, as far as they are known in advance.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
@@ -10,8 +10,8 @@ use crate::sample::{JointSample, Sample};
 use crate::trajectory::{Point, Trajectory};
 
 impl Planner<'_> {
-    /// What is commanded at each point of a trajectory, with the torques by the model, friction at the planner's temperature; nothing
-    /// of it is measured.
+    /// Returns the commanded values at each point of a trajectory, with the model torques and friction at the planner's
+    /// temperature. No value is measured.
     pub fn samples(&self, trajectory: &Trajectory) -> Vec<Sample> {
         let dynamics =
             self.model.map(|model| Dynamics::with_payload(model, self.config.gravity, &self.config.payload));

@@ -1,4 +1,4 @@
-//! The same path at another speed, and the set values of a trajectory at each millisecond.
+//! A path at another speed, and the set values of a trajectory at each millisecond.
 
 use jtc_core::{JOINTS, POINTS_MAX, SetPoint, interpolate, position_speed};
 
@@ -6,12 +6,12 @@ use super::{PlanError, STEP_MS};
 use crate::check::POSITION_BIT;
 use crate::trajectory::{Point, Trajectory};
 
-/// The same path at `speed_pct` of its speed.
+/// Returns the trajectory on the same path at `speed_pct` of its speed.
 ///
 /// # Errors
 ///
-/// [`PlanError::Speed`] outside 1..200 %, [`PlanError::TooLong`] when the slower one does not fit into the controller,
-/// [`PlanError::Plan`] without a point.
+/// [`PlanError::Speed`] outside 1..200 %, [`PlanError::TooLong`] if the slower trajectory does not fit into the
+/// controller, [`PlanError::Plan`] if it has no point.
 pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, PlanError> {
     if trajectory.points.is_empty() {
         return Err(jtc_plan::PlanError::TooFew { count: 0 }.into());
@@ -30,7 +30,7 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     if (step - step.round()).abs() < 1e-9 && (1.0..=1000.0).contains(&step) {
         return Ok(Trajectory { step_ms: step.round() as u16, points: own.iter().map(slower).collect() });
     }
-    // A step that is no whole number of ms: sampled anew, each channel from its own samples (J-32).
+    // The step is not a whole number of ms: resamples each channel from its own samples (J-32).
     let seconds = trajectory.duration_s() / s;
     let step_ms = f64::from(STEP_MS).max((seconds * 1e3 / (POINTS_MAX - 1) as f64).ceil());
     if step_ms > 1000.0 {
@@ -50,10 +50,11 @@ pub fn at_speed(trajectory: &Trajectory, speed_pct: f64) -> Result<Trajectory, P
     Ok(Trajectory { step_ms: step_ms as u16, points: points.collect() })
 }
 
-/// Set values between two points to sample anew. Where the velocities leave out more of the way than rounding does (a file whose
-/// velocities are all 0), those of the position take their place, or the samples would contradict themselves all along.
+/// Returns set values between two points, for resampling. If the velocities disagree with the positions by more than
+/// rounding (a file whose velocities are all 0), the derivative of the position replaces them, so that the samples do
+/// not contradict each other.
 fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
-    // Half a thousandth of an interval: exact enough for a polynomial, and inside it.
+    // Half a thousandth of an interval: precise enough for a polynomial, and inside the interval.
     let (low, high) = ((u - 5e-4).max(0.0), (u + 5e-4).min(1.0));
     let mut at = interpolate(a, b, h, u);
     let (speed, before, after) =
@@ -69,7 +70,7 @@ fn moment(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
 }
 
 impl Trajectory {
-    /// Set values at the 1 ms point `k`, as the controller computes them (J-31, J-32); the last point beyond the end.
+    /// Returns the set values at the 1 ms point `k`, as the controller computes them (J-31, J-32); after the end the last point.
     pub fn at_ms(&self, k: u32) -> Option<SetPoint> {
         let step = u32::from(self.step_ms.max(1));
         let (i, ms) = ((k / step) as usize, k % step);
@@ -109,7 +110,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// The same path at another speed: same places, other times.
+        /// The path at another speed has the same positions at other times.
         #[test]
         fn another_speed_keeps_the_path(from in pose(), to in pose(), speed in 5.0..100.0f64) {
             let config = Config::avena();

@@ -1,4 +1,4 @@
-//! Plans: whatever is planned passes the check, and what cannot be is refused by name.
+//! Every plan passes the check, and impossible motions are rejected with the reason.
 
 use host_kit::{Diagnose, ErrorKind};
 use jtc_core::{POINTS_MAX, SetPoint};
@@ -21,7 +21,7 @@ fn waypoints(positions: &[[f64; JOINTS]]) -> Vec<Waypoint> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// Any planned move passes the check at any speed, and ends exactly where it should.
+    /// Every planned move passes the check at every speed, and ends exactly at the goal.
     #[test]
     fn planned_moves_pass_the_check(from in pose(), to in pose(), speed in 1.0..100.0f64) {
         let config = Config::avena();
@@ -32,7 +32,7 @@ proptest! {
         prop_assert!(plan.points.len() <= POINTS_MAX);
     }
 
-    /// With torques, friction and the way to stop; where an arm cannot be held, or not stopped at any speed, that is the reason.
+    /// With torques, friction and stopping distance. If the arm cannot be held, or not be stopped at any speed, the error says so.
     #[test]
     fn plans_of_an_arm_pass_its_check(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.3f64, jerk: bool) {
         let arm = Arm::avena();
@@ -71,7 +71,7 @@ fn a_target_outside_the_limits_is_refused() {
     }
 }
 
-/// An arm without brakes falls to an end stop, outside of its limits: a motion leads away from there.
+/// An arm without brakes falls to an end stop outside its limits: a motion leads back from there.
 #[test]
 fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -103,7 +103,7 @@ fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     }
 }
 
-/// Position 16 376 of the wire, with which an int16 file has rounded 1.57 rad up, is 1.570077 rad.
+/// Position 16 376 of the wire, to which an int16 file rounds 1.57 rad up, is 1.570077 rad.
 #[test]
 fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     let config = Config::avena();
@@ -115,7 +115,7 @@ fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     }
 }
 
-/// An approach to a trajectory begins there, too.
+/// An approach to a trajectory begins at the nearest position inside, too.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -152,7 +152,7 @@ fn moves_slow_down_for_torque() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Long and slow motions have longer steps, up to what the controller holds.
+/// Long and slow motions have longer steps, up to the capacity of the controller.
 #[test]
 fn any_length_fits_or_is_refused() {
     let config = Config::avena();
@@ -168,7 +168,7 @@ fn any_length_fits_or_is_refused() {
     assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
-/// Given times are kept, or refused with the shortest one.
+/// Given times are kept, or rejected with the shortest possible time.
 #[test]
 fn given_times_are_kept_or_refused() {
     let config = Config::avena();
@@ -185,7 +185,7 @@ fn given_times_are_kept_or_refused() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Joint 2 of the arm with a payload (kg), between a pose that takes most of its torque and the upright one.
+/// Plans a move of joint 2 with a payload (kg), between a pose that takes most of its torque and the upright pose.
 fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     let arm = Arm::avena();
     let (mut config, friction) = (arm.config(), arm.friction());
@@ -195,7 +195,7 @@ fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     planner.through(&waypoints(&places))
 }
 
-/// What the whole torque limit can hold and leave is planned, though a plan uses less of it elsewhere.
+/// A pose that the whole torque limit can hold and leave is planned, although a plan uses less of the limit elsewhere.
 #[test]
 fn a_pose_that_can_be_held_can_be_left() {
     let (arm, mut masses) = (Arm::avena(), 0);
@@ -217,7 +217,7 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// The waypoint that cannot be held is named, with what it takes and how much of the limit holding may take.
+/// The error names the waypoint that cannot be held, its torque, and the share of the limit that holding may use.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();
@@ -232,7 +232,7 @@ fn too_much_payload_names_the_pose_that_cannot_be_held() {
     assert!(error.to_string().contains("97.0 % of its limit of 180.0 N·m"), "{error}");
 }
 
-/// More corners than points are refused before anything is planned.
+/// More corners than points are rejected before planning.
 #[test]
 fn too_many_corners_are_refused_at_once() {
     let places: Vec<[f64; JOINTS]> = (0..10_000)
@@ -246,8 +246,8 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// What is too long at the highest speed all the way is refused before anything is planned: the last place could not be held, which is not
-/// found out. Waypoints in degrees are refused as such.
+/// A motion that is too long even at the highest speed is rejected before planning: the last pose could not be held,
+/// which is not detected. Waypoints in degrees are reported as such.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();
@@ -269,7 +269,7 @@ fn too_long_a_way_is_refused_at_once() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
-    /// The least time that is known beforehand is no longer than that of the plan, also where most waypoints lie within a blend.
+    /// The lower bound of the time is not longer than the plan, even if most waypoints lie within a blend.
     #[test]
     fn no_plan_is_shorter_than_the_least_time(places in prop::collection::vec(pose(), 2..20), dense: bool, blend in 0.0..BLEND_MAX, speed in 20.0..100.0f64) {
         let config = Config::avena();
@@ -282,7 +282,7 @@ proptest! {
         prop_assert!(least <= planned.trajectory.duration_s(), "{least} s");
     }
 
-    /// Without a limit of jerk, too, the position that the controller computes between the points (J-32) keeps the acceleration.
+    /// Without a jerk limit, too, the position that the controller computes between the points (J-32) keeps the acceleration limit.
     #[test]
     fn j32_the_position_between_points_keeps_the_acceleration(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.2f64, jerk: bool) {
         let config = Config::avena();

@@ -1,25 +1,25 @@
-//! What the waypoints of a file lead through: places, or lines and arcs of the flange.
+//! Path through the waypoints of a file: positions, or lines and arcs of the flange.
 
 use super::kinematics::Route;
 use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
 use crate::arm::Arm;
 use crate::waypoints::{WaypointError, WaypointFile};
 
-/// How far the flange may leave a straight line without a word, m.
+/// Deviation of the flange from a straight line that is not reported, m.
 const ASIDE_M: f64 = 5e-4;
 
-/// How an arm is to go through waypoints.
+/// Options for the path through waypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayOptions {
-    /// The flange keeps to a straight line on each leg of which the file does not say how the arm moves.
+    /// `true`: the flange moves on a straight line on each leg for which the file does not specify the motion.
     pub line: bool,
-    /// How far from a waypoint its corner may be rounded, rad of the joint that is furthest; 0: the arm stops at each.
+    /// Rounding of the corner at a waypoint, rad of the joint with the largest deviation; 0: the arm stops at each.
     pub blend: f64,
-    /// How far from a waypoint the corner between two lines or arcs may be rounded, m; 0: the arm stops there.
+    /// Rounding of the corner between two lines or arcs, m; 0: the arm stops there.
     pub blend_m: f64,
 }
 
-/// What a plan leads through.
+/// Path of a plan.
 #[derive(Debug)]
 pub struct Way<'a> {
     file: &'a WaypointFile,
@@ -30,22 +30,22 @@ pub struct Way<'a> {
 #[derive(Debug)]
 enum Course {
     Joints(Vec<Waypoint>),
-    /// Of these the one that is passed the fastest, with the times of the waypoints.
+    /// Alternative routes (the fastest is used), with the times of the waypoints.
     Lines(Vec<Route>, Vec<Option<f64>>),
 }
 
 impl<'a> Way<'a> {
-    /// The way of an arm through the waypoints of a file.
+    /// Returns the path of an arm through the waypoints of a file.
     ///
     /// # Errors
     ///
-    /// Those of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`].
+    /// Returns the errors of [`WaypointFile::positions`] and [`WaypointFile::route`], and [`PlanError::Blend`].
     pub fn of(file: &'a WaypointFile, arm: &Arm, options: WayOptions) -> Result<Self, WaypointError> {
         let WayOptions { line, blend, blend_m } = options;
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop is within every blend, and beside a sharp corner it may be faster than a small one.
+            // A stop satisfies every blend, and next to a sharp corner it may be faster than a small blend.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
         } else {
@@ -54,16 +54,16 @@ impl<'a> Way<'a> {
         Ok(Self { file, options, course })
     }
 
-    /// The flange keeps to a line or an arc somewhere.
+    /// Returns `true` if the flange moves on a line or an arc on any leg.
     pub fn has_lines(&self) -> bool {
         matches!(self.course, Course::Lines(..))
     }
 
-    /// The motion along it.
+    /// Plans the motion along the path.
     ///
     /// # Errors
     ///
-    /// Those of [`Planner::through`] and [`Planner::on_route`].
+    /// Returns the errors of [`Planner::through`] and [`Planner::on_route`].
     pub fn planned(&self, planner: &Planner) -> Result<Planned, PlanError> {
         let (routes, times) = match &self.course {
             Course::Joints(waypoints) => return planner.through(waypoints),
@@ -82,9 +82,9 @@ impl<'a> Way<'a> {
         fastest.unwrap_or(Err(PlanError::Nowhere { count: 0 }))
     }
 
-    /// Where the flange leaves the straight line between two of its poses, by more than nobody would see.
+    /// Returns the largest deviation of the flange from the straight line between two of its poses, if above 0.5 mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // With the option a leg in joint space is one that was asked for.
+        // With `line`, the user requested each remaining leg in joint space.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

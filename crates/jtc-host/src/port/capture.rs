@@ -1,4 +1,4 @@
-//! A raw record of both directions of a port, one line a piece: seconds, direction, bytes in hex.
+//! A raw record of both directions of a port, one line per piece: seconds, direction, bytes in hex.
 //!
 //! ```text
 //! 0.001250 > 9B 06 00 06 0A E6
@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use super::{Halts, Port, PortError};
 
-/// Which way bytes went.
+/// Direction of bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// From the host to the controller, `>`.
@@ -19,7 +19,7 @@ pub enum Direction {
     ToHost,
 }
 
-/// A port that also writes down all that passes.
+/// A port that also writes all bytes of both directions to a capture.
 pub struct Capture<P, W: Write> {
     port: P,
     out: W,
@@ -27,12 +27,12 @@ pub struct Capture<P, W: Write> {
 }
 
 impl<P: Port, W: Write> Capture<P, W> {
-    /// Wraps `port`; lines go to `out`.
+    /// Wraps `port`; lines are written to `out`.
     pub fn new(port: P, out: W) -> Self {
         Self { port, out, failed: None }
     }
 
-    /// The port and the writer; an error that writing met.
+    /// Returns the port, the writer, and the error if writing failed.
     pub fn finish(mut self) -> (P, W, Option<io::Error>) {
         if self.failed.is_none() {
             self.failed = self.out.flush().err();
@@ -91,22 +91,22 @@ impl<P: Port, W: Write> Port for Capture<P, W> {
     }
 }
 
-/// One line of a capture.
+/// A line of a capture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Captured {
-    /// s.
+    /// Time, s.
     pub time_s: f64,
-    /// Which way.
+    /// Direction of the bytes.
     pub direction: Direction,
-    /// What passed.
+    /// Bytes sent or received.
     pub bytes: Vec<u8>,
 }
 
-/// Reads a capture back. Lines that are none are an error with their number.
+/// Reads a capture back. Invalid lines are an error with their number.
 ///
 /// # Errors
 ///
-/// The input cannot be read, or a line of it is no captured bytes.
+/// Returns an error if the input cannot be read or if a line is not a valid capture line.
 pub fn read_capture(input: impl BufRead) -> io::Result<Vec<Captured>> {
     let mut all = Vec::new();
     for (i, line) in input.lines().enumerate() {

@@ -1,4 +1,4 @@
-//! The door of an open port: a socket through which other programs of the same user stop the arm.
+//! The door of an open port: a socket through which other programs of the same user can stop the arm.
 
 use std::fs;
 use std::io;
@@ -16,26 +16,27 @@ use super::halt::{Answer, End, REQUEST_MAX, Request, may_ask, peer, read_line, s
 use super::line::{Counted, Line};
 use super::runtime;
 
-/// Programs that are answered at the same time.
+/// Maximum number of programs served at the same time.
 const ASKERS: usize = 8;
-/// How often the door looks whether it is closed, without anything else to wake it.
+/// Interval at which the door checks whether it is closed, if no event wakes it.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
-/// Pause after a connection that could not be taken.
+/// Pause after a connection that could not be accepted.
 const RETRY: Duration = Duration::from_millis(20);
-/// Time for a request and for taking an answer.
+/// Timeout for a request and for writing an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// An open door. It is closed before the port is: who opens the port next has a door at the same place.
+/// An open door. The door is closed before the port, because the next program that opens the port creates a door at the same path.
 pub struct Door {
     path: PathBuf,
-    /// Device and number of the socket: another program may have one at the same path later.
+    /// Device and inode of the socket: another program may create a socket at the same path later.
     file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Door {
-    /// Opens the door of a port that this program has. `None`: there is no place for it; the port works without.
+    /// Opens the door of this program's port. Returns `None` if no socket can be created for it; the port works without
+    /// a door.
     pub fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
         let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
@@ -59,13 +60,13 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         self.line.close();
-        // Wakes the thread at once; without it the thread looks soon.
+        // Wakes the thread at once; without the connection the thread notices after at most 200 ms.
         let _ = UnixStream::connect(&self.path);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
         if file_of(&self.path) == Some(self.file) {
-            // It may be gone already.
+            // The file may already be deleted.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -75,7 +76,7 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// A socket that is there belongs to a program that was killed, or to one of the superuser, whom no port is closed to. That one keeps it.
+/// An existing socket belongs to a killed program, or to a program of the superuser, who can open any port. The superuser's socket is kept.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -99,7 +100,7 @@ fn serve(listener: &UnixListener, line: &Line) {
                 Ok((stream, _)) => stream,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
                 Err(_) => {
-                    // For example too many open files: the next attempt fails at once, too.
+                    // For example too many open files: the next attempt would fail at once, too.
                     std::thread::sleep(RETRY);
                     continue;
                 }
@@ -111,17 +112,17 @@ fn serve(listener: &UnixListener, line: &Line) {
                 continue;
             }
             let counted = Counted::new(&busy);
-            // Without a thread the asker is disconnected, and asks again.
+            // If no thread can start, the client is disconnected and repeats its request.
             let _ = std::thread::Builder::new().spawn_scoped(scope, move || {
                 let _counted = counted;
-                // An asker that has disconnected has no use for an answer.
+                // A disconnected client needs no answer.
                 let _ = answer(&stream, line);
             });
         }
     });
 }
 
-/// One request for one deadline, however slowly its bytes come.
+/// A reader with a deadline for a whole request, even if its bytes arrive slowly.
 struct Within<'a> {
     stream: &'a UnixStream,
     end: Instant,
@@ -138,7 +139,7 @@ impl io::Read for Within<'_> {
     }
 }
 
-/// Does what one program asks for.
+/// Executes the request of a client program.
 fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     stream.set_nonblocking(false)?;
     stream.set_write_timeout(Some(PATIENCE))?;
@@ -148,7 +149,7 @@ fn answer(stream: &UnixStream, line: &Line) -> io::Result<()> {
     let answer = Answer::of(line.path.clone(), line.baud, done);
     write_line(stream, &answer)?;
     if !answer.confirmed {
-        // The asker reports that, and waits for nothing.
+        // The client reports the error and does not wait for the end.
         return Ok(());
     }
     let Some((status, standstill)) = line.wait_for_rest(request.halt) else { return Ok(()) };

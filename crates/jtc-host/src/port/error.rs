@@ -1,124 +1,124 @@
-//! Why a port cannot be used.
+//! Errors of a port.
 
 use std::io;
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 
-/// Why a port cannot be opened, read or written.
+/// Reason why a port cannot be opened, read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {
-    /// No such device.
+    /// The device does not exist.
     #[error("{path}: there is no such port")]
     NotFound {
-        /// Name given.
+        /// Name of the port.
         path: String,
     },
-    /// The operating system does not let this user open it.
+    /// The operating system does not let this user open the port.
     #[error("{path}: no permission to open this port")]
     Permission {
-        /// Name given.
+        /// Name of the port.
         path: String,
     },
-    /// Another program has it.
+    /// Another program has opened the port.
     #[error("{path}: another program has this port open")]
     Busy {
-        /// Name given.
+        /// Name of the port.
         path: String,
     },
-    /// The device cannot run at this rate.
+    /// The device does not support this rate.
     #[error("{path}: the port refuses {baud} Bd")]
     Baud {
-        /// Name given.
+        /// Name of the port.
         path: String,
-        /// Bits per second asked for.
+        /// Requested rate, bits per second.
         baud: u32,
     },
-    /// It was there, and is no more.
+    /// The port disappeared while it was open.
     #[error("{path}: the port has gone (cable pulled, or the program at its other end has ended)")]
     Gone {
-        /// Name given.
+        /// Name of the port.
         path: String,
     },
-    /// No agent is there.
+    /// No agent answers.
     #[error("{url}: no agent answers: {what}")]
     NoAgent {
-        /// Address given.
+        /// Address of the agent.
         url: String,
-        /// What was found.
+        /// Problem found.
         what: String,
     },
-    /// An agent does not let this client in.
+    /// The agent rejects this client.
     #[error("{url}: the agent does not let this program in: {what}")]
     NotLetIn {
-        /// Address given.
+        /// Address of the agent.
         url: String,
-        /// Its words.
+        /// Message of the agent.
         what: String,
     },
-    /// The connection to an agent is lost.
+    /// The connection to the agent is lost.
     #[error("{url}: the connection to the agent is lost: {what}")]
     AgentGone {
-        /// Address given.
+        /// Address of the agent.
         url: String,
-        /// What happened.
+        /// Cause.
         what: String,
     },
-    /// The other end takes no bytes.
+    /// The other end accepts no bytes.
     #[error("{path}: no byte could be written for {seconds:.1} s")]
     Stalled {
-        /// Name given.
+        /// Name of the port.
         path: String,
-        /// How long was waited, s.
+        /// Waiting time, s.
         seconds: f64,
     },
-    /// No port was named, and none is there.
+    /// No port was named, and no port exists.
     #[error("no serial port found")]
     NoneFound,
-    /// No port was named, and several are there.
+    /// No port was named, and several ports exist.
     #[error("several serial ports found: {}", paths.join(", "))]
     Several {
         /// Names found.
         paths: Vec<String>,
     },
-    /// The path is that of a file or a directory.
+    /// The path belongs to a file or a directory.
     #[error("{path} is no serial port")]
     NoPort {
-        /// Name given.
+        /// Name of the port.
         path: String,
     },
     /// The port withholds a frame that would move the arm: the arm was stopped after the motion was requested.
     #[error("not sent: {} after this motion was requested", stopped_by(by.as_deref()))]
     Halted {
-        /// The program that stopped the arm, where it is another one.
+        /// Program that stopped the arm, if another program did.
         by: Option<String>,
     },
-    /// The program that has the port does not answer a Stop or Pause.
+    /// The program that holds the port does not answer a Stop or Pause.
     #[error("{}: the program that has this port{} did not answer within {seconds:.0} s", path, process_words(*process))]
     HolderSilent {
         /// Name of the port or of its socket.
         path: String,
-        /// Its process number.
+        /// Process number of the program.
         process: Option<i32>,
-        /// Time that was waited, s.
+        /// Waiting time, s.
         seconds: f64,
     },
-    /// The program that has the port could not get a Stop or Pause to the controller.
+    /// The program that holds the port could not deliver a Stop or Pause to the controller.
     #[error("{path}: the controller has not confirmed it to {holder}, which has this port{}", what.as_ref().map_or(String::new(), |what| format!(" ({what})")))]
     NotHalted {
         /// Name of the port.
         path: String,
-        /// The program.
+        /// Program that holds the port.
         holder: String,
-        /// Why, where the frame could not be written.
+        /// Cause, if the frame could not be written.
         what: Option<String>,
     },
-    /// Anything else that the operating system reports.
+    /// Any other error of the operating system.
     #[error("{path}: {source}")]
     Io {
-        /// Name given.
+        /// Name of the port.
         path: String,
-        /// Its words.
+        /// Error of the operating system.
         source: io::Error,
     },
 }

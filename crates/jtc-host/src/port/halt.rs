@@ -1,7 +1,7 @@
-//! A Stop or Pause by another program of the same user: what is said at the [door](super) of the program that has the port.
+//! Stop or Pause by another program of the same user: messages at the [door](super) of the program that holds the port.
 //!
-//! The asker sends one line, a request as JSON. The program that has the port writes the frame to the line, answers with an
-//! [`Answer`], and with an [`End`] when the arm stands.
+//! The client sends one line, a request as JSON. The program that holds the port writes the frame to the line, answers
+//! with an [`Answer`], and sends an [`End`] when the arm is at rest.
 
 use std::io;
 use std::time::Duration;
@@ -22,29 +22,29 @@ use super::runtime;
 use super::standstill::{Standstill, has_torque, is_paused};
 use crate::words;
 
-/// Most bytes of a request.
+/// Maximum size of a request, bytes.
 pub(super) const REQUEST_MAX: usize = 1024;
-/// Most bytes of an answer.
+/// Maximum size of an answer, bytes.
 const ANSWER_MAX: usize = 4096;
-/// Most bytes of an end.
+/// Maximum size of an end, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Longest wait for the answer of a program that has the port: longer than it takes to write a Stop eight times.
+/// Timeout for the answer of the program that holds the port: longer than writing a Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Longest wait for the end: longer than a stopped arm takes to come to rest.
+/// Timeout for the end: longer than a stopped arm needs to come to rest.
 const REST: Duration = Duration::from_secs(6);
 
-/// What another program is asked for.
+/// Command that a program requests from the holder of the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Halt {
-    /// Stop on the path and end the execution.
+    /// Stops on the path and ends the execution.
     Stop,
-    /// Pause on the path.
+    /// Pauses on the path.
     Pause,
 }
 
 impl Halt {
-    /// The command to the controller.
+    /// Returns the command to the controller.
     pub fn command(self) -> ExecCommand {
         match self {
             Self::Stop => ExecCommand::Stop,
@@ -53,46 +53,46 @@ impl Halt {
     }
 }
 
-/// What is asked for, and by whom.
+/// Request: the command and the program that sends it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Request {
     pub halt: Halt,
     pub by: String,
 }
 
-/// What became of the frame.
+/// Result of writing the frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Answer {
-    /// The program that has the port.
+    /// Program that holds the port.
     pub program: String,
-    /// Its process number.
+    /// Process number of that program.
     pub pid: u32,
-    /// The port, as that program opened it.
+    /// Port, named as that program opened it.
     pub port: String,
-    /// Its rate, Bd.
+    /// Rate of the port, Bd.
     pub baud: u32,
-    /// The controller has received the frame.
+    /// `true` if the controller has received the frame.
     pub confirmed: bool,
-    /// The controller accepted it: there was something to stop.
+    /// `true` if the controller accepted the frame: a motion could be stopped.
     pub accepted: bool,
-    /// The arm moved when the frame came.
+    /// `true` if the arm moved when the frame arrived.
     pub moved: bool,
     /// State of the controller.
     pub state: String,
     /// Trajectory execution state.
     pub trajectory: String,
-    /// Why the frame could not be written.
+    /// Reason why the frame could not be written.
     pub error: Option<String>,
 }
 
-/// How it ended.
+/// Final message: the state of the arm after the command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct End {
-    /// The arm stands.
+    /// `true` if the arm is at rest.
     pub stands: bool,
-    /// The arm moved before.
+    /// `true` if the arm moved before.
     pub moved: bool,
-    /// What still moves.
+    /// Description of the remaining motion.
     pub moving: Option<String>,
     /// State of the controller.
     #[serde(default)]
@@ -100,14 +100,14 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
-    /// The arm is in a held stop: what still moves yields to a push, or lowers its load.
+    /// `true` if the arm is in a held stop: a joint that still moves yields to a push or lowers its load.
     #[serde(default)]
     pub held_stop: bool,
 }
 
 impl Answer {
     pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
-        // The asker may work in another folder.
+        // The client may run in another working directory.
         let port = std::path::absolute(&port).map_or(port, |absolute| absolute.display().to_string());
         let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
         match done {
@@ -131,7 +131,7 @@ pub fn still_moving_help() -> Next {
 }
 
 impl End {
-    /// Of the last status.
+    /// Creates the final message from the last status.
     pub fn of(status: &Status, standstill: &Standstill) -> Self {
         let stands = standstill.is_reached();
         let moving = match words::moving_joint(status) {
@@ -168,7 +168,7 @@ impl End {
     }
 }
 
-/// What this program is called: its name and the first words of its command line.
+/// Returns the name of this program with the first words of its command line.
 pub fn this_program() -> String {
     let mut words = std::env::args();
     let name = words.next().unwrap_or_default();
@@ -179,25 +179,26 @@ pub fn this_program() -> String {
     all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
 }
 
-/// The user at the other end may stop the arm: it is the one that runs this program.
+/// Returns `true` if this user may stop the arm: the user that runs this program.
 #[cfg(unix)]
 pub(super) fn may_ask(user: u32) -> bool {
     user == rustix::process::geteuid().as_raw()
 }
 
-/// The user at the other end of a socket. Where the system does not tell, the rights of the folder and of the socket let no other in.
+/// Returns the user at the other end of a socket. If the system does not report it, the permissions of folder and
+/// socket admit no other user.
 #[cfg(target_os = "linux")]
 pub(super) fn peer(stream: &UnixStream) -> Option<u32> {
     rustix::net::sockopt::socket_peercred(stream).ok().map(|peer| peer.uid.as_raw())
 }
 
-/// The same where the system does not tell.
+/// Returns this program's user on systems that do not report the other end.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(super) fn peer(_: &UnixStream) -> Option<u32> {
     Some(rustix::process::geteuid().as_raw())
 }
 
-/// The process at the other end of a socket, where the system tells.
+/// Returns the process at the other end of a socket, if the system reports it.
 #[cfg(unix)]
 fn process(stream: &UnixStream) -> Option<i32> {
     #[cfg(target_os = "linux")]
@@ -206,21 +207,21 @@ fn process(stream: &UnixStream) -> Option<i32> {
     return None.filter(|_: &i32| stream.peer_addr().is_ok());
 }
 
-/// The name of the socket of a port: the number of its device, which all its names share.
+/// Returns the socket name of a port: its device number, which all names of the port share.
 #[cfg(unix)]
 pub(super) fn socket_name(port: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt as _;
     Some(format!("line-{:x}.sock", std::fs::metadata(port).ok()?.rdev()))
 }
 
-/// The sockets where a program that has this port may listen.
+/// Returns the sockets at which a program that holds this port may listen.
 #[cfg(unix)]
 pub fn sockets_of(port: &str) -> Vec<PathBuf> {
     let Some(name) = socket_name(port) else { return Vec::new() };
     runtime::folders().into_iter().map(|folder| folder.join(&name)).filter(|path| path.exists()).collect()
 }
 
-/// The sockets of all ports that programs of this user have, and of programs that were killed.
+/// Returns the sockets of all ports that programs of this user hold, including sockets that killed programs left.
 #[cfg(unix)]
 pub fn sockets() -> Vec<PathBuf> {
     let files = runtime::folders().into_iter().filter_map(|folder| std::fs::read_dir(folder).ok()).flatten();
@@ -232,8 +233,8 @@ pub fn sockets() -> Vec<PathBuf> {
     files.flatten().map(|file| file.path()).filter(named).collect()
 }
 
-/// The port of a socket, if its device is the one for which the program listened. A device that was plugged in, or a pseudo-terminal that
-/// was opened, after that may be another one with the same number.
+/// Returns the port of a socket, if its device is the one for which the program listened. A device that was plugged in
+/// later, or a pseudo-terminal that was opened later, may have the same number.
 #[cfg(unix)]
 pub fn port_of(socket: &Path) -> Option<String> {
     use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
@@ -253,17 +254,17 @@ pub fn port_of(socket: &Path) -> Option<String> {
     Some(port.display().to_string())
 }
 
-/// A program listens at this socket.
+/// Returns `true` if a program listens at this socket.
 #[cfg(unix)]
 pub fn is_alive(socket: &Path) -> bool {
     UnixStream::connect(socket).is_ok()
 }
 
-/// Asks the program that listens at this socket. `None`: none does, or it ended before it answered.
+/// Sends a request to the program that listens at this socket. Returns `None` if no program listens, or if it ended before it answered.
 ///
 /// # Errors
 ///
-/// [`PortError::HolderSilent`] when the program does not answer, [`PortError::NotHalted`] when the frame did not get to the controller.
+/// [`PortError::HolderSilent`] if the program does not answer, [`PortError::NotHalted`] if the frame did not reach the controller.
 #[cfg(unix)]
 pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option<End>)>, PortError> {
     let Ok(stream) = UnixStream::connect(socket) else { return Ok(None) };
@@ -291,7 +292,7 @@ pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option
         let holder = format!("{} (process {})", answer.program, answer.pid);
         return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
     }
-    // A program that was stopped may end before the arm stands.
+    // The other program may end because of the Stop, before the arm is at rest.
     let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
     Ok(Some((answer, end)))
 }
@@ -322,7 +323,7 @@ pub(super) fn write_line<T: Serialize>(mut stream: impl io::Write, what: &T) -> 
 mod tests {
     use super::*;
 
-    /// Another user may not stop the arm, wherever its request comes from.
+    /// Another user may not stop the arm, independent of the way of the request.
     #[test]
     fn the_request_of_another_user_is_refused() {
         let own = rustix::process::geteuid().as_raw();
@@ -337,7 +338,7 @@ mod tests {
         assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
     }
 
-    /// The emergency stop would drop an arm whose load is being lowered.
+    /// The emergency stop would drop an arm that is lowering its load.
     #[test]
     fn j70_an_arm_that_still_moves_in_a_held_stop_is_waited_for() {
         let standstill = Standstill::after(Halt::Stop);

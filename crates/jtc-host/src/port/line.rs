@@ -1,9 +1,9 @@
 //! The two directions of a serial line, shared by the owner of the port and by the [door](super::door) through which other programs
 //! stop the arm.
 //!
-//! A Stop of another program is written by the thread of the door, whatever the owner is busy with. It goes between two frames: a long
-//! frame that is half written is given up, and a gap on the line tells the controller so (J-03). From then on frames that move the arm and
-//! were requested before the Stop are not written any more.
+//! The door's thread writes a Stop of another program, even while the owner is busy. The Stop goes between two frames:
+//! a half-written long frame is abandoned, and a gap on the line tells the controller to drop it (J-03). From then on,
+//! frames that move the arm and were requested before the Stop are not written.
 
 use std::collections::VecDeque;
 use std::io;
@@ -20,39 +20,39 @@ use super::halt::Halt;
 use super::standstill::{Standstill, is_moving, is_paused};
 use super::{Halts, PortError, line_time};
 
-/// Longest time in which a write finds no room.
+/// Timeout of a write that makes no progress.
 const STALL: Duration = Duration::from_secs(5);
-/// Bytes that are handed over at once. A stalled line is noticed, and a Stop waits for no more than these.
+/// Bytes per write. Limits the delay until a stalled line is noticed, and the delay of a Stop.
 const CHUNK: usize = 256;
-/// Gap on the line after a frame that was given up: the 5 ms of J-03, and what adapters may take off it.
+/// Gap on the line after an abandoned frame: the 5 ms of J-03, plus the part that adapters may remove.
 const GAP: Duration = Duration::from_millis(8);
-/// A frame of which no further piece came for this time after its last byte is not continued.
+/// Time after the last byte of a frame from which a further piece does not continue it.
 const PIECE: Duration = Duration::from_millis(50);
-/// Time for the record of a Stop, beyond three statuses on the line.
+/// Time to wait for the record of a Stop, in addition to three statuses on the line.
 const AWAITED: Duration = Duration::from_millis(150);
 /// Number of times that a Stop is written before it counts as not confirmed.
 const TRIES: u32 = 8;
-/// A frame whose record did not come for this time has none.
+/// Timeout for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
-/// Time after another program's Stop in which no motion can be requested, as with an agent.
+/// Time after another program's Stop in which motion requests are rejected, as with an agent.
 const CALM: Duration = Duration::from_secs(3);
-/// A status or a jog of this age still describes the arm.
+/// Maximum age of a status or a jog that still describes the arm.
 const RECENT: Duration = Duration::from_millis(300);
-/// Time after which a Stop, or the end of teaching, is written again while statuses do not show it.
+/// Interval at which a Stop, or the end of teaching, is repeated until the statuses show it.
 const AGAIN: Duration = Duration::from_millis(200);
-/// Longest time in which a stopped arm comes to rest.
+/// Maximum time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
-/// Bytes that are kept for an owner that does not read.
+/// Maximum number of bytes kept for an owner that does not read.
 const KEPT: usize = 1 << 16;
 
 /// The outcome of another program's Stop or Pause.
 #[derive(Clone, Copy, Debug)]
 pub struct HaltOutcome {
-    /// The controller accepted it.
+    /// `true` if the controller accepted the command.
     pub accepted: bool,
-    /// The arm moved when it came.
+    /// `true` if the arm moved when the command arrived.
     pub moved: bool,
-    /// The last status.
+    /// Last status.
     pub status: Status,
 }
 
@@ -62,12 +62,12 @@ pub struct Line {
     pub baud: u32,
     pub start: Instant,
     output: Mutex<Output>,
-    /// Stops that wait for the output: the owner's next piece waits for them.
+    /// Number of Stops that wait for the output; the owner's next piece waits for them.
     urgent: AtomicUsize,
-    /// Stops and Pauses of other programs, and those of them that are Stops. They change with `Output::halted`.
+    /// Number of Stops and Pauses of other programs, and of Stops alone. Both change together with `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
-    /// One Stop is written and confirmed after the other.
+    /// Serialises Stops: each is written and confirmed before the next.
     turn: Mutex<()>,
     input: Mutex<Input>,
     seen: Mutex<Seen>,
@@ -78,15 +78,15 @@ pub struct Line {
 struct Output {
     port: Box<dyn serialport::SerialPort>,
     timeout: Option<Duration>,
-    /// Bytes that are still to come of the frame that is being written.
+    /// Remaining bytes of the frame that is being written.
     rest: usize,
-    /// When the line will have carried everything that was written.
+    /// Time at which the line will have transmitted all written bytes.
     free_at: Instant,
-    /// The frame that was being written was given up for a Stop.
+    /// `true` if the current frame was abandoned for a Stop.
     given_up: bool,
-    /// The last Stop or Pause of another program, until the owner requests a motion anew.
+    /// Last Stop or Pause of another program, until the owner makes a new motion request.
     halted: Option<Halted>,
-    /// When the owner jogged last.
+    /// Time of the owner's last jog.
     jogged: Option<Instant>,
 }
 
@@ -104,23 +104,23 @@ struct Input {
     pending: VecDeque<u8>,
 }
 
-/// Facts from the statuses that came in, whoever read them.
+/// Facts from the received statuses, independent of the thread that read them.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
-    /// When the last status of a moving arm was read.
+    /// Time at which the last status of a moving arm was read.
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
-    /// The owner has switched teaching on, and no record says that it is off again.
+    /// `true` if the owner switched teaching on and no record reports that it is off again.
     teaching: bool,
-    /// Frames Execute, Pause and Stop without a record, oldest first, with the number of those that the door wrote.
+    /// Frames Execute, Pause and Stop without a record, oldest first; frames that the door wrote have a number.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
     answered: VecDeque<(u64, Response)>,
 }
 
-/// Counts while it lives, also when its thread panics.
+/// Guard that increments a counter until it is dropped, also if its thread panics.
 pub(super) struct Counted<'a>(&'a AtomicUsize);
 
 impl<'a> Counted<'a> {
@@ -145,7 +145,7 @@ fn nothing_yet(e: &io::Error) -> bool {
 }
 
 impl Line {
-    /// The line of an open port.
+    /// Creates the line of an open port.
     pub fn new(path: &str, baud: u32, port: Box<dyn serialport::SerialPort>) -> Result<Self, PortError> {
         let start = Instant::now();
         let reading = port.try_clone().map_err(|e| PortError::io(path, e.into()))?;
@@ -178,7 +178,7 @@ impl Line {
         })
     }
 
-    /// Reads for the owner.
+    /// Reads for the owner of the port.
     pub fn read(&self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError> {
         let mut input = lock(&self.input);
         if input.pending.is_empty() {
@@ -191,7 +191,7 @@ impl Line {
         Ok(n)
     }
 
-    /// Writes for the owner: a frame, or a piece of one.
+    /// Writes a frame, or a piece of a frame, for the owner of the port.
     pub fn write_all(&self, bytes: &[u8]) -> Result<(), PortError> {
         for (i, piece) in bytes.chunks(CHUNK).enumerate() {
             self.let_urgent_pass();
@@ -206,20 +206,20 @@ impl Line {
         Ok(())
     }
 
-    /// Number of Stops and Pauses of other programs so far. It waits for nothing.
+    /// Returns the number of Stops and Pauses of other programs so far, without waiting.
     pub fn halts(&self) -> Halts {
-        // A Stop counts in `halts` first: so no Stop is seen here without its number.
+        // `halts` is incremented before `stops`, so every Stop counted here is also included in `halts`.
         let stops = self.stops.load(Ordering::SeqCst);
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
     }
 
-    /// The owner sends a motion from now on that was requested after so many halts. The gate opens unless another halt came since, or the
-    /// last one has just come.
+    /// Permits motion frames for a request made after `after` halts. The gate stays closed if another halt came since,
+    /// or if the last one is less than 3 s old.
     pub fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
 
-    /// Like `ask_to_move`, to resume a paused motion. No motion goes on after a Stop.
+    /// Like `ask_to_move`, to resume a paused motion. No motion is resumed after a Stop.
     pub fn ask_to_resume(&self, after: u64) {
         self.open_gate(after, |halt| halt == Halt::Pause);
     }
@@ -232,22 +232,23 @@ impl Line {
         }
     }
 
-    /// The owner closes the port: nobody waits any more.
+    /// Marks the port as closing and ends all waits.
     pub fn close(&self) {
         self.closing.store(true, Ordering::SeqCst);
         self.news.notify_all();
     }
 
-    /// The owner closes the port.
+    /// Returns `true` if the owner closes the port.
     pub fn is_closing(&self) -> bool {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes another program's Stop or Pause, again until the controller has received it. `None`: it is not confirmed. An owner that
-    /// closes the port meanwhile waits for that: it ends because of the Stop.
+    /// Writes another program's Stop or Pause, and repeats it until the controller has received it. Returns `None` if
+    /// it is not confirmed. An owner that closes the port waits for this, because it may be closing because of the
+    /// Stop.
     pub fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
-            // A Pause after a Stop is not written: there is nothing to pause.
+            // A Pause after a Stop is not written, because no motion can be paused.
             Err(PortError::Halted { .. }) => {
                 let status = lock(&self.seen).status.map(|(_, status)| status);
                 Ok(status.map(|status| HaltOutcome { accepted: false, moved: false, status }))
@@ -258,7 +259,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // First of all nothing that moves the arm passes any more.
+        // First, block all frames that move the arm.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -283,20 +284,20 @@ impl Line {
             }
         }
         let status = lock(&self.seen).status.map(|(_, status)| status);
-        // An arm that is taught is loose, and a Stop holds it.
+        // An arm in teaching is compliant; a Stop makes it hold its position.
         let taught = status.is_some_and(|status| status.state == ControllerState::Teaching);
         if halt == Halt::Stop && (taught || lock(&self.seen).teaching) {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // An owner that does not read leaves old statuses for now.
+            // If the owner does not read, old statuses are read first.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
     }
 
-    /// Waits until the arm stands: the last status, and whether it stands.
+    /// Waits until the arm is at rest. Returns the last status and the standstill state.
     pub fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
         let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
         let mut written_at = Instant::now();
@@ -310,11 +311,11 @@ impl Line {
             {
                 if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
                     written_at = Instant::now();
-                    // A line that takes nothing more shows as an arm that does not stand.
+                    // If the line accepts no bytes, the result shows an arm that is not at rest.
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
-                // Teaching that was requested may begin as soon as the arm rests.
+                // A pending teach request may start as soon as the arm is at rest.
                 if lock(&self.seen).teaching && halt == Halt::Stop {
                     standstill.begin_again();
                 }
@@ -328,8 +329,8 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Writes again what a Stop brings about and statuses do not show: the end of teaching, and a Stop where the Pause of another sender came
-    /// after it.
+    /// Repeats the effects of a Stop that the statuses do not show: the end of teaching, and the Stop itself if another
+    /// sender's Pause came after it.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
@@ -340,12 +341,12 @@ impl Line {
         Ok(())
     }
 
-    /// A status of a moving arm was read since then.
+    /// Returns `true` if a status of a moving arm was read since `time`.
     fn moved_since(&self, time: Instant) -> bool {
         lock(&self.seen).moved_at.is_some_and(|at| at >= time)
     }
 
-    /// The record of a Stop that was written with a number from `first` on.
+    /// Returns the record of a Stop that was written with a number of at least `first`.
     fn record_since(&self, first: u64) -> Option<Response> {
         let queued = lock(&self.output).free_at.saturating_duration_since(Instant::now());
         let end = Instant::now() + queued + AWAITED + line_time(3 * STATUS_LEN, Some(self.baud));
@@ -366,7 +367,7 @@ impl Line {
         }
     }
 
-    /// Waits for the next status. An owner that does not read is no hindrance: then this reads for it.
+    /// Waits for the next status. If the owner does not read, this function reads for the owner.
     fn look(&self) {
         let seen = lock(&self.seen);
         let before = seen.statuses;
@@ -377,7 +378,7 @@ impl Line {
             return;
         }
         if let Ok(mut input) = self.input.try_lock() {
-            // The owner meets the error when it reads.
+            // The owner gets the error at its next read.
             let _ = self.receive(&mut input, Duration::from_millis(20));
         }
     }
@@ -407,7 +408,7 @@ impl Line {
         Ok(())
     }
 
-    /// The owner begins a frame with these bytes, or goes on with one.
+    /// Checks bytes of the owner that begin or continue a frame.
     fn begin(&self, output: &mut Output, bytes: &[u8]) -> Result<(), PortError> {
         let whole = FrameRef::new_checked(bytes).is_some();
         if !whole && output.given_up {
@@ -429,9 +430,9 @@ impl Line {
         let moves = jogs
             || bytes == fixed::EXECUTE
             || is(FrameType::TeachingModeEnable)
-            // An upload leads to a motion.
+            // An upload prepares a motion.
             || is(FrameType::Trajectory);
-        // A Pause in the deceleration of a Stop would leave a motion that can be resumed.
+        // A Pause during the deceleration of a Stop would leave a motion that can be resumed.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
@@ -449,7 +450,7 @@ impl Line {
         Ok(())
     }
 
-    /// Writes a frame ahead of the rest of what the owner writes.
+    /// Writes a frame ahead of the owner's remaining bytes.
     fn write_urgent(&self, frame: &[u8], has_number: bool) -> Result<(), PortError> {
         self.urgently(|output| {
             if frame == fixed::PAUSE && output.is_stopped() {
@@ -469,13 +470,13 @@ impl Line {
         })
     }
 
-    /// Does something with the output before the owner writes its next piece.
+    /// Runs `work` on the output before the owner writes its next piece.
     fn urgently(&self, work: impl FnOnce(&mut Output) -> Result<(), PortError>) -> Result<(), PortError> {
         let _counted = Counted::new(&self.urgent);
         work(&mut lock(&self.output))
     }
 
-    /// A lock is not handed over in turn: the owner waits for Stops that wait for it. They take as long as one short write.
+    /// Lets waiting Stops go first, because a mutex is not fair. Each of them takes as long as a short write.
     fn let_urgent_pass(&self) {
         let end = Instant::now() + STALL;
         while self.urgent.load(Ordering::SeqCst) > 0 && Instant::now() < end {
@@ -507,7 +508,7 @@ impl Line {
 }
 
 impl Output {
-    /// The arm may still be coming to rest after a Stop.
+    /// Returns `true` if the arm may still be coming to rest after a Stop.
     fn is_stopped(&self) -> bool {
         self.halted.as_ref().is_some_and(|halted| halted.halt == Halt::Stop && halted.at.elapsed() < REST)
     }
@@ -518,7 +519,7 @@ impl Output {
 }
 
 impl Seen {
-    /// A frame Execute, Pause or Stop is written now.
+    /// Notes that a frame Execute, Pause or Stop is written now.
     fn write(&mut self, number: Option<u64>) {
         self.forget();
         self.written.push_back((Instant::now(), number));
@@ -547,7 +548,7 @@ impl Seen {
         }
     }
 
-    /// Frames whose record does not come any more, and records that nobody waits for.
+    /// Drops frames whose record is overdue, and excess records that no thread waits for.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

@@ -1,10 +1,10 @@
-//! The serial ports of this computer, and why one cannot be used.
+//! The serial ports of this computer, and the reason if a port cannot be used.
 
 use serialport::SerialPortType;
 
 use super::{PortError, SerialPort};
 
-/// What a port is made of.
+/// Hardware type of a port.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PortKind {
@@ -14,42 +14,42 @@ pub enum PortKind {
         vendor: u16,
         /// Product number.
         product: u16,
-        /// Serial number, where it has one.
+        /// Serial number, if the device has one.
         serial: Option<String>,
-        /// Words of the device about itself.
+        /// Self-description of the device.
         description: String,
     },
     /// A card in the computer.
     Pci,
     /// A paired radio link.
     Bluetooth,
-    /// The system does not report it.
+    /// Unknown type: the system does not report it.
     Unknown,
 }
 
 /// A serial port of this computer.
 #[derive(Debug)]
 pub struct PortInfo {
-    /// Name to open it with.
+    /// Name for opening the port.
     pub path: String,
-    /// What it is.
+    /// Hardware type.
     pub kind: PortKind,
-    /// Why it cannot be used; `None`: it can.
+    /// Reason why the port cannot be used; `None` if it can.
     pub problem: Option<PortError>,
 }
 
 impl PortInfo {
-    /// It can be opened.
+    /// Returns `true` if the port can be opened.
     pub fn usable(&self) -> bool {
         self.problem.is_none()
     }
 }
 
-/// All ports, by name; each is opened for a moment to see whether it can be used.
+/// Returns all ports, sorted by name; opens each one briefly to check that it can be used.
 ///
 /// # Errors
 ///
-/// The operating system does not list its ports.
+/// Returns an error if the operating system does not list its ports.
 pub fn list() -> Result<Vec<PortInfo>, PortError> {
     let found = serialport::available_ports().map_err(|e| PortError::io("list of ports", e.into()))?;
     let mut ports: Vec<PortInfo> = found
@@ -64,7 +64,7 @@ pub fn list() -> Result<Vec<PortInfo>, PortError> {
     Ok(ports)
 }
 
-/// Names of the ports with an adapter or board on USB. None is opened.
+/// Returns the names of the ports with an adapter or board on USB, without opening them.
 pub fn usb_names() -> Vec<String> {
     let found = serialport::available_ports().unwrap_or_default();
     let is_usb = |kind: &SerialPortType| matches!(kind, SerialPortType::UsbPort(_));
@@ -74,17 +74,17 @@ pub fn usb_names() -> Vec<String> {
     names
 }
 
-/// The name of the only port that can be used.
+/// Returns the name of the only usable port.
 ///
 /// # Errors
 ///
-/// None, or more than one, with their names.
+/// Returns an error if no port or more than one can be used; the error contains the names.
 pub fn only_one() -> Result<String, PortError> {
     let ports = list()?;
     let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();
     match usable.len() {
         1 => Ok(usable.remove(0)),
-        // A board that is there but cannot be opened is the more helpful error.
+        // A board that is connected but cannot be opened is the more helpful error.
         0 => Err(ports
             .into_iter()
             .filter(|p| matches!(p.kind, PortKind::Usb { .. }))

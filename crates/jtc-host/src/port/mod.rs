@@ -1,4 +1,4 @@
-//! Ways to the controller: serial ports, the simulator in this process, and what can be wrapped around them.
+//! Ports to the controller: serial ports, the simulator in this process, and wrappers around ports.
 
 mod capture;
 #[cfg(unix)]
@@ -24,53 +24,52 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of times that other programs stopped or paused the arm: through a port of this program, or through the agent that has the port.
+/// Number of times that other programs stopped or paused the arm: through a port of this program, or through the agent that holds the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {
-    /// Stops and Pauses.
+    /// Number of Stops and Pauses.
     pub all: u64,
-    /// Stops.
+    /// Number of Stops.
     pub stops: u64,
 }
 
 /// A byte stream to a controller, polled by one thread.
 ///
-/// Time belongs to the port: in the simulator it is virtual and passes while `read` waits, so that the same code is
-/// deterministic there.
+/// The port defines the time: in the simulator time is virtual and advances while `read` waits, so that runs are deterministic.
 pub trait Port {
-    /// Waits until at least one byte is there or `timeout` is over; returns how many were read (0: none in that time).
+    /// Waits until at least one byte is available or `timeout` has passed; returns the number of bytes read (0 after a timeout).
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError>;
-    /// Hands all bytes to the line; may block while the line's buffer is full.
+    /// Writes all bytes to the line; may block while the line's buffer is full.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError>;
-    /// Time since some fixed moment.
+    /// Returns the time since a fixed start.
     fn now(&self) -> Duration;
-    /// Bits per second on the line, where the line has a speed.
+    /// Returns the rate of the line, bits per second, if it has one.
     fn baud(&self) -> Option<u32>;
-    /// What a person calls this port.
+    /// Returns the name of this port for the user.
     fn name(&self) -> String {
         "port".to_owned()
     }
-    /// Why the frame that was refused last did not get to the device, in words; `None` where it was the device that refused it. Only
-    /// a line that is shared with others has something to say here.
+    /// Returns the reason, as text, why the last rejected frame did not reach the device; `None` if the device rejected
+    /// it. Only a shared line has such a reason.
     fn take_denial(&mut self) -> Option<String> {
         None
     }
-    /// What is written from now on was asked for now. A line that is shared with others passes on nothing that was asked for before
-    /// somebody stopped the arm; on others this has nothing to do.
+    /// Marks the start of a motion request: frames written from now on belong to it. A shared line rejects requests
+    /// that are older than another client's Stop; on other lines this call has no effect.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
-    /// Number of Stops and Pauses of other programs that are known so far.
+    /// Returns the known number of Stops and Pauses of other programs.
     fn halts(&self) -> Halts {
         Halts::default()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move) for a motion that was requested after so many [`halts`](Self::halts): one that has waited since,
-    /// as in a queue, does not pass if the arm was stopped meanwhile.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a motion requested after `halts` of the [`halts`](Self::halts). A
+    /// request that waited, for example in a queue, is rejected if the arm was stopped since.
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         let _ = halts;
         self.ask_to_move()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), to resume a paused motion: after a Stop no motion goes on.
+    /// Like [`ask_to_move`](Self::ask_to_move), to resume a paused motion: after a Stop no motion is resumed.
     fn ask_to_resume(&mut self) -> Result<(), PortError> {
         self.ask_to_move()
     }
@@ -109,7 +108,7 @@ impl<P: Port + ?Sized> Port for Box<P> {
     }
 }
 
-/// Time that `bytes` take on a line of 8N1 at `baud`; none on a line without a speed.
+/// Returns the time that `bytes` take on a line with 8N1 at `baud`; zero on a line without a rate.
 pub fn line_time(bytes: usize, baud: Option<u32>) -> Duration {
     match baud {
         Some(baud) if baud > 0 => Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud)),

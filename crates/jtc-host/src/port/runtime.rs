@@ -1,30 +1,30 @@
-//! The folder of this user for sockets and locks of running programs. No other user can write to it.
+//! The folder of this user for sockets and locks of running programs. Other users cannot write to it.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// The folder that this program uses, if the system has one for this user alone.
+/// Returns the folder that this program uses, if the system has one for this user alone.
 pub fn folder() -> Option<PathBuf> {
     by_environment().or_else(by_user)
 }
 
-/// The folders that a program of this user may use, best first.
+/// Returns the folders that a program of this user may use, best first.
 #[cfg(unix)]
 pub(super) fn candidates() -> Vec<PathBuf> {
     by_environment().into_iter().chain(by_user()).collect()
 }
 
-/// All folders of this user: another program may have started with other variables, as under `su` or `cron`, or found a path too long for
-/// a socket.
+/// Returns all folders of this user. Another program may use a different one: started with other variables, as under
+/// `su` or `cron`, or with a path too long for a socket.
 pub fn folders() -> Vec<PathBuf> {
     let given = std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
     let all = own_name().map_or(Vec::new(), |name| all_of(given, &std::env::temp_dir(), &name));
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// The folders with these variables. A runtime folder that is not the usual one keeps its programs apart: then only that one, and the
-/// folder for temporary files, count.
+/// Returns the folders for these variables. A runtime folder other than the usual one isolates its programs: then only
+/// that folder and the folder for temporary files are used.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);
@@ -58,7 +58,7 @@ fn own_name() -> Option<String> {
     None
 }
 
-/// The folder belongs to this user, and no other user can write to it.
+/// Returns `true` if the folder belongs to this user and no other user can write to it.
 #[cfg(unix)]
 pub fn is_own(folder: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
@@ -67,22 +67,22 @@ pub fn is_own(folder: &Path) -> bool {
     })
 }
 
-/// The folder belongs to this user, and no other user can write to it.
+/// Returns `true` if the folder exists; ownership is not checked on this system.
 #[cfg(not(unix))]
 pub fn is_own(folder: &Path) -> bool {
     folder.is_dir()
 }
 
-/// Creates the folder. `None`: no place is there that only this user can write to.
+/// Creates the folder. Returns `None` if no location is writable by this user alone.
 ///
 /// # Errors
 ///
-/// It cannot be created.
+/// Returns an error if the folder cannot be created.
 pub fn create() -> io::Result<Option<PathBuf>> {
     folder().map_or(Ok(None), create_at)
 }
 
-/// Creates this folder, for this user alone.
+/// Creates this folder with access for this user alone.
 pub(super) fn create_at(folder: PathBuf) -> io::Result<Option<PathBuf>> {
     let mut builder = fs::DirBuilder::new();
     #[cfg(unix)]
@@ -98,7 +98,7 @@ pub(super) fn create_at(folder: PathBuf) -> io::Result<Option<PathBuf>> {
 mod tests {
     use super::*;
 
-    /// A program that asks finds the folder of one that started with other variables.
+    /// A client finds the folder of a program that was started with other variables.
     #[test]
     fn the_folders_of_programs_with_other_variables_are_found() {
         let all = |given: Option<&str>, temporary: &str| -> Vec<String> {
@@ -112,7 +112,7 @@ mod tests {
         assert_eq!(all(Some("/run/user/1000"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000/"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000"), "/y"), [runtime, "/y/openjtc-1000", tmp]);
-        // Kept apart.
+        // An unusual runtime folder isolates its programs.
         assert_eq!(all(Some("/z"), "/y"), ["/z/openjtc", "/y/openjtc-1000"]);
         assert_eq!(all(Some("/run/user/0"), "/tmp"), ["/run/user/0/openjtc", tmp]);
     }

@@ -1,4 +1,4 @@
-//! The simulated controller, drives and arm in this process, as a port in virtual time.
+//! Simulated controller, drives and arm in this process, as a port in virtual time.
 
 use std::time::{Duration, Instant};
 
@@ -6,40 +6,40 @@ use jtc_sim::World;
 
 use super::{Port, PortError};
 
-/// Bytes that wait for the line before a write blocks, as in an operating system.
+/// Size of the line's write buffer, bytes, as in an operating system: a write to a full buffer blocks.
 const WRITE_BUFFER: usize = 4096;
 
-/// Called after each simulated millisecond.
+/// Callback after each simulated millisecond.
 type Observer = Box<dyn FnMut(&World)>;
 
-/// A world as a port: waiting lets virtual time pass.
+/// A simulated world as a port: waiting advances virtual time.
 pub struct SimPort {
     world: World,
     observer: Option<Observer>,
 }
 
 impl SimPort {
-    /// A port of `world`.
+    /// Creates a port to `world`.
     pub fn new(world: World) -> Self {
         Self { world, observer: None }
     }
 
-    /// Calls `observer` after each simulated millisecond, for recordings at 1 kHz.
+    /// Sets `observer`, which is called after each simulated millisecond, for recordings at 1 kHz.
     pub fn observe(&mut self, observer: impl FnMut(&World) + 'static) {
         self.observer = Some(Box::new(observer));
     }
 
-    /// The world.
+    /// Returns the world.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// The world, to do something to it.
+    /// Returns the world for modification.
     pub fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// One millisecond.
+    /// Simulates one millisecond.
     pub fn step(&mut self) {
         self.world.step();
         if let Some(observer) = &mut self.observer {
@@ -81,31 +81,31 @@ impl Port for SimPort {
     }
 }
 
-/// Longest simulated time that is made up for at once; after a longer delay (a suspended computer) time goes on from there.
+/// Maximum simulated time to catch up at once; after a longer delay (a suspended computer) the simulation skips the delay.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
-/// A world as a port in the time of this computer, as a real controller would be.
+/// A simulated world as a port in real time, like a real controller.
 pub struct LivePort {
     world: World,
     start: Instant,
-    /// Real time that was left out.
+    /// Real time that the simulation skipped.
     left_out: Duration,
 }
 
 impl LivePort {
-    /// A port of `world`, whose time begins now.
+    /// Creates a port to `world`, whose time begins now.
     pub fn new(world: World) -> Self {
         Self { world, start: Instant::now(), left_out: Duration::ZERO }
     }
 
-    /// Lets the world come up to now.
+    /// Advances the world to the present.
     fn catch_up(&mut self) {
         let world = Duration::from_micros(self.world.now_us());
         let behind = self.now().saturating_sub(world);
         if behind > CATCH_UP {
             self.left_out += behind;
         }
-        // By this clock once: a slow computer is to come out of it.
+        // Reads the clock once, so that the loop ends on a slow computer.
         let now = self.now();
         while Duration::from_micros(self.world.now_us()) < now {
             self.world.step();

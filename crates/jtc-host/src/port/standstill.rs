@@ -1,4 +1,4 @@
-//! Whether an arm stands after a Stop.
+//! Detection of an arm at rest after a Stop.
 
 use std::time::Duration;
 
@@ -7,28 +7,28 @@ use jtc_wire::{ControllerState, Status, TrajectoryState};
 use super::halt::Halt;
 use crate::words;
 
-/// An arm that did not move for this time stands.
+/// Time without motion after which an arm counts as at rest.
 const STILL: Duration = Duration::from_millis(200);
 
-/// The arm follows a path or can be led by hand, or a joint moves under torque.
+/// Returns `true` if the arm follows a path or can be guided by hand, or if a joint moves under torque.
 pub fn is_moving(status: &Status) -> bool {
     status.is_executing()
         || status.state == ControllerState::Teaching
         || (has_torque(status) && words::moving_joint(status).is_some())
 }
 
-/// A trajectory is paused, and can be resumed.
+/// Returns `true` if a trajectory is paused and can be resumed.
 pub fn is_paused(status: &Status) -> bool {
     status.trajectory == TrajectoryState::Pause && has_torque(status)
 }
 
-/// The controller holds or moves the joints.
+/// Returns `true` if the controller holds or moves the joints.
 pub(super) fn has_torque(status: &Status) -> bool {
     use ControllerState::{HoldPos, Operate, Teaching};
     status.state.is_in(&[HoldPos, Operate, Teaching])
 }
 
-/// Watches statuses until the arm stands. An arm that falls without torque does not stand, though no Stop holds it.
+/// Evaluates statuses until the arm is at rest. An arm that falls without torque is not at rest, although no Stop can hold it.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     halt: Halt,
@@ -38,12 +38,12 @@ pub struct Standstill {
 }
 
 impl Standstill {
-    /// Watches what a Stop or Pause brings about.
+    /// Begins to evaluate the statuses after a Stop or Pause.
     pub fn after(halt: Halt) -> Self {
         Self { halt, since: None, reached: false, moved: false }
     }
 
-    /// Takes a status that arrived at this time.
+    /// Evaluates a status that arrived at `now`.
     pub fn see(&mut self, now: Duration, status: &Status) {
         self.moved |= is_moving(status);
         if status.is_executing() || words::moving_joint(status).is_some() || self.is_incomplete(status) {
@@ -53,22 +53,22 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// The arm was still, but a Stop holds it and leaves nothing that can be resumed.
+    /// Returns `true` if a Stop has not taken full effect on a still arm: it must hold the arm and leave no motion that can be resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
     }
 
-    /// The arm must be still for the whole time again.
+    /// Restarts the time for which the arm must be still.
     pub(super) fn begin_again(&mut self) {
         (self.since, self.reached) = (None, false);
     }
 
-    /// The arm stands.
+    /// Returns `true` if the arm is at rest.
     pub fn is_reached(&self) -> bool {
         self.reached
     }
 
-    /// The arm moved at first.
+    /// Returns `true` if the arm moved at first.
     pub fn moved(&self) -> bool {
         self.moved
     }
@@ -86,14 +86,14 @@ mod tests {
         status
     }
 
-    /// The statuses come each 50 ms for a second.
+    /// Evaluates a status each 50 ms for one second.
     fn stands_after(halt: Halt, statuses: impl Fn(u32) -> Status) -> bool {
         let mut standstill = Standstill::after(halt);
         (0..20).for_each(|i| standstill.see(Duration::from_millis(50) * i, &statuses(i)));
         standstill.is_reached()
     }
 
-    /// No arm stands that moves, with torque or without.
+    /// A moving arm is not at rest, with torque or without.
     #[test]
     fn an_arm_that_moves_does_not_stand_in_any_state() {
         for state in [Error, HoldPos, Init, Operate, Start] {
@@ -117,7 +117,7 @@ mod tests {
             assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
             assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
-        // Without torque nothing is resumed.
+        // Without torque no motion can be resumed.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));
     }
 }

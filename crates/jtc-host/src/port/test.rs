@@ -1,12 +1,12 @@
-//! A port whose other end is a closure: for tests and for protocol experiments without a device.
+//! A port whose other end is a closure, for tests and for protocol experiments without a device.
 
 use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::{Port, PortError, line_time};
 
-/// Calls `device(now, bytes)` whenever bytes are written and each virtual millisecond that is waited (then with no bytes); what it
-/// returns is read.
+/// Calls `device(now, bytes)` when bytes are written and after each virtual millisecond of waiting (with no bytes); the
+/// returned bytes are received.
 pub struct ScriptedPort<F> {
     device: F,
     now: Duration,
@@ -16,12 +16,12 @@ pub struct ScriptedPort<F> {
 }
 
 impl<F: FnMut(Duration, &[u8]) -> Vec<u8>> ScriptedPort<F> {
-    /// A port in front of `device`. With a `baud`, writing takes virtual time.
+    /// Creates a port to `device`. If `baud` is set, writing takes virtual time.
     pub fn new(baud: Option<u32>, device: F) -> Self {
         Self { device, now: Duration::ZERO, inbox: VecDeque::new(), baud, written: Vec::new() }
     }
 
-    /// All bytes written so far.
+    /// Returns all bytes written so far.
     pub fn written(&self) -> &[u8] {
         &self.written
     }

@@ -1,4 +1,4 @@
-//! Where a run was broken off, as its recording shows it.
+//! Point at which a run was interrupted, according to its recording.
 
 use std::sync::Arc;
 
@@ -10,42 +10,44 @@ use super::Recording;
 use crate::sample::Sample;
 use crate::trajectory::Trajectory;
 
-/// The arm comes to rest within this time after a stop, ms of path time.
+/// Maximum path time in which the arm comes to rest after a stop, ms.
 const RAMP_MS: u32 = 1000;
-/// A measured position is that of a path at rest to this, rad.
+/// Maximum distance of a measured position from a path position at rest, rad.
 const AT_REST: f64 = 0.01;
-/// Commanded positions of a recording are those of its trajectory to this, rad.
+/// Maximum distance of the commanded positions of a recording from its trajectory, rad.
 const SAME: f64 = 2e-3;
 
-/// How far a run got along its path, as far as its recording proves it.
+/// Progress of a run along its path, as far as its recording proves it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BrokenOff {
-    /// Path time of the last place that the recording shows, ms; 0 where the motion had not begun.
+    /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
     pub last_ms: u32,
 }
 
-/// Where to go on with a run.
+/// Point at which a run can be resumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resumption {
     /// Path time, ms.
     pub ms: u32,
-    /// The controller itself shows this place: it went on when nobody recorded it. Else it is the last one of the recording.
+    /// `true` if the controller itself reports this point because the motion continued without a recording; `false` if
+    /// the recording shows it.
     pub shown: bool,
-    /// The arm stands there.
+    /// `true` if the arm is at this point.
     pub stands: bool,
 }
 
 impl BrokenOff {
-    /// Where to go on with the run on `trajectory`, of which nothing may be left out: the last place that the recording shows, or a later
-    /// one where the controller's `status` shows that it went on by itself, which is where the arm stands, too. That an arm stands
-    /// anywhere on the rest of the path proves nothing: it may have been brought there. A controller that was started anew, or that
-    /// was given another motion, shows no place of this one; nor does one that was stopped, whose points begin anew.
+    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part: the last position
+    /// that the recording shows. A later point counts if the controller's `status` shows that the motion continued, and
+    /// the arm is there. An arm at rest anywhere on the remaining path proves nothing, because a user may have moved it
+    /// there. A controller that was restarted or received another motion shows no point of this one; neither does a
+    /// stopped controller, whose points begin again.
     ///
-    /// `tolerance` (rad) is how far from a place an arm may be and stand there.
+    /// `tolerance` (rad) is the maximum distance of the arm from a point at which it counts as being there.
     ///
     /// # Errors
     ///
-    /// [`NothingLeft::Finished`]: the controller shows the end of the path.
+    /// [`NothingLeft::Finished`] if the controller shows the end of the path.
     pub fn resumption(
         &self,
         trajectory: &Trajectory,
@@ -55,7 +57,7 @@ impl BrokenOff {
         let (end_ms, q) = (end_ms(trajectory), status.positions());
         let stands_at = |ms: u32| trajectory.at_ms(ms).is_some_and(|at| away(&at.position, &q) <= tolerance);
         let on_its_way = status.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
-        // A motion finishes at its own end only.
+        // A motion finishes only at its own end.
         let at_end = status.trajectory == TrajectoryState::Finish && status.point == end_ms;
         let shown = (on_its_way || at_end) && status.point >= self.last_ms && stands_at(status.point);
         let ms = if shown { status.point } else { self.last_ms };
@@ -66,29 +68,29 @@ impl BrokenOff {
     }
 }
 
-/// Path time of the last point, ms.
+/// Returns the path time of the last point, ms.
 fn end_ms(trajectory: &Trajectory) -> u32 {
     (trajectory.duration_s() * 1e3).round() as u32
 }
 
-/// Of the joint that is furthest, rad.
+/// Returns the distance of the joint that is furthest away, rad.
 fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
-    // A joint that is not known is at no place.
+    // An unknown joint position counts as infinitely far away.
     let far = |(a, b): (&f64, &f64)| if (a - b).is_nan() { f64::INFINITY } else { (a - b).abs() };
     a.iter().zip(b).map(far).fold(0.0, f64::max)
 }
 
-/// There is nothing to go on with.
+/// Reason why no part of a run remains to be resumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NothingLeft {
-    /// The run came to its end.
+    /// The run reached its end.
     #[error("the run came to its end: nothing is left of it")]
     Finished,
-    /// The recording holds no motion.
+    /// The recording contains no motion.
     #[error("the recording holds no execution of this trajectory")]
     NoExecution,
-    /// What was commanded is not on this trajectory.
+    /// The commanded positions are not on this trajectory.
     #[error("the recording is of another trajectory, or of this one at another speed")]
     Other,
 }
@@ -107,12 +109,12 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// How far the last run of this recording got along `trajectory`: to its last sample in motion or, where it was stopped, to the place
-    /// behind that at which the recording shows the arm at rest.
+    /// Returns the progress of the last run of this recording along `trajectory`: up to its last sample in motion or,
+    /// after a stop, up to the later position at which the recording shows the arm at rest.
     ///
     /// # Errors
     ///
-    /// [`NothingLeft`]: it came to its end, is no run, or one of another trajectory.
+    /// Returns [`NothingLeft`] if the run reached its end, if the recording contains no run, or if the run is of another trajectory.
     pub fn broken_off(&self, trajectory: &Trajectory) -> Result<BrokenOff, NothingLeft> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let number = self.samples.iter().rposition(moving).ok_or(NothingLeft::NoExecution)?;
@@ -126,7 +128,7 @@ impl Recording {
             let own = |of: Option<&Arc<Trajectory>>| of.is_some_and(|own| **own == *trajectory);
             let own = own(info.and_then(|info| info.commanded.as_ref()))
                 || own(info.and_then(|info| info.then.as_ref()));
-            // The way to the first point of its own trajectory: nothing of that was run.
+            // The interrupted motion was the approach to the first point: no part of the trajectory itself was run.
             return if own { Ok(BrokenOff { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
         if is_end || last.point >= end_ms(trajectory) {
@@ -137,8 +139,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// How many runs of a motion that was repeated came to their end: the first of `first`, the others of `then`. Approaches between them
-    /// are none.
+    /// Returns the number of completed runs of a repeated motion: the first run on `first`, the others on `then`.
+    /// Approaches between them do not count.
     pub fn runs_finished(&self, first: &Trajectory, then: &Trajectory) -> u32 {
         let mut finished = 0;
         for (leg, ended) in self.executions() {
@@ -148,14 +150,15 @@ impl Recording {
         finished
     }
 
-    /// The samples of each execution, and whether it came to its end: there is another one behind it, or the controller shows it.
+    /// Returns the samples of each execution, and `true` if it reached its end: another execution follows, or the
+    /// controller reports the end.
     fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let mut all: Vec<(Vec<&Sample>, bool)> = Vec::new();
         for sample in &self.samples {
             match all.last_mut() {
                 Some((leg, ended)) if moving(sample) && !*ended => match leg.last() {
-                    // Its points begin anew.
+                    // The point index starts again.
                     Some(before) if sample.point < before.point => {
                         *ended = true;
                         all.push((vec![sample], false));
@@ -174,8 +177,8 @@ impl Recording {
     }
 }
 
-/// The path time at which a stop brought the arm to rest, ms: the first place behind the last one in motion (`last_ms`) where the path is as
-/// the arm then stood. Without torque an arm leaves its path, and proves nothing.
+/// Returns the path time at which a stop brought the arm to rest, ms: the first position after the last one in motion
+/// (`last_ms`) that matches the arm at rest. Without torque an arm leaves its path and proves nothing.
 fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
     let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
     let rest = behind.last().filter(|_| behind.iter().all(held))?;
@@ -188,7 +191,7 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
         let far = away(&trajectory.at_ms(ms)?.position, &stood);
         match nearest {
             Some((_, least)) if far < least => nearest = Some((ms, far)),
-            // The path has left the place again: a later passage is another one.
+            // The path has left this position again: a later pass does not count.
             Some(_) if far > AT_REST => break,
             None if far <= AT_REST => nearest = Some((ms, far)),
             _ => {}
@@ -197,12 +200,12 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
     nearest.map(|(ms, _)| ms)
 }
 
-/// What was commanded then is the trajectory's; of a recording that does not hold it, where the arm was.
+/// Returns `true` if the commanded position of the sample is on the trajectory; without commanded positions, compares the measured ones.
 fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
     let Some(at) = trajectory.at_ms(sample.point) else { return false };
     (0..JOINTS).all(|j| {
         let joint = &sample.joints[j];
-        // Measured positions lag behind and are off by the tracking error.
+        // Measured positions lag and contain the tracking error.
         let (value, same) =
             if joint.set_position.is_finite() { (joint.set_position, SAME) } else { (joint.position, 0.1) };
         (value - at.position[j]).abs() <= same
@@ -216,7 +219,7 @@ mod tests {
     use crate::example::demo_motion;
     use crate::trajectory::Point;
 
-    /// Samples of the demo's motion at these points, with their states.
+    /// Returns samples of the demo's motion at these points, with their states.
     fn recording(points: &[(u32, TrajectoryState)], outcome: &str) -> Recording {
         recording_of(&demo_motion(), points, outcome)
     }
@@ -242,7 +245,7 @@ mod tests {
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(BrokenOff { last_ms });
-        // The link was lost, the program killed, or the controller ended it.
+        // The link was lost, the program was killed, or the controller ended the run.
         for outcome in ["", "fault"] {
             assert_eq!(of(&way, outcome), at(4_000));
         }
@@ -251,17 +254,17 @@ mod tests {
         assert_eq!(of(&paused, "stopped"), at(4_300));
         assert_eq!(of(&[&way[..], &[(10_000, Finish)]].concat(), "finished"), Err(NothingLeft::Finished));
         assert_eq!(of(&[(0, Stop)], "stopped"), Err(NothingLeft::NoExecution));
-        // Its points are those of another path.
+        // The points belong to another path.
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
         assert_eq!(approach.broken_off(&demo_motion()), Err(NothingLeft::Other));
-        // Unless that is the recording's own: it was on the way to its first point.
+        // Unless the trajectory is the recording's own: then the arm was approaching its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
         assert_eq!(approach.broken_off(&demo_motion()), at(0));
     }
 
-    /// Runs are counted by their ends, approaches between them left out; the first one may be the rest of a run.
+    /// Completed runs are counted, approaches between them are not; the first run may be the remainder of a run.
     #[test]
     fn runs_of_a_repeated_motion_are_counted() {
         use TrajectoryState::{Execute, Finish, Stop};
@@ -277,7 +280,7 @@ mod tests {
             }
         };
         let run = || recording(&whole, "");
-        // Statuses come every 40 ms, and the end of a run may be in none of them.
+        // Statuses arrive every 40 ms, and possibly none of them shows the end of a run.
         let unseen = || recording(&whole[..3], "");
         let part = || recording(&whole[..2], "");
         let approach = || recording_of(&other, &[(0, Execute), (9_960, Execute), (10_000, Finish)], "");
@@ -301,13 +304,13 @@ mod tests {
                 parts.len()
             );
         }
-        // The rest of a run, then two whole ones.
+        // The remainder of a run, then two complete ones.
         let rest = joined(&[approach(), run(), part()], "stopped");
         assert_eq!(rest.runs_finished(&other, &demo), 2);
         assert_eq!(rest.broken_off(&demo), Ok(BrokenOff { last_ms: 5_000 }));
     }
 
-    /// A controller that was stopped is at its start again (point 0); where the arm came to rest shows its place.
+    /// A stopped controller is at its start again (point 0); the position at rest shows the progress.
     #[test]
     fn a_stop_proves_the_place_at_which_the_arm_came_to_rest() {
         use TrajectoryState::{Execute, Stop};
@@ -325,9 +328,9 @@ mod tests {
             let found = stood(3_400, ms).broken_off(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // It turned round meanwhile, and is where it was before: the turn is run again rather than left out.
+        // The path turned back meanwhile, and the arm is at an earlier position: the turn is run again rather than left out.
         assert!(stood(4_900, 5_100).broken_off(&path).unwrap().last_ms < 4_920);
-        // Elsewhere on the path, beside it, or without torque nothing is proved.
+        // Elsewhere on the path, away from it, or without torque the position proves nothing.
         let elsewhere = stood(3_400, 12_000);
         let (mut beside, mut error) = (stood(3_400, 3_700), stood(3_400, 3_700));
         beside.samples[2].joints[3].position += 0.05;
@@ -350,14 +353,14 @@ mod tests {
         status
     }
 
-    /// An arm that stands on the rest of its path has not been there on its way unless the controller shows that.
+    /// An arm on the remaining path counts as having moved there in this run only if the controller shows it.
     #[test]
     fn only_what_is_proved_counts_as_done() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let (path, broken) = (back_and_forth(), BrokenOff { last_ms: 3_400 });
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
-        // Started anew, stopped, or moved meanwhile: at 0 rad it is where the path is after 15 s, at −0.5 where it ends.
+        // Restarted, stopped, or moved by a user: at 0 rad the arm is at the path's position of 15 s, at −0.5 rad at its end.
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -369,13 +372,13 @@ mod tests {
                 );
             }
         }
-        // It went on by itself.
+        // The motion continued by itself.
         for trajectory in [Execute, Pause] {
             let on = at(&status(trajectory, 8_000, 0.7));
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
         }
         assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
-        // At the end of a closed path an arm stands before it as well.
+        // At the end of a closed path an arm is also at its start.
         assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 

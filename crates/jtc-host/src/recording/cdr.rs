@@ -1,6 +1,6 @@
 //! Little-endian CDR, the encoding of ROS 2 messages: each value aligned to its size, counted after the 4-byte header.
 
-/// Writes one message.
+/// Encoder of a message.
 #[derive(Default)]
 pub(super) struct Encoder {
     bytes: Vec<u8>,
@@ -9,7 +9,7 @@ pub(super) struct Encoder {
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
 impl Encoder {
-    /// Starts a message, reusing the memory of the last one.
+    /// Starts a message, reusing the memory of the previous one.
     pub(super) fn start(&mut self) -> &mut Self {
         self.bytes.clear();
         self.bytes.extend(HEADER);
@@ -55,13 +55,13 @@ impl Encoder {
         self.u8(0)
     }
 
-    /// A sequence: its length, then its values.
+    /// Writes a sequence: its length, then its values.
     pub(super) fn f64s(&mut self, values: [f64; 6]) -> &mut Self {
         self.u32(6);
         self.array(values)
     }
 
-    /// A fixed array: values only.
+    /// Writes a fixed-length array: values only.
     pub(super) fn array(&mut self, values: [f64; 6]) -> &mut Self {
         for v in values {
             self.f64(v);
@@ -69,20 +69,20 @@ impl Encoder {
         self
     }
 
-    /// `std_msgs/Header` with a time stamp in ns since 1970.
+    /// Writes a `std_msgs/Header` with a time stamp in ns since 1970.
     pub(super) fn header(&mut self, stamp_ns: u64, frame: &str) -> &mut Self {
         self.u32((stamp_ns / 1_000_000_000) as u32).u32((stamp_ns % 1_000_000_000) as u32).string(frame)
     }
 }
 
-/// Reads one message; every method is `None` past its end.
+/// Decoder of a message; every method returns `None` after its end.
 pub(super) struct Decoder<'a> {
     body: &'a [u8],
     at: usize,
 }
 
 impl<'a> Decoder<'a> {
-    /// `None` unless the message is little-endian CDR.
+    /// Creates a decoder; returns `None` unless the message is little-endian CDR.
     pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
         let body = bytes.strip_prefix(&HEADER[..2])?.get(2..)?;
         Some(Self { body, at: 0 })
@@ -133,7 +133,7 @@ impl<'a> Decoder<'a> {
         Some(values)
     }
 
-    /// A sequence: its first six values, NaN where it has fewer.
+    /// Reads a sequence and returns its first six values, with NaN for missing ones.
     pub(super) fn f64s(&mut self) -> Option<[f64; 6]> {
         let mut values = [f64::NAN; 6];
         let len = self.u32()? as usize;

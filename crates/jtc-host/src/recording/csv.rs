@@ -1,5 +1,6 @@
-//! CSV files: a header with units, then one row a sample; an unknown value is an empty field. The end of a run that was not finished stands in
-//! lines that begin with `#`, behind all rows: readers that know no comments have the whole table before them.
+//! CSV files: a header with units, then one row per sample; an unknown value is an empty field. If a run was not
+//! finished, comment lines that begin with `#` report its end. The comments follow all rows, so that a reader without
+//! support for comments gets the whole table first.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -10,7 +11,7 @@ use jtc_wire::{Code, NodeState};
 use super::{Ending, Found, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
-/// A number of a joint: column name after `q1_`…, and how to reach it.
+/// A value of a joint: column name after `q1_`…, and its accessor.
 type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
 
 const COLUMNS: [Column; 13] = [
@@ -31,12 +32,12 @@ const COLUMNS: [Column; 13] = [
 
 const SAMPLE_COLUMNS: [&str; 6] = ["time_s", "state", "tes", "point", "errors", "can_current"];
 
-/// How the comments at the end begin.
+/// Prefixes of the comments at the end.
 const OUTCOME: &str = "# outcome: ";
 const REASON: &str = "# reason: ";
 const LOST: &str = "# lost samples: ";
 
-/// Writes samples as rows.
+/// Writer of samples as rows.
 pub(super) struct CsvWriter<W: Write> {
     out: W,
     row: String,
@@ -106,7 +107,7 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 }
 
-/// To the ninth decimal: 1 nrad, far below what any sensor resolves, at half the size of all digits.
+/// Formats a number with nine decimals: 1 nrad, far below the resolution of any sensor, at half the size of all digits.
 fn number(row: &mut String, value: f64) {
     use std::fmt::Write as _;
     if value.is_finite() {
@@ -115,10 +116,10 @@ fn number(row: &mut String, value: f64) {
     }
 }
 
-/// Longest line that is read: ours have some 1,500 bytes.
+/// Maximum length of a line, bytes: the writer's lines have about 1,500.
 const LINE_MAX: u64 = 1 << 20;
 
-/// Where the values of a column go.
+/// Destination of the values of a column.
 #[derive(Clone, Copy)]
 enum Target {
     Time,
@@ -127,11 +128,11 @@ enum Target {
     Point,
     Errors,
     CanCurrent,
-    /// Joint, and its place in [`COLUMNS`].
+    /// Joint, and index in [`COLUMNS`].
     Value(usize, usize),
     Node(usize),
     Internal(usize),
-    /// Not known: passed over.
+    /// Unknown column, ignored.
     Other,
 }
 
@@ -158,7 +159,7 @@ impl Target {
         }
     }
 
-    /// Puts the text of a field there; `None` where it is no number.
+    /// Stores the text of a field in the sample; returns `None` if the text is not a valid number.
     fn put(self, sample: &mut Sample, field: &[u8]) -> Option<()> {
         match self {
             Self::Time => sample.time_s = decimal(field)?,
@@ -184,8 +185,8 @@ fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// A number as [`str::parse`] reads it, faster where it is as short as ours are: digits that a float holds exactly, divided by a power of
-/// ten that it holds exactly, are rounded once (Clinger 1990).
+/// Parses a number like [`str::parse`], but faster for short numbers such as those of the writer. If a float holds both
+/// the digits and the power of ten exactly, their quotient is rounded only once (Clinger 1990).
 fn decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
@@ -211,7 +212,7 @@ fn decimal(field: &[u8]) -> Option<f64> {
     whole(field)
 }
 
-/// The lines of a file, of which the last may be without its end.
+/// Reader of a file's lines; the last line may be incomplete.
 struct Lines<R> {
     file: R,
     line: Vec<u8>,
@@ -219,7 +220,7 @@ struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// The next line without its end, and whether it has one; `None` behind the last.
+    /// Returns the next line without its line end, and `true` if the line end was present; `None` after the last line.
     fn next(&mut self) -> Result<Option<(&[u8], bool)>, RecordingError> {
         self.line.clear();
         self.number += 1;
@@ -237,7 +238,7 @@ fn failure(line: usize, column: Option<&str>, problem: &'static str) -> Recordin
     RecordingError::Line { path: PathBuf::new(), line, column: column.map(str::to_owned), problem }
 }
 
-/// Reads rows back, one after the other; columns may stand in any order, unknown ones are passed over, missing ones leave values unknown.
+/// Reads rows in order. Columns may be in any order; unknown columns are ignored, and missing ones leave values unknown.
 pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<Found, RecordingError> {
     let mut lines = Lines { file, line: Vec::new(), number: 0 };
     let Some((header, _)) = lines.next()? else {
@@ -254,7 +255,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     while let Some((row, ended)) = lines.next()? {
         let row = row.trim_ascii();
         if !ended {
-            // Every line that was written whole has its end.
+            // Every completely written line has a line end.
             within_line = !row.is_empty();
             break;
         }
@@ -288,7 +289,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     Ok(Found { info: None, ending, cut: cut.map(str::to_owned) })
 }
 
-/// How the run ended.
+/// Reads the end of the run from a comment.
 fn take_comment(ending: &mut Ending, row: &str) {
     for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
         if let Some(text) = row.strip_prefix(head) {

@@ -1,67 +1,67 @@
-//! What can go wrong with a recording.
+//! Errors of recordings.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Why a recording could not be written or read.
+/// Reason why a recording could not be written or read.
 #[derive(Debug)]
 pub enum RecordingError {
-    /// The ending of the file name is neither `.mcap` nor `.csv`.
+    /// The extension of the file name is neither `.mcap` nor `.csv`.
     UnknownFormat {
         /// The file.
         path: PathBuf,
     },
-    /// An MCAP file, and this program was built without the feature `mcap`.
+    /// The file is an MCAP file, but this program was built without the feature `mcap`.
     BuiltWithout {
         /// The file.
         path: PathBuf,
     },
-    /// Nothing is in the file.
+    /// The file is empty.
     Empty {
         /// The file.
         path: PathBuf,
     },
-    /// The operating system refused.
+    /// The operating system reported an error.
     Io {
         /// The file.
         path: PathBuf,
-        /// Its error.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A CSV line that cannot be understood.
+    /// A CSV line cannot be parsed.
     Line {
         /// The file.
         path: PathBuf,
-        /// Line number from 1.
+        /// Line number, counted from 1.
         line: usize,
-        /// Column name, where one is to blame.
+        /// Column name, if the error is in a column.
         column: Option<String>,
-        /// What is wrong with it.
+        /// Problem found.
         problem: &'static str,
     },
-    /// Not a sound MCAP file.
+    /// The file is not a valid MCAP file.
     Mcap {
         /// The file.
         path: PathBuf,
-        /// What the reader found.
+        /// Problem that the reader found.
         problem: String,
     },
-    /// Messages of an MCAP file stand far from the order of their times.
+    /// Messages of an MCAP file are far out of order of their times.
     Disorder {
         /// The file.
         path: PathBuf,
-        /// Log time of the first that comes too late, s.
+        /// Log time of the first message that is too late, s.
         time_s: f64,
     },
-    /// A message of a known topic that is shorter than its schema.
+    /// A message of a known topic is shorter than its schema requires.
     Message {
         /// The file.
         path: PathBuf,
-        /// Its topic.
+        /// Topic of the message.
         topic: String,
-        /// Its log time, s.
+        /// Log time of the message, s.
         time_s: f64,
     },
 }
@@ -71,7 +71,7 @@ impl RecordingError {
         RecordingError::Io { path: path.to_owned(), source }
     }
 
-    /// The same error with the file it is about.
+    /// Returns the error with the path of the file set.
     pub(super) fn at(mut self, file: &Path) -> Self {
         let (RecordingError::UnknownFormat { path }
         | RecordingError::BuiltWithout { path }

@@ -1,17 +1,17 @@
-//! Where the links of the arm are, as the transforms that viewers know: each joint's frame in that before it, named as in the description.
+//! Poses of the arm's links as transforms for viewers: each joint's frame in its parent frame, named as in the description.
 
 use super::RecordingInfo;
 use super::cdr::Encoder;
 use crate::arm::frame_name;
 use crate::sample::Sample;
 
-/// Transforms are written as often as this at most, ns: what a viewer shows.
+/// Minimum interval between transforms, ns: the display rate of a viewer.
 const EVERY_NS: u64 = 20_000_000;
 
 /// A rotation as a unit quaternion: x, y, z, w.
 type Quaternion = [f64; 4];
 
-/// First `b`, then `a`.
+/// Returns the rotation `b` followed by `a`.
 fn product(a: Quaternion, b: Quaternion) -> Quaternion {
     let ([ax, ay, az, aw], [bx, by, bz, bw]) = (a, b);
     [
@@ -22,7 +22,7 @@ fn product(a: Quaternion, b: Quaternion) -> Quaternion {
     ]
 }
 
-/// By an angle, rad, about axis 0, 1 or 2.
+/// Returns the rotation by an angle, rad, about axis 0, 1 or 2.
 fn about(axis: usize, angle: f64) -> Quaternion {
     let (sin, cos) = (0.5 * angle).sin_cos();
     let mut turned = [0.0, 0.0, 0.0, cos];
@@ -30,12 +30,12 @@ fn about(axis: usize, angle: f64) -> Quaternion {
     turned
 }
 
-/// Roll, pitch and yaw about fixed axes, as a URDF has them.
+/// Returns the rotation for roll, pitch and yaw about fixed axes, as in a URDF.
 fn from_rpy([roll, pitch, yaw]: [f64; 3]) -> Quaternion {
     product(about(2, yaw), product(about(1, pitch), about(0, roll)))
 }
 
-/// A frame in the one before it.
+/// A frame with its pose in the parent frame.
 struct Placed {
     xyz: [f64; 3],
     rotation: Quaternion,
@@ -43,15 +43,15 @@ struct Placed {
     child: String,
 }
 
-/// Writes `tf2_msgs/msg/TFMessage`.
+/// Writer of `tf2_msgs/msg/TFMessage`.
 pub(super) struct Frames {
-    /// The six joints, and the flange, which does not move.
+    /// The six joints and the flange, which is fixed.
     placed: [Placed; 7],
     last: Option<u64>,
 }
 
 impl Frames {
-    /// Those of the arm.
+    /// Creates the frames of the arm.
     pub(super) fn of(info: &RecordingInfo) -> Self {
         let placed = |i: usize| {
             let [x, y, z, roll, pitch, yaw] = info.joints.get(i).map_or(info.flange, |joint| joint.origin);
@@ -65,7 +65,7 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// The message of a sample, if one is due; joints whose position is not known are left out of it.
+    /// Writes the message of a sample, if one is due; leaves out joints with an unknown position.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,
@@ -79,7 +79,7 @@ impl Frames {
             return None;
         }
         self.last = Some(turn);
-        // The flange is always known.
+        // The pose of the flange is always known.
         cdr.start().u32(known as u32 + 1);
         for (i, placed) in self.placed.iter().enumerate().filter(|(i, _)| position(*i).is_finite()) {
             cdr.header(stamp_ns, &placed.parent).string(&placed.child);

@@ -1,43 +1,43 @@
-//! Samples put together from their messages, in the order of their times, whatever the order in the file.
+//! Reassembly of samples from their messages, in order of their times, for any order in the file.
 
 use std::collections::VecDeque;
 
 use crate::sample::Sample;
 
-/// A sample in the making.
+/// An incomplete sample.
 struct Gathered {
     time_ns: u64,
     sample: Sample,
-    /// Which of its messages have come, a bit each.
+    /// Messages received so far, one bit each.
     came: u8,
 }
 
-/// Gives out samples when so many later ones have come that none of their messages is expected any more.
+/// Reassembles samples. Releases the oldest sample when the buffer of `room` samples is full, because no further message of it is expected.
 ///
-/// A recording of ours has the messages of a sample one behind the other. Programs that write a file anew may put those of each topic
-/// together: what is a chunk apart is found all the same.
+/// A recording of this project stores the messages of a sample consecutively. A program that rewrites a file may group
+/// messages by topic; messages up to a chunk apart are still matched.
 pub(super) struct Gatherer {
-    /// By time.
+    /// Incomplete samples, sorted by time.
     waiting: VecDeque<Box<Gathered>>,
     room: usize,
-    /// Time of the last sample that was given out.
+    /// Time of the last released sample.
     given_ns: Option<u64>,
-    /// Most messages that a sample has had.
+    /// Largest number of messages of a sample so far.
     most: u32,
     spare: Option<Box<Gathered>>,
 }
 
-/// A message belongs to a sample that was given out already, or to one before it.
+/// Error: the message belongs to a released sample or to an earlier one.
 #[derive(Debug)]
 pub(super) struct Late;
 
 impl Gatherer {
-    /// So many samples wait for messages of theirs.
+    /// Creates a buffer for `room` incomplete samples.
     pub(super) fn new(room: usize) -> Self {
         Self { waiting: VecDeque::new(), room, given_ns: None, most: 0, spare: None }
     }
 
-    /// The sample of this time, which `bit` is of; what is given out for it goes to `give`.
+    /// Returns the sample of this time, to which the message `bit` belongs; passes a sample that is released for it to `give`.
     pub(super) fn at(
         &mut self,
         time_ns: u64,
@@ -78,12 +78,13 @@ impl Gatherer {
         }
     }
 
-    /// Nothing has come.
+    /// Returns `true` if no message has been received.
     pub(super) fn is_empty(&self) -> bool {
         self.waiting.is_empty() && self.given_ns.is_none()
     }
 
-    /// The file is at its end. Of one that breaks off (`cut`), the last sample may be without some of its messages: then it is none.
+    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), drops the last sample
+    /// if messages are missing.
     pub(super) fn finish(mut self, cut: bool, give: &mut dyn FnMut(u64, Sample)) {
         if cut && self.waiting.back().is_some_and(|last| last.came.count_ones() < self.most) {
             self.waiting.pop_back();
@@ -100,7 +101,7 @@ mod tests {
 
     use super::*;
 
-    /// Messages of topics that are as far apart as there is room come together, in the order of time; none is lost.
+    /// Messages of topics up to `room` samples apart are matched, in order of time, and none is lost.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Gatherer::new(room);
         let mut given = Vec::new();

@@ -1,4 +1,4 @@
-//! The description that a recording carries: the arm, its limits, where the samples come from.
+//! The header of a recording: the arm, its limits, and the source of the samples.
 
 use std::sync::Arc;
 
@@ -7,20 +7,20 @@ use jtc_wire::Info;
 
 use crate::{Arm, Trajectory};
 
-/// One joint's name and limits.
+/// Name and limits of a joint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointInfo {
-    /// As in the arm file.
+    /// Name as in the arm file.
     pub name: String,
-    /// Lowest position, rad.
+    /// Minimum position, rad.
     pub position_min_rad: f64,
-    /// Highest position, rad.
+    /// Maximum position, rad.
     pub position_max_rad: f64,
-    /// Highest speed, rad/s.
+    /// Maximum speed, rad/s.
     pub velocity_max_rad_s: f64,
-    /// Highest torque, N·m.
+    /// Maximum torque, N·m.
     pub torque_max_nm: f64,
-    /// Largest tracking error, rad.
+    /// Maximum tracking error, rad.
     pub position_error_max_rad: f64,
     /// Origin of the joint in its parent's frame: x, y, z in m, then roll, pitch, yaw in rad.
     pub origin: [f64; 6],
@@ -40,32 +40,32 @@ impl Default for JointInfo {
     }
 }
 
-/// How the run ended that a recording is of; empty where nobody wrote it down.
+/// End of the recorded run; empty if the recording does not contain it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ending {
     /// `finished`, `stopped` or `fault`.
     pub outcome: String,
-    /// Why it did not come to its end, in words.
+    /// Reason why the run did not reach its end, as text.
     pub reason: String,
-    /// Samples that the disk did not take in time.
+    /// Number of samples lost because the disk was too slow.
     pub lost_samples: u64,
 }
 
 impl Ending {
-    /// The run failed.
+    /// Returns `true` if the run failed.
     pub fn is_fault(&self) -> bool {
         self.outcome == "fault"
     }
 }
 
-/// The device that samples come from.
+/// Identity of the device that the samples come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceIdentity {
-    /// The board.
+    /// Board.
     pub board: String,
-    /// Version of its firmware.
+    /// Version of the firmware.
     pub firmware: String,
-    /// Its git revision.
+    /// Git revision of the firmware.
     pub revision: String,
 }
 
@@ -79,43 +79,43 @@ impl From<&Info> for DeviceIdentity {
     }
 }
 
-/// Where samples come from and what they belong to.
+/// Source and context of the samples.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RecordingInfo {
     /// Name of the arm.
     pub arm: String,
     /// "simulator", or the serial port.
     pub source: String,
-    /// Who commanded the motion, where several may; empty otherwise.
+    /// Client that commanded the motion, if several clients share the line; else empty.
     pub commanded_by: String,
     /// Name of the trajectory.
     pub trajectory: String,
-    /// Wall-clock time of sample time 0, ns since 1970; 0 when virtual time was recorded.
+    /// Wall-clock time of sample time 0, ns since 1970; 0 for a recording in virtual time.
     pub start_unix_ns: u64,
-    /// Base to wrist.
+    /// Joints, base to wrist.
     pub joints: [JointInfo; 6],
     /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
-    /// The arm as a robot description (URDF), in MCAP files: with it they hold where each link is, too.
+    /// Robot description (URDF) of the arm, in MCAP files; if present, the file also contains the pose of each link.
     pub description: Option<Arc<str>>,
     /// Gains, base to wrist, in MCAP files.
     pub gains: Option<[PidGains; JOINTS]>,
-    /// Hash of all that decides how the arm moves (J-52), in MCAP files.
+    /// Hash of all parameters that determine the arm's motion (J-52), in MCAP files.
     pub hash: Option<u64>,
-    /// The controller, in MCAP files; `None` where it did not report what it is.
+    /// Controller, in MCAP files; `None` if it did not report its identity.
     pub device: Option<DeviceIdentity>,
-    /// How the run ended.
+    /// End of the run.
     pub ending: Ending,
-    /// The whole trajectory that the run is of, in MCAP files: what is needed to go on where it was broken off.
+    /// Complete trajectory of the run, in MCAP files; needed to resume an interrupted run.
     pub commanded: Option<Arc<Trajectory>>,
-    /// How often a motion was to be run, the first one included, in MCAP files; `None` where nobody wrote it down.
+    /// Requested number of runs of the motion, including the first, in MCAP files; `None` if not recorded.
     pub runs: Option<u32>,
-    /// What all but the first are runs of, where that is not `commanded`: the first one was the rest of a run.
+    /// Trajectory of all runs but the first, if not `commanded`: the first run was then the remainder of a run.
     pub then: Option<Arc<Trajectory>>,
 }
 
 impl RecordingInfo {
-    /// Names, limits, gains and frames of an arm; source, trajectory, start time and ending are left empty.
+    /// Returns names, limits, gains and frames of an arm; leaves source, trajectory, start time and ending empty.
     pub fn of(arm: &Arm) -> Self {
         let origin = |i: usize| {
             let o = &arm.model.joints[i];
@@ -135,13 +135,13 @@ impl RecordingInfo {
             flange: origin(6),
             description: Some(arm.to_urdf().into()),
             gains: arm.pid,
-            // One that has no image has none.
+            // An arm without an image has no hash.
             hash: arm.hash().ok().flatten(),
             ..Self::default()
         }
     }
 
-    /// The name of joint `j`, `joint_1` and so on when it has none.
+    /// Returns the name of joint `j`, or `joint_1` and so on if it has none.
     pub fn joint_name(&self, j: usize) -> String {
         match self.joints.get(j) {
             Some(joint) if !joint.name.is_empty() => joint.name.clone(),

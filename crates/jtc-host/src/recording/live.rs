@@ -1,6 +1,6 @@
-//! A recording that is written while it is made, so that a program that is killed loses no more than its last moments.
+//! A recording that is written during the run, so that a killed program loses only its last moments.
 //!
-//! A thread of its own writes: a disk that is slow or full never holds up whoever follows an arm.
+//! A separate thread writes: a slow or full disk does not delay the caller.
 
 use std::fs::File;
 use std::path::Path;
@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use super::{Ending, Recorder, RecordingError, RecordingInfo};
 use crate::sample::Sample;
 
-/// What was recorded is handed to the operating system after this time at the latest.
+/// Maximum delay until recorded samples are written to the operating system.
 pub const FLUSH: Duration = Duration::from_millis(200);
-/// Samples that wait for a disk that does not take them: 16 s of a simulator, many minutes of a serial line.
+/// Maximum number of samples that wait for the disk: 16 s of a simulator, many minutes of a serial line.
 const WAITING_MAX: usize = 1 << 14;
 
 enum Message {
@@ -22,26 +22,26 @@ enum Message {
     Abandon,
 }
 
-/// Takes samples while they are made.
+/// Receiver of samples during the run.
 #[derive(Clone)]
 pub struct SampleSink(SyncSender<Message>);
 
 impl SampleSink {
-    /// Hands a sample over. What follows an error is dropped: the error was reported when it happened.
+    /// Passes a sample to the recorder. Drops the samples after an error, which was reported when it occurred.
     pub fn write(&self, sample: &Sample) {
         let _ = self.0.send(Message::Sample(Box::new(*sample)));
     }
 }
 
-/// A recording in the making.
+/// A recording in progress.
 pub struct LiveRecorder {
     sink: SampleSink,
     thread: JoinHandle<Result<u64, RecordingError>>,
 }
 
 impl LiveRecorder {
-    /// Writes what precedes all samples, so that a disk that takes nothing is an error here; the ending of `path` chooses the format.
-    /// `on_error` is called once, by the thread that writes, as soon as writing fails.
+    /// Writes the header, so that an unwritable disk is reported here; the extension of `path` selects the format. The
+    /// writing thread calls `on_error` once, as soon as writing fails.
     pub fn begin(
         file: File,
         path: &Path,
@@ -59,17 +59,17 @@ impl LiveRecorder {
         Ok(Self { sink: SampleSink(send), thread })
     }
 
-    /// Where samples go; the recording ends with [`Self::finish`], however many of these there are.
+    /// Returns a sink for samples; [`Self::finish`] ends the recording even if sinks still exist.
     pub fn sink(&self) -> SampleSink {
         self.sink.clone()
     }
 
-    /// Completes the file, with how the run ended, and returns how many samples it holds; or why it is not whole.
+    /// Completes the file with the ending of the run, and returns the number of samples; or the error if the file is incomplete.
     pub fn finish(self, ending: &Ending) -> Result<u64, RecordingError> {
         self.end(Message::End(ending.clone()))
     }
 
-    /// Ends without completing the file, which is about to be begun again.
+    /// Ends without completing the file, which will be started again.
     pub fn abandon(self) {
         let _ = self.end(Message::Abandon);
     }
@@ -80,7 +80,7 @@ impl LiveRecorder {
     }
 }
 
-/// Writes until the end is announced.
+/// Writes until the end message arrives.
 fn write(mut recorder: Recorder, messages: &Receiver<Message>) -> Result<u64, RecordingError> {
     let (mut due, mut fresh) = (Instant::now() + FLUSH, false);
     loop {
@@ -120,7 +120,7 @@ mod tests {
         }
     }
 
-    /// Nobody ends the recording: as after `kill -9`, what the operating system has is all there is.
+    /// The recording is never ended: as after `kill -9`, the file contains only the data passed to the operating system.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();

@@ -20,13 +20,13 @@ use crate::trajectory::{Loaded, Trajectory};
 
 /// Name of the metadata record with the [`RecordingInfo`].
 const METADATA: &str = "openjtc";
-/// Name of the metadata record with the [`Ending`], behind all messages.
+/// Name of the metadata record with the [`Ending`], after all messages.
 const END: &str = "openjtc_end";
-/// A log of a flight recorder as it was fetched (J-56).
+/// Topic of a flight recorder log, as fetched from the device (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
-/// The trajectory that is run, in the header-less form of 19 columns of integers.
+/// Topic of the executed trajectory, in the header-less form of 19 columns of integers.
 const TRAJECTORY_TOPIC: &str = "/jtc/trajectory";
-/// That of later runs, in the same form.
+/// Topic of the trajectory of later runs, in the same form.
 const THEN_TOPIC: &str = "/jtc/trajectory_then";
 
 impl From<McapError> for RecordingError {
@@ -38,12 +38,12 @@ impl From<McapError> for RecordingError {
     }
 }
 
-/// The arm as a robot description, at the beginning.
+/// Topic of the arm's robot description, at the beginning.
 const DESCRIPTION_TOPIC: &str = "/robot_description";
-/// Where its links are.
+/// Topic of the poses of the links.
 const TRANSFORMS_TOPIC: &str = "/tf";
 
-/// Writes samples as four messages each.
+/// Writer of samples as four messages each.
 pub(super) struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
     states: u16,
@@ -52,7 +52,7 @@ pub(super) struct McapWriter<W: Write + Seek> {
     state: u16,
     names: Vec<String>,
     start_ns: u64,
-    /// Where the arm is known: its frames, and their channel.
+    /// Frames of the arm and their channel, if the arm is known.
     frames: Option<(Frames, u16)>,
     sequence: u32,
     cdr: Encoder,
@@ -103,7 +103,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Writes a robot description, as programs that show robots look for it.
+/// Writes a robot description in the form that robot viewers expect.
 fn describe<W: Write + Seek>(
     out: &mut mcap::Writer<W>,
     description: &str,
@@ -118,7 +118,7 @@ fn describe<W: Write + Seek>(
 }
 
 impl<W: Write + Seek> McapWriter<W> {
-    /// A log of a flight recorder, as one message.
+    /// Writes a log of a flight recorder as one message.
     pub(super) fn write_log(&mut self, log: &[u8]) -> Result<(), RecordingError> {
         let channel = self.out.add_channel(0, LOG_TOPIC, "openjtc", &BTreeMap::new())?;
         let header = MessageHeader {
@@ -131,7 +131,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// The log of a flight recorder in a file; none in a recording of something else.
+/// Returns the log of a flight recorder in a file; `None` if the recording contains no log.
 pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingError> {
     let (mut channel, mut log) = (None, None);
     let read = each_record(file, |record| {
@@ -196,13 +196,13 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     }
 }
 
-/// Topics that a sample is made of; a bit of what has come stands for each.
+/// Topics of a sample; each has a bit in the mask of received messages.
 const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC];
 
-/// What a channel of a file carries.
+/// Content of a channel of a file.
 #[derive(Clone, Copy)]
 enum Carries {
-    /// Messages of samples, by their place in [`SAMPLE_TOPICS`].
+    /// Messages of samples, by their index in [`SAMPLE_TOPICS`].
     Sample(u8),
     Trajectory,
     Then,
@@ -222,15 +222,15 @@ impl Carries {
     }
 }
 
-/// The description at the beginning of a file; none where it breaks off before.
+/// Returns the header of a file; `None` if the file is truncated before it.
 ///
-/// What wrote the file anew may have put it to the end: it is looked for as far as the file goes.
+/// A program that rewrote the file may have moved the header to the end: the whole file is searched.
 pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     let mut info = None;
     let mut see = |record: records::Record<'_>| match record {
         records::Record::Metadata(metadata) if metadata.name == METADATA => {
             info = Some(RecordingInfo::from_map(&metadata.metadata));
-            // No more of the file is wanted.
+            // The rest of the file is not needed.
             Err(RecordingError::Empty { path: PathBuf::new() })
         }
         _ => Ok(()),
@@ -239,8 +239,9 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     info
 }
 
-/// Reads what [`McapWriter`] wrote, as far as the file is whole; messages of other topics are passed over. Samples go to `see`, in the
-/// order of their times; `room` of them wait for messages of theirs that stand later in the file. `info` is that of [`read_info`].
+/// Reads the output of [`McapWriter`] up to the first damage; ignores messages of other topics. Passes samples to `see`
+/// in order of their times. Up to `room` samples wait for messages that come later in the file. `info` is the result of
+/// [`read_info`].
 pub(super) fn scan(
     file: impl Read,
     mut info: Option<RecordingInfo>,

@@ -1,4 +1,4 @@
-//! Messages about an arm, in CDR with ROS 2 schemas: in recordings, and live for programs that show them as they show recordings.
+//! Messages about an arm, in CDR with ROS 2 schemas: in recordings, and live for viewers that also show recordings.
 
 use super::cdr::Encoder;
 use super::frames::Frames;
@@ -10,34 +10,34 @@ pub(super) const STATES_TOPIC: &str = "/joint_states";
 pub(super) const COMMANDS_TOPIC: &str = "/joint_commands";
 pub(super) const CONTROL_TOPIC: &str = "/jtc/control";
 pub(super) const STATE_TOPIC: &str = "/jtc/state";
-/// The arm as a robot description.
+/// Topic of the arm's robot description.
 pub(super) const DESCRIPTION_TOPIC: &str = "/robot_description";
-/// Where its links are.
+/// Topic of the poses of the links.
 pub(super) const TRANSFORMS_TOPIC: &str = "/tf";
 
-/// What a message is about.
+/// Topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
-    /// Joints as measured: positions (rad), velocities (rad/s), torques (N·m).
+    /// Measured joint values: positions (rad), velocities (rad/s), torques (N·m).
     States,
-    /// Joints as commanded.
+    /// Commanded joint values.
     Commands,
-    /// The control law's parts.
+    /// Parts of the control law.
     Control,
-    /// State, error words and the point of the trajectory.
+    /// State, error words and point of the trajectory.
     State,
-    /// The arm as a robot description (URDF), which does not change.
+    /// Robot description (URDF) of the arm, which does not change.
     Description,
-    /// Where the links of the arm are.
+    /// Poses of the arm's links.
     Transforms,
 }
 
 impl Topic {
-    /// All of them.
+    /// All topics.
     pub const ALL: [Self; 6] =
         [Self::States, Self::Commands, Self::Control, Self::State, Self::Description, Self::Transforms];
 
-    /// Its name.
+    /// Returns the name of the topic.
     pub fn name(self) -> &'static str {
         match self {
             Self::States => STATES_TOPIC,
@@ -49,7 +49,7 @@ impl Topic {
         }
     }
 
-    /// Name and text of its schema, a message definition of ROS 2 (`ros2msg`).
+    /// Returns the name and text of the schema, a message definition of ROS 2 (`ros2msg`).
     pub fn schema(self) -> (&'static str, &'static str) {
         match self {
             Self::States | Self::Commands => (schema::JOINT_STATE, schema::JOINT_STATE_TEXT),
@@ -61,7 +61,7 @@ impl Topic {
     }
 }
 
-/// `sensor_msgs/msg/JointState`.
+/// Writes a `sensor_msgs/msg/JointState`.
 pub(super) fn joints(
     cdr: &mut Encoder,
     stamp_ns: u64,
@@ -75,17 +75,17 @@ pub(super) fn joints(
     cdr.f64s(position).f64s(velocity).f64s(effort);
 }
 
-/// Measured positions, velocities and torques.
+/// Returns the measured positions, velocities and torques.
 pub(super) fn measured(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque)]
 }
 
-/// Commanded ones. The effort commanded is the model's share: what remains of the torque is feedback and friction.
+/// Returns the commanded values. The commanded effort is the model's share; the rest of the torque is feedback and friction.
 pub(super) fn commanded(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.set_position), j.map(|j| j.set_velocity), j.map(|j| j.torque_model)]
 }
 
-/// The control law's parts.
+/// Writes the parts of the control law.
 pub(super) fn control(cdr: &mut Encoder, stamp_ns: u64, j: &[JointSample; 6]) {
     cdr.start()
         .header(stamp_ns, "")
@@ -100,7 +100,7 @@ pub(super) fn control(cdr: &mut Encoder, stamp_ns: u64, j: &[JointSample; 6]) {
         .array(j.map(|j| j.temperature));
 }
 
-/// States, error words and the point.
+/// Writes states, error words and the point.
 pub(super) fn state(cdr: &mut Encoder, stamp_ns: u64, s: &Sample) {
     cdr.start()
         .header(stamp_ns, "")
@@ -117,7 +117,7 @@ pub(super) fn state(cdr: &mut Encoder, stamp_ns: u64, s: &Sample) {
     }
 }
 
-/// Writes messages about one arm.
+/// Writer of messages about an arm.
 pub struct MessageWriter {
     names: Vec<String>,
     description: String,
@@ -126,7 +126,7 @@ pub struct MessageWriter {
 }
 
 impl MessageWriter {
-    /// Of this arm.
+    /// Creates a writer for this arm.
     pub fn new(arm: &Arm) -> Self {
         let info = RecordingInfo::of(arm);
         Self {
@@ -137,8 +137,8 @@ impl MessageWriter {
         }
     }
 
-    /// The message of a sample at a time, ns since 1970. `None` where the sample knows nothing of it; transforms are due 50 times a second
-    /// at most.
+    /// Returns the message of a sample at a time, ns since 1970. Returns `None` if the sample has no data for the
+    /// topic; transforms are due at most 50 times a second.
     pub fn write(&mut self, topic: Topic, stamp_ns: u64, sample: &Sample) -> Option<&[u8]> {
         let (cdr, j) = (&mut self.cdr, &sample.joints);
         match topic {

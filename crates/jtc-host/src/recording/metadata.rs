@@ -1,4 +1,4 @@
-//! The description of a recording as the key-value pairs of an MCAP metadata record.
+//! The header of a recording as the key-value pairs of an MCAP metadata record.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ fn listed(gains: &PidGains) -> [f64; 5] {
     [gains.kp, gains.ki, gains.kd, gains.int_min, gains.int_max]
 }
 
-/// Those of all joints; `None` where one is missing.
+/// Returns the gains of all joints; `None` if one is missing.
 fn gains(map: &BTreeMap<String, String>) -> Option<[PidGains; JOINTS]> {
     let mut all = [PidGains::default(); JOINTS];
     for (i, gains) in all.iter_mut().enumerate() {
@@ -25,7 +25,7 @@ fn gains(map: &BTreeMap<String, String>) -> Option<[PidGains; JOINTS]> {
 }
 
 impl RecordingInfo {
-    /// As key-value pairs.
+    /// Returns the header as key-value pairs.
     pub(super) fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::new();
         let mut put = |key: String, value: String| drop(map.insert(key, value));
@@ -80,7 +80,7 @@ impl RecordingInfo {
         map
     }
 
-    /// The reverse of `to_map`; what is missing or unreadable stays at its default.
+    /// Reverses `to_map`; missing or unreadable values keep their defaults.
     pub(super) fn from_map(map: &BTreeMap<String, String>) -> Self {
         let text = |key: &str| map.get(key).cloned().unwrap_or_default();
         let number = |key: String| map.get(&key).and_then(|v| v.parse().ok()).unwrap_or(f64::NAN);

@@ -1,14 +1,14 @@
-//! Recordings of a run: written as MCAP or CSV by the ending of the file name, and read back for reports.
+//! Recordings of a run: written as MCAP or CSV, depending on the extension of the file name, and read back for reports.
 //!
-//! An MCAP file holds `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so that
-//! Foxglove, PlotJuggler and Rerun plot it at once, the torque split on `/jtc/control` and states on `/jtc/state`. Where the arm is known,
-//! the file stands alone: its description (URDF) is on `/robot_description`, where each link is on `/tf`, and its limits, its gains, its hash and
-//! the controller's firmware are in the metadata. A CSV file
-//! has one row a sample and a header that names the units; lines that begin with `#` at its end hold how a run ended that was not
-//! finished.
+//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded),
+//! so that Foxglove, PlotJuggler and Rerun plot it directly. The torque split is on `/jtc/control` and the states are
+//! on `/jtc/state`. If the arm is known, the file is self-contained: its description (URDF) is on `/robot_description`,
+//! and the pose of each link on `/tf`. The metadata contain its limits, gains and hash, and the controller's firmware.
+//! A CSV file has one row per sample and a header that names the units; if a run was not finished, lines that begin
+//! with `#` at the end of the file report its end.
 //!
-//! A file that breaks off (a program that was killed, a full disk) is read as far as it is whole, and [`Recording::cut`] gives what
-//! is missing.
+//! A truncated file (the program was killed, the disk was full) is read up to the damage, and [`Recording::cut`]
+//! describes the missing part.
 
 mod broken_off;
 #[cfg(feature = "mcap")]
@@ -55,11 +55,11 @@ pub enum Format {
 }
 
 impl Format {
-    /// By the ending of the file name: `.mcap` or `.csv`.
+    /// Returns the format for the extension of the file name: `.mcap` or `.csv`.
     ///
     /// # Errors
     ///
-    /// Another ending, or one whose format this program was built without.
+    /// Returns an error for another extension, or if this program was built without the format.
     pub fn of(path: &Path) -> Result<Self, RecordingError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("mcap") if cfg!(feature = "mcap") => Ok(Format::Mcap),
@@ -70,16 +70,16 @@ impl Format {
     }
 }
 
-/// Writes samples in one format.
+/// Writer of samples in one format.
 trait Writer: Send {
     fn write(&mut self, sample: &Sample) -> Result<(), RecordingError>;
     fn flush(&mut self) -> Result<(), RecordingError>;
-    /// How the run ended, known at its end only.
+    /// Writes the ending of the run, which is known only at its end.
     fn end(&mut self, ending: &Ending) -> Result<(), RecordingError>;
     fn finish(self: Box<Self>) -> Result<(), RecordingError>;
 }
 
-/// Writes samples into a file as they come.
+/// Writer of samples to a file during the run.
 pub struct Recorder {
     writer: Box<dyn Writer>,
     path: PathBuf,
@@ -87,21 +87,21 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Makes (or replaces) the file; its ending chooses the format.
+    /// Creates (or replaces) the file; its extension selects the format.
     ///
     /// # Errors
     ///
-    /// Another ending, or a file that cannot be made.
+    /// Returns an error for another extension or if the file cannot be created.
     pub fn create(path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         Format::of(path)?;
         Self::on(File::create(path).map_err(|e| RecordingError::io(path, e))?, path, info)
     }
 
-    /// Writes into a file that is open already; the ending of `path` chooses the format.
+    /// Writes to an open file; the extension of `path` selects the format.
     ///
     /// # Errors
     ///
-    /// Another ending, or a file that cannot be written.
+    /// Returns an error for another extension or if the file cannot be written.
     pub fn on(file: File, path: &Path, info: &RecordingInfo) -> Result<Self, RecordingError> {
         let format = Format::of(path)?;
         let file = BufWriter::with_capacity(1 << 16, file);
@@ -119,13 +119,13 @@ impl Recorder {
     ///
     /// # Errors
     ///
-    /// The file cannot be written, on a full disk for example.
+    /// Returns an error if the file cannot be written, for example on a full disk.
     pub fn write(&mut self, sample: &Sample) -> Result<(), RecordingError> {
         self.samples += 1;
         self.writer.write(sample).map_err(|e| e.at(&self.path))
     }
 
-    /// Samples written so far.
+    /// Returns the number of samples written so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
@@ -135,41 +135,41 @@ impl Recorder {
         self.finish()
     }
 
-    /// Hands all samples so far to the operating system: they are in the file whatever becomes of this program.
+    /// Writes all samples so far to the operating system: they survive the end of this program.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|e| e.at(&self.path))
     }
 
-    /// Completes the file as [`Self::finish`], with how the run ended, which nobody knew when it was begun.
+    /// Completes the file like [`Self::finish`], with the ending of the run, which was unknown at the start.
     pub fn finish_as(mut self, ending: &Ending) -> Result<u64, RecordingError> {
         self.writer.end(ending).map_err(|e| e.at(&self.path))?;
         self.finish()
     }
 
-    /// Completes the file (index and summary of an MCAP file) and returns how many samples it holds.
+    /// Completes the file (index and summary of an MCAP file) and returns its number of samples.
     ///
     /// # Errors
     ///
-    /// The file cannot be written, on a full disk for example.
+    /// Returns an error if the file cannot be written, for example on a full disk.
     pub fn finish(self) -> Result<u64, RecordingError> {
         self.writer.finish().map(|()| self.samples).map_err(|e| e.at(&self.path))
     }
 }
 
-/// Writes a whole recording at once.
+/// Writes a complete recording at once.
 ///
 /// # Errors
 ///
-/// Another ending, or a file that cannot be made or written.
+/// Returns an error for another extension or if the file cannot be created or written.
 pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Result<u64, RecordingError> {
     Recorder::create(path, info)?.finish_with(samples)
 }
 
-/// Writes a whole recording at once into a file that is open already; the ending of `path` chooses the format.
+/// Writes a complete recording at once to an open file; the extension of `path` selects the format.
 ///
 /// # Errors
 ///
-/// Another ending, or a file that cannot be written.
+/// Returns an error for another extension or if the file cannot be written.
 pub fn write_into(
     file: File,
     path: &Path,
@@ -179,12 +179,12 @@ pub fn write_into(
     Recorder::on(file, path, info)?.finish_with(samples)
 }
 
-/// Writes a whole recording and the log of a flight recorder that it was made of, as MCAP, into what is open already; `path` is what errors
-/// call it.
+/// Writes a complete recording, and the flight recorder log that it was made from, as MCAP to an open file. Error
+/// messages use `path` as its name.
 ///
 /// # Errors
 ///
-/// A file that cannot be written, or a program that was built without MCAP.
+/// Returns an error if the file cannot be written or if this program was built without MCAP.
 pub fn write_with_log(
     file: impl Write + Seek + Send,
     path: &Path,
@@ -209,11 +209,11 @@ pub fn write_with_log(
     }
 }
 
-/// The log of a flight recorder in an MCAP file; none in a recording of something else.
+/// Returns the log of a flight recorder in an MCAP file; `None` if the recording contains no log.
 ///
 /// # Errors
 ///
-/// A file that cannot be read.
+/// Returns an error if the file cannot be read.
 pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     if Format::of(path)? != Format::Mcap {
         return Ok(None);
@@ -230,16 +230,16 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
     }
 }
 
-/// A recording that was read back.
+/// A recording that was read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
-    /// Arm, limits and origin; none for a CSV file, which does not carry them.
+    /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
     pub info: Option<RecordingInfo>,
-    /// How the run ended.
+    /// End of the run.
     pub ending: Ending,
-    /// Oldest first.
+    /// Samples, oldest first.
     pub samples: Vec<Sample>,
-    /// What is missing of a file that breaks off, in words; none where it was completed.
+    /// Description of the missing part of a truncated file; `None` for a complete file.
     pub cut: Option<String>,
 }
 
@@ -248,7 +248,7 @@ impl Recording {
     ///
     /// # Errors
     ///
-    /// A file that cannot be read, or is no recording of ours.
+    /// Returns an error if the file cannot be read or is not a recording of this project.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let mut samples = Vec::new();
         let Scanned { info, ending, cut, .. } = scan_with(path, usize::MAX, |sample| samples.push(*sample))?;
@@ -256,33 +256,34 @@ impl Recording {
     }
 }
 
-/// What a recording holds beside its samples.
+/// Content of a recording apart from its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scanned {
-    /// Arm, limits and origin; none for a CSV file, which does not carry them.
+    /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
     pub info: Option<RecordingInfo>,
-    /// How the run ended.
+    /// End of the run.
     pub ending: Ending,
-    /// How many samples there were.
+    /// Number of samples.
     pub samples: u64,
-    /// What is missing of a file that breaks off, in words; none where it was completed.
+    /// Description of the missing part of a truncated file; `None` for a complete file.
     pub cut: Option<String>,
 }
 
-/// Samples that wait for messages of theirs which stand later in the file: several chunks of ours.
+/// Maximum number of samples that wait for messages later in the file: several chunks of the writer.
 const ROOM: usize = 4096;
 
-/// Shows the samples of a file that [`Recorder`] wrote, oldest first; no more of it is in memory than a piece, however long it is.
+/// Passes the samples of a file that [`Recorder`] wrote to `see`, oldest first. Only a part of the file is in memory,
+/// independent of its size.
 ///
 /// # Errors
 ///
-/// A file that cannot be read, is no recording of ours, or whose messages are far from the order of their times. Samples before that
-/// were shown.
+/// Returns an error if the file cannot be read, is not a recording of this project, or has messages far out of order of
+/// their times. The samples before the error were passed to `see`.
 pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
     scan_with(path, ROOM, see)
 }
 
-/// What a file holds beside its samples, and why it is not whole.
+/// Content of a file apart from its samples, and the reason if it is incomplete.
 struct Found {
     info: Option<RecordingInfo>,
     ending: Ending,

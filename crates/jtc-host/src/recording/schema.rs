@@ -1,6 +1,6 @@
-//! ROS 2 message definitions that the MCAP file carries.
+//! ROS 2 message definitions contained in the MCAP file.
 
-/// A definition with those that every header needs.
+/// Adds the definitions that every header needs.
 macro_rules! with_header {
     ($fields:literal) => {
         concat!(
@@ -21,7 +21,7 @@ uint32 nanosec
 
 /// Name of the standard joint message.
 pub(super) const JOINT_STATE: &str = "sensor_msgs/msg/JointState";
-/// Its definition with the definitions it needs.
+/// Definition of the joint message, with the definitions that it needs.
 pub(super) const JOINT_STATE_TEXT: &str = with_header!(
     "\
 std_msgs/Header header
@@ -34,12 +34,12 @@ float64[] effort
 
 /// Name of the message with a robot's description.
 pub(super) const STRING: &str = "std_msgs/msg/String";
-/// Its definition.
+/// Definition of the description message.
 pub(super) const STRING_TEXT: &str = "string data\n";
 
 /// Name of the message with transforms between frames.
 pub(super) const TRANSFORMS: &str = "tf2_msgs/msg/TFMessage";
-/// Its definition with the definitions it needs.
+/// Definition of the transform message, with the definitions that it needs.
 pub(super) const TRANSFORMS_TEXT: &str = with_header!(
     "\
 geometry_msgs/TransformStamped[] transforms
@@ -68,7 +68,7 @@ float64 w 1
 
 /// Name of the control law's message.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
-/// Per joint, base to wrist; NaN where the source does not know a value.
+/// Definition with values per joint, base to wrist; NaN for a value that the source does not know.
 pub(super) const CONTROL_TEXT: &str = with_header!(
     "\
 std_msgs/Header header
@@ -90,7 +90,7 @@ float64[6] temperature
 
 /// Name of the state message.
 pub(super) const STATE: &str = "openjtc_msgs/msg/ControllerState";
-/// States, error words and the point index.
+/// Definition with states, error words and the point index.
 pub(super) const STATE_TEXT: &str = with_header!(
     "\
 uint8 STATE_START=0

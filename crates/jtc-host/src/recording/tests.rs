@@ -1,4 +1,4 @@
-//! Round trips through both formats, and files that are no recordings.
+//! Round trips through both formats, and files that are not recordings.
 
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 
@@ -109,8 +109,8 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(read_mcap(b"not an mcap file").is_err());
 }
 
-/// Cut at any byte, a file gives all samples of the blocks that are whole, in the order in which they were written, and reports that it
-/// breaks off.
+/// A file truncated at any byte returns all samples of its complete blocks, in the order in which they were written,
+/// and reports the truncation.
 #[test]
 fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
                     assert_eq!(sample.point, i as u32);
                     assert!(sample.joints.iter().all(|j| j.temperature == 31.0 && j.position.is_finite()));
                 }
-                // Behind the last block stands the end of an MCAP file.
+                // After the last block comes the end of an MCAP file.
                 if k + 1 == sizes.len() && more > 0 {
                     continue;
                 }
@@ -163,7 +163,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
 #[test]
 fn a_damaged_length_takes_no_memory() {
     let mut file = b"\x89MCAP0\r\n".to_vec();
-    // An LZ4 frame with one block as it is: opcode and length of a message.
+    // An LZ4 frame with one uncompressed block: opcode and length of a message.
     let mut data = b"\x04\x22\x4D\x18\x60\x40\x82\x09\0\0\x80\x05".to_vec();
     data.extend((1_u64 << 40).to_le_bytes());
     data.extend([0; 4]);
@@ -180,7 +180,7 @@ fn a_damaged_length_takes_no_memory() {
     assert!(error.contains("length"), "{error}");
 }
 
-/// The index of the limits points behind the end of all files: nobody reads it.
+/// The index of the limits points beyond the end of all files: the reader ignores it.
 #[test]
 fn a_damaged_index_takes_nothing_away() {
     let dir = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn a_damaged_index_takes_nothing_away() {
     let mut file = std::fs::read(&path).unwrap();
     let name = b"\x07\0\0\0openjtc";
     let at = file.windows(name.len()).rposition(|bytes| bytes == name).unwrap();
-    // Offset and length stand before the name.
+    // Offset and length precede the name.
     file[at - 16..at - 8].copy_from_slice(&(u64::MAX - 8).to_le_bytes());
     file[at - 8..at].copy_from_slice(&u64::from(16_u8).to_le_bytes());
     let (found, samples) = read_mcap(&file).unwrap();
@@ -213,7 +213,7 @@ fn how_the_run_ended_comes_back() {
     }
 }
 
-/// Messages of a file, by topic.
+/// Counts the messages of a file by topic.
 fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     let mut topics = std::collections::BTreeMap::new();
     let mut counts = std::collections::BTreeMap::new();
@@ -231,8 +231,8 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     counts
 }
 
-/// What the numbers mean is in the file: the arm, its gains and limits, who the controller is. Where the links are is written 50 times a
-/// second at most, however often samples come, and not where no position is known.
+/// The file contains all context of its values: the arm, its gains and limits, the identity of the controller. Poses of
+/// the links are written at most 50 times a second, independent of the sample rate, and not if no position is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -257,7 +257,7 @@ fn a_recording_of_an_arm_stands_alone() {
     written.iter_mut().flat_map(|s| &mut s.joints).for_each(|joint| joint.position = f64::NAN);
     write_all(&path, &info, &written).unwrap();
     assert!(!counted(&path).contains_key("/tf"));
-    // Of an arm that nobody named nothing is described.
+    // Without an arm the file contains no description.
     write_all(&path, &RecordingInfo::default(), &samples(100)).unwrap();
     assert_eq!(counted(&path).len(), 4);
 }

@@ -1,11 +1,11 @@
-//! The curves of a report: every sample of a short recording, and of a longer one the extremes of pieces of equal length.
+//! Curves of a report: every sample of a short recording; for a longer one the extremes of pieces of equal length.
 
 use crate::sample::{JointSample, Sample};
 
-/// Points per curve; 16 000 keep the page below some 4 MB and are four times what a screen can show.
+/// Maximum number of points per curve; 16 000 keep the page below about 4 MB and are four times the resolution of a screen.
 pub(super) const POINTS_MAX: usize = 16_000;
 
-/// Values of a joint that are drawn.
+/// Plotted values of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Curve {
     SetPosition,
@@ -13,7 +13,7 @@ pub(super) enum Curve {
     SetVelocity,
     SetAcceleration,
     Velocity,
-    /// mrad.
+    /// In mrad.
     Error,
     TorqueModel,
     TorquePid,
@@ -22,11 +22,11 @@ pub(super) enum Curve {
     Temperature,
 }
 
-/// How many of them there are.
+/// Number of curves of a joint.
 const KINDS: usize = Curve::Temperature as usize + 1;
 const ALL: usize = 6 * KINDS;
 
-/// Those of a joint, in the order of [`Curve`].
+/// Returns the values of a joint, in the order of [`Curve`].
 fn values(joint: &JointSample) -> [f64; KINDS] {
     [
         joint.set_position,
@@ -43,15 +43,15 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
     ]
 }
 
-/// A piece of the recording: when it begins, its middle, and the extremes of each curve.
+/// A piece of the recording: its start, its middle, and the extremes of each curve.
 #[derive(Clone, Debug)]
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Above `high` where no value is known.
+    /// Lowest values; above `high` if no value is known.
     low: [f64; ALL],
     high: [f64; ALL],
-    /// The lowest value occurs before the highest.
+    /// `true` if the lowest value occurs before the highest.
     low_first: [bool; ALL],
 }
 
@@ -84,7 +84,7 @@ impl Bucket {
         }
     }
 
-    /// With the bucket behind it, of the same length.
+    /// Joins this bucket with the next one, of the same length.
     fn join(&mut self, next: &Self) {
         self.middle_s = next.begin_s;
         for i in 0..ALL {
@@ -109,13 +109,13 @@ impl Bucket {
     }
 }
 
-/// The curves of samples that come one after the other, in bounded memory: when there are too many buckets, each two are joined.
+/// Curves of streamed samples in bounded memory: if there are too many buckets, neighbours are joined in pairs.
 #[derive(Clone, Debug)]
 pub(super) struct Curves {
     buckets: Vec<Bucket>,
-    /// Samples of a bucket; 1: each is a point of its own.
+    /// Number of samples in a bucket; 1: each sample is a point.
     width: usize,
-    /// Samples of the last bucket.
+    /// Number of samples in the last bucket.
     filled: usize,
     last_s: f64,
 }
@@ -127,7 +127,7 @@ impl Curves {
 
     pub(super) fn push(&mut self, sample: &Sample) {
         if self.buckets.is_empty() || self.filled == self.width {
-            // Of a bucket two points are drawn, unless it is one sample.
+            // A bucket of several samples is drawn as two points.
             while self.buckets.len() >= if self.width == 1 { POINTS_MAX } else { POINTS_MAX / 2 } {
                 self.double();
             }
@@ -144,7 +144,7 @@ impl Curves {
         self.last_s = sample.time_s;
     }
 
-    /// Joins each two buckets, which are full.
+    /// Joins the buckets, all full, in pairs.
     fn double(&mut self) {
         for i in 0..self.buckets.len() / 2 {
             let (first, next) = self.buckets.split_at_mut(2 * i + 1);
@@ -158,36 +158,36 @@ impl Curves {
         self.filled = self.width;
     }
 
-    /// Memory that they take.
+    /// Returns the size of the curves in memory.
     pub(super) fn bytes(&self) -> usize {
         self.buckets.capacity() * size_of::<Bucket>()
     }
 
-    /// One in how many samples a point stands for; 1 = nothing was left out.
+    /// Returns the number of samples per bucket; 1: every sample is a point.
     pub(super) fn bucket(&self) -> usize {
         self.width
     }
 
-    /// Points of each curve.
+    /// Returns the number of points of each curve.
     pub(super) fn len(&self) -> usize {
         self.buckets.len() * if self.width == 1 { 1 } else { 2 }
     }
 
-    /// Times of the points, s.
+    /// Returns the times of the points, s.
     pub(super) fn times(&self) -> Vec<f64> {
         if self.width == 1 {
             return self.buckets.iter().map(|bucket| bucket.begin_s).collect();
         }
         let mut times: Vec<f64> =
             self.buckets.iter().flat_map(|bucket| [bucket.begin_s, bucket.middle_s]).collect();
-        // What is drawn reaches to the end, also where its last piece is not whole.
+        // The curve reaches to the end, even if its last piece is incomplete.
         if let Some(last) = times.last_mut().filter(|_| self.filled < self.width) {
             *last = self.last_s;
         }
         times
     }
 
-    /// Values at those times: of each bucket its extremes, in the order in which they occur. NaN where none is known.
+    /// Returns the values at those times: the extremes of each bucket, in the order in which they occur. NaN if no value is known.
     pub(super) fn values(&self, curve: Curve, joint: usize) -> Vec<f64> {
         let i = joint * KINDS + curve as usize;
         let mut values = Vec::with_capacity(self.len());
@@ -205,15 +205,15 @@ impl Curves {
     }
 }
 
-/// Pieces that are kept of a row of states; twice as many may be there before they are joined.
+/// Number of pieces kept of a row of states; pieces are joined when there are twice as many.
 const RUNS_MAX: usize = 8_192;
 
-/// How two pieces become one where there are too many of them.
+/// Rule for joining two pieces if there are too many.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joined {
-    /// The value of the longer one: states.
+    /// Keep the value of the longer piece: for states.
     Longer,
-    /// The bits of both: errors, of which none may be lost.
+    /// Combine the bits of both: for errors, so that none is lost.
     Both,
 }
 
@@ -243,9 +243,9 @@ impl Runs {
         }
     }
 
-    /// Joins each two, and those of equal values.
+    /// Joins the pieces in pairs, and neighbours with equal values.
     fn halve(&mut self) {
-        // The last one goes on.
+        // The last piece continues.
         let last = self.runs.pop();
         let mut fewer: Vec<(f64, f64, u64)> = Vec::with_capacity(RUNS_MAX);
         for two in self.runs.chunks(2) {
@@ -266,7 +266,7 @@ impl Runs {
         self.runs = fewer;
     }
 
-    /// Memory that they take.
+    /// Returns the size of the runs in memory.
     pub(super) fn bytes(&self) -> usize {
         self.runs.capacity() * size_of::<(f64, f64, u64)>()
     }

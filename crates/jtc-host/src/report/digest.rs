@@ -1,4 +1,4 @@
-//! What a report needs of its samples, which come one after the other: its memory does not grow with their number.
+//! Data that a report needs from its samples. The samples are streamed: memory does not grow with their number.
 
 use super::curves::{Curves, Joined, Runs};
 use super::summary::Figures;
@@ -7,9 +7,9 @@ use super::{RunFailure, Summary};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Samples reduced to what a report states and draws: its figures, curves with their extremes, and what broke first.
+/// Samples reduced to the content of a report: its figures, curves with their extremes, and the first error.
 ///
-/// It takes some 20 MB, of a minute and of a day alike. The plots of up to 16,000 samples show each of them.
+/// Takes about 20 MB, for a minute as for a day. The plots of up to 16,000 samples show each of them.
 #[derive(Clone, Debug)]
 pub struct Digest {
     samples: u64,
@@ -30,7 +30,7 @@ impl Default for Digest {
 }
 
 impl Digest {
-    /// Of no sample yet.
+    /// Creates a digest without samples.
     pub fn new() -> Self {
         Self {
             samples: 0,
@@ -45,14 +45,14 @@ impl Digest {
         }
     }
 
-    /// Of samples that are at hand, oldest first.
+    /// Creates a digest of these samples, oldest first.
     pub fn of(samples: &[Sample]) -> Self {
         let mut digest = Self::new();
         samples.iter().for_each(|sample| digest.push(sample));
         digest
     }
 
-    /// Takes in the next sample.
+    /// Adds the next sample.
     pub fn push(&mut self, sample: &Sample) {
         self.samples += 1;
         self.first_s.get_or_insert(sample.time_s);
@@ -65,28 +65,28 @@ impl Digest {
         self.errors.push(sample.time_s, u64::from(sample.errors));
     }
 
-    /// How many samples there were.
+    /// Returns the number of samples.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Memory that it takes, more or less.
+    /// Returns the approximate size in memory.
     pub fn bytes(&self) -> usize {
         let runs = [&self.states, &self.trajectory, &self.errors].map(Runs::bytes);
         size_of::<Self>() + self.curves.bytes() + runs.iter().sum::<usize>()
     }
 
-    /// Times of the first and of the last sample, s.
+    /// Returns the times of the first and of the last sample, s.
     pub(super) fn span_s(&self) -> Option<(f64, f64)> {
         self.first_s.map(|first| (first, self.last_s))
     }
 
-    /// The figures, with the names and limits of `info`.
+    /// Returns the figures, with the names and limits of `info`.
     pub fn summary(&self, info: &RecordingInfo) -> Summary {
         self.figures.summary(info)
     }
 
-    /// What a recording shows of its run: see [`RunFailure::of_recording`].
+    /// Returns the failure of the recorded run: see [`RunFailure::of_recording`].
     pub fn failure(&self, info: &RecordingInfo, ending: &Ending) -> Option<RunFailure> {
         self.watch.failure(info, ending)
     }

@@ -1,4 +1,4 @@
-//! What broke first in a run that failed: when, at which joint, and the values around it.
+//! First error of a failed run: its time, its joint, and the values around it.
 
 use std::fmt::Write;
 
@@ -11,18 +11,18 @@ use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 use crate::words;
 
-/// Samples shown before and after the one that shows the failure.
+/// Number of samples shown before and after the first bad sample.
 pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
-/// A step of the measured position counts above this share of what the velocity limit allows: noise and jitter of the time stay below.
+/// Share of the velocity limit above which a step of the measured position counts as a jump: noise and time jitter stay below.
 const STEP_SHARE: f64 = 1.2;
 
-/// One joint at one moment near the failure; numbers are NaN where they are not known.
+/// Values of a joint at one moment near the failure; unknown values are NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Moment {
-    /// Into the run, ms.
+    /// Time since the start of the run, ms.
     pub time_ms: f64,
-    /// Which joint.
+    /// Joint.
     pub joint: Joint,
     /// State of the controller.
     pub state: &'static str,
@@ -36,42 +36,42 @@ pub struct Moment {
     pub torque_nm: f64,
     /// Limit of the torque, N·m.
     pub torque_limit_nm: f64,
-    /// Error bits of this joint in words.
+    /// Error bits of this joint as text.
     pub errors: Vec<String>,
-    /// The failure shows here first.
+    /// `true` for the first sample that shows the failure.
     pub first: bool,
 }
 
 /// The failure of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunFailure {
-    /// What is wrong, what broke first before what followed from it.
+    /// Problems found, the first error before its consequences.
     pub causes: Vec<String>,
-    /// The joint that broke first; none where no joint did.
+    /// First failed joint; `None` if no joint failed.
     pub joint: Option<Joint>,
-    /// Into the run, ms: on the controller's count of 1 ms points while it moves.
+    /// Time since the start of the run, ms; in motion by the controller's count of 1 ms points.
     pub at_ms: f64,
-    /// Time of the sample that shows it first, s, on the clock of the samples.
+    /// Time of the first sample that shows the failure, s, on the clock of the samples.
     pub time_s: f64,
-    /// Since the last good sample, ms: it happened within this time.
+    /// Time since the last good sample, ms: the failure occurred within this time.
     pub within_ms: f64,
-    /// Values around it.
+    /// Values around the failure.
     pub moments: Vec<Moment>,
-    /// It is of a log, whose times are those of the device: s since its start.
+    /// `true` for a log, whose times are those of the device: s since its start.
     #[serde(skip)]
     pub in_log: bool,
 }
 
 impl RunFailure {
-    /// The first error in the samples since a trajectory was executed; none in a run without errors.
+    /// Returns the first error in the samples since a trajectory was executed; `None` for a run without errors.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
         let at = begin + samples.get(begin..)?.iter().position(is_bad)?;
         Some(Self::found(info, &Around::of(samples, at)))
     }
 
-    /// What a recording shows of its run: an error in its samples; or what ended it, as was written down; or that its end
-    /// was not seen.
+    /// Returns the failure of a recorded run: an error in its samples, else the recorded reason for its end, else the
+    /// fact that the recording does not show its end.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
@@ -80,7 +80,7 @@ impl RunFailure {
         Some(Self::ended_by(info, samples, why_it_ended(ending, unseen)?))
     }
 
-    /// The first error of a log: at the sample of `time_s`, of what, and of which joint.
+    /// Returns the first error of a log, at the sample of `time_s`, with these causes and this joint.
     pub fn in_log(
         info: &RecordingInfo,
         samples: &[Sample],
@@ -93,18 +93,18 @@ impl RunFailure {
         Self { in_log: true, ..Self::at(info, &around, causes, joint) }
     }
 
-    /// A run that ended without an error in its samples: at the last of them, for the reason given.
+    /// Returns the failure of a run that ended without an error in its samples: at the last sample, for the given reason.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
         Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }
 
-    /// Returns what broke first in a run that ended with `error`.
+    /// Returns the failure of a run that ended with `error`.
     pub fn of(error: &Error, info: &RecordingInfo, samples: &[Sample]) -> Self {
         let found = Self::find(info, samples);
         found.unwrap_or_else(|| Self::ended_by(info, samples, error.to_string())).with_error(error)
     }
 
-    /// Adds what only the error of the run knows: the errors that the drives report of themselves.
+    /// Adds details that only the run's error contains: the errors that the drives report themselves.
     pub fn with_error(self, error: &Error) -> Self {
         match error {
             Error::Motion(MotionError::RunFault { status, .. }) => self.with_status(status),
@@ -112,13 +112,13 @@ impl RunFailure {
         }
     }
 
-    /// Adds the errors that the drives report of themselves.
+    /// Adds the errors that the drives report themselves.
     pub(super) fn with_status(self, status: &Status) -> Self {
         let (causes, joint) = causes(&Words::of_status(status));
         if causes.is_empty() { self } else { Self { causes, joint: joint.or(self.joint), ..self } }
     }
 
-    /// The run failed here, of what: one line.
+    /// Returns one line with the time and the first cause of the failure.
     pub fn headline(&self) -> String {
         let cause = self.causes.first().map_or("an error without a name", String::as_str);
         if self.in_log {
@@ -127,7 +127,7 @@ impl RunFailure {
         format!("FAILED {:.0} ms into the run: {cause}", self.at_ms)
     }
 
-    /// An error that the samples show.
+    /// Returns the failure that the samples show.
     pub(super) fn found(info: &RecordingInfo, around: &Around) -> Self {
         let words = around.samples.get(around.at).map(Words::of_sample);
         let (mut causes, mut joint) = words.map_or_else(Default::default, |words| causes(&words));
@@ -165,7 +165,7 @@ impl RunFailure {
                 first: i == at,
             }
         };
-        // Of the joint that broke a piece of its history; where no joint did, all of them up to that moment.
+        // History of the failed joint around the failure; if no joint failed, all joints up to that moment.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
                 .map(|i| moment(i, joint))
@@ -180,7 +180,7 @@ impl RunFailure {
         Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments, in_log: false }
     }
 
-    /// The table's head: words, then figures with their units.
+    /// Header of the table: text, then figures with their units.
     pub const HEAD: [&'static str; 9] = [
         "ms",
         "joint",
@@ -193,7 +193,7 @@ impl RunFailure {
         "errors",
     ];
 
-    /// The table's rows; a dash where a value is not known.
+    /// Returns the rows of the table; a dash for an unknown value.
     pub fn rows(&self) -> Vec<[String; 9]> {
         let figure = |v: f64, digits: usize| {
             if v.is_finite() { format!("{v:.digits$}").replace('-', "−") } else { "–".to_owned() }
@@ -214,7 +214,7 @@ impl RunFailure {
         self.moments.iter().map(row).collect()
     }
 
-    /// As the first thing on a page.
+    /// Returns the HTML for the top of the page.
     pub(super) fn html(&self) -> String {
         let mut out = format!(
             "<section class=\"failure\" role=\"alert\">\n<h1>{}</h1>\n",
@@ -246,12 +246,12 @@ impl RunFailure {
     }
 }
 
-/// An error shows in this sample.
+/// Returns `true` if this sample shows an error.
 pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
-/// Why a run failed whose samples show no error; `unseen`: the last of them is in motion. `None`: it did not fail.
+/// Returns the reason why a run failed whose samples show no error; `unseen`: the last sample is in motion. `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault that the recording does not name".to_owned()),
@@ -263,13 +263,13 @@ pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     }
 }
 
-/// A moment, and the samples before and after it that a person wants to see.
+/// A moment, with the samples shown before and after it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Around {
     pub(super) samples: Vec<Sample>,
-    /// Which of them.
+    /// Index of the moment in the samples.
     pub(super) at: usize,
-    /// When the run began, s.
+    /// Start of the run, s.
     pub(super) start_s: f64,
 }
 
@@ -280,7 +280,7 @@ impl Around {
         Self { samples: piece.to_vec(), at: at - from, start_s: start_s(samples, at) }
     }
 
-    /// One more behind it, if it is near.
+    /// Adds a following sample, if it is near the moment.
     pub(super) fn follow(&mut self, sample: &Sample) {
         if self.samples.len() <= self.at + AFTER {
             self.samples.push(*sample);
@@ -288,13 +288,13 @@ impl Around {
     }
 }
 
-/// The joint whose measured position went further from one sample to the next than its velocity limit allows, around the
-/// sample `at`, where the status names no joint: words for it.
+/// Returns the joint whose measured position changed by more than its velocity limit permits between two samples around
+/// the sample `at`, with a description. Used if the status names no joint.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
     let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
-        // Behind the fault the time is that of arrival: what came together was not measured together.
+        // After the fault the times are arrival times: samples that arrived together were not measured together.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
         for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
             let position = |i: usize| samples[i].joints[joint.index()].position;
@@ -313,12 +313,12 @@ fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint
     worst.map(|(_, joint, words)| (joint, words))
 }
 
-/// The first sample of the execution, or the first of all.
+/// Returns the index of the first sample of the execution, or of the first of all samples.
 fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
-/// When the run began, s: the controller's own count of milliseconds at the last sample of the motion is the most exact.
+/// Returns the start of the run, s; the controller's count of milliseconds at the last sample in motion is the most precise.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {
@@ -327,19 +327,19 @@ fn start_s(samples: &[Sample], at: usize) -> f64 {
     }
 }
 
-/// When the run began that this sample is of, s.
+/// Returns the start of the run of this sample, s.
 pub(super) fn began_s(sample: &Sample) -> f64 {
     sample.time_s - f64::from(sample.point) * 1e-3
 }
 
-/// Error words of a moment, from either source.
+/// Error words of a moment, from a sample or a status.
 struct Words {
     errors: u16,
     can: u32,
     joints: [JointWords; 6],
 }
 
-/// Error words of one joint.
+/// Error words of a joint.
 #[derive(Clone, Copy, Default)]
 struct JointWords {
     internal: u16,
@@ -365,7 +365,7 @@ impl Words {
         Self { errors: s.errors, can: s.can_current, joints }
     }
 
-    /// What is wrong with a joint.
+    /// Returns the problems of a joint.
     fn joint(&self, joint: Joint) -> Vec<String> {
         let own = &self.joints[joint.index()];
         let silent = (self.can & can_flag::no_answer(joint.index()) != 0).then_some("does not answer");
@@ -379,7 +379,7 @@ impl Words {
     }
 }
 
-/// What is wrong, joints first: the controller's own words follow from theirs. And the first joint.
+/// Returns the problems, joints first because the controller's own errors follow from them, and the first failed joint.
 fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;

@@ -1,4 +1,4 @@
-//! A small picture of a run: commanded and measured position of the six joints, and the tracking error below them.
+//! A small picture of a run: commanded and measured positions of the six joints, and the tracking error below.
 
 use std::fmt::Write;
 
@@ -7,14 +7,14 @@ use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
-/// Points per line: enough for its width in pixels.
+/// Points per line, enough for its width in pixels.
 const POINTS: usize = 260;
-/// Fewest and most grid lines of an axis.
+/// Minimum and maximum number of grid lines of an axis.
 const TICKS: (usize, usize) = (3, 12);
-/// Largest value that is drawn; larger ones are as good as no number.
+/// Largest value that is drawn; larger values count as invalid.
 const DRAWN_MAX: f64 = 1e30;
 
-/// Light colours here, dark ones by the reader's preference, as the page has them.
+/// Light colours by default, dark ones if the reader prefers them, as on the page.
 const STYLE: &str = "\
 svg{--paper:#fffefb;--ink:#1b1f24;--soft:#5f666f;--grid:#eceae2;--j0:#2559d6;--j1:#dd6412;--j2:#0c8a5b;--j3:#c02c7c;--j4:#7547cf;--j5:#94780a}\
 @media (prefers-color-scheme:dark){svg{--paper:#161a20;--ink:#e9ebee;--soft:#9aa3af;--grid:#262c35;--j0:#7aa5ff;--j1:#ff9d57;--j2:#43d39e;--j3:#ff77b6;--j4:#b79bff;--j5:#e3c84c}}\
@@ -23,15 +23,15 @@ text{font-family:system-ui,-apple-system,'Segoe UI','Noto Sans',sans-serif;font-
 .g{stroke:var(--grid);stroke-width:1}.c{fill:none;stroke-width:6;stroke-linejoin:round;opacity:.25}\
 .m{fill:none;stroke-width:1.5;stroke-linejoin:round}.e{fill:none;stroke-width:1.1;stroke-linejoin:round}";
 
-/// One rectangle of the picture with its axes.
+/// A plot area of the picture with its axes.
 struct Panel {
     left: f64,
     top: f64,
     width: f64,
     height: f64,
-    /// First and last, s; the last one is later.
+    /// First and last time, s; the last one is later.
     time: (f64, f64),
-    /// Lowest and highest; the highest one is higher.
+    /// Lowest and highest value; the highest one is higher.
     value: (f64, f64),
 }
 
@@ -56,7 +56,7 @@ impl Panel {
         path
     }
 
-    /// The grid lines of the values, with their labels.
+    /// Draws the grid lines of the values, with their labels.
     fn grid(&self, svg: &mut String) {
         let (l, r) = (self.left, self.left + self.width);
         for (v, label) in ticks(self.value.0, self.value.1, 1.0) {
@@ -72,7 +72,7 @@ impl Panel {
     }
 }
 
-/// The picture as SVG; it follows the reader's light or dark setting.
+/// Returns the picture as SVG; it follows the reader's light or dark setting.
 pub fn picture_svg(input: &ReportInput<'_>) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n<style>{STYLE}</style>\n\
@@ -155,7 +155,7 @@ fn errors(svg: &mut String, input: &ReportInput<'_>, time: (f64, f64)) {
     }
 }
 
-/// Times and values of a curve.
+/// Returns times and values of a curve.
 fn points(input: &ReportInput<'_>, curve: Curve, j: usize) -> Vec<(f64, f64)> {
     let curves = &input.digest.curves;
     curves.times().into_iter().zip(curves.values(curve, j)).collect()
@@ -168,7 +168,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     thinned
 }
 
-/// The lowest and the highest value of each bucket: a peak of one sample stays visible.
+/// Returns the lowest and the highest value of each bucket, so that a peak of one sample stays visible.
 fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let bucket = points.len().div_ceil(2 * POINTS).max(1);
     let pair = |bucket: &[(f64, f64)]| {
@@ -187,30 +187,30 @@ fn bounds<'a>(points: impl Iterator<Item = &'a (f64, f64)>) -> Option<(f64, f64)
     })
 }
 
-/// A number that has a place in the picture.
+/// Returns `true` if the number can be drawn.
 fn is_drawn(v: f64) -> bool {
     v.abs() < DRAWN_MAX
 }
 
-/// What an axis around `v` needs at least so that its labels can be told apart.
+/// Returns the minimum span of an axis around `v` at which its labels can be distinguished.
 fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
 
-/// The axis of positions from `low` to `high`, with a margin also where a joint stands still.
+/// Returns the axis of positions from `low` to `high`, with a margin even if the joint does not move.
 fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
     (low - margin, high + margin)
 }
 
-/// Values and labels of the grid lines between `low` and `high`, as many as [`TICKS`] says. Some four steps fill `share` of the span: less
-/// for an axis with more room for labels.
+/// Returns values and labels of the grid lines between `low` and `high`, as many as [`TICKS`] permits. About four steps
+/// fill `share` of the span; use a smaller share for an axis with more space for labels.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    // 1, 2 or 5 times a power of ten: the first that is enough, or a finer one where that leaves too few lines.
+    // 1, 2 or 5 times a power of ten: the first step that is large enough, or a finer one if that leaves too few lines.
     let power = 10f64.powf(rough.log10().floor());
     let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
     let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);
@@ -223,17 +223,17 @@ fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     (0..TICKS.1).map(|k| first + k as f64).take_while(|i| *i <= last).map(tick).collect()
 }
 
-/// How numbers are written.
+/// Number format.
 #[derive(Clone, Copy)]
 enum Digits {
-    /// Behind the point.
+    /// Digits after the decimal point.
     Plain(usize),
-    /// Behind the point, with a power of ten.
+    /// Digits after the decimal point, with a power of ten.
     Power(usize),
 }
 
 impl Digits {
-    /// Enough that numbers up to `most` which are a `step` apart differ.
+    /// Returns enough digits to distinguish numbers up to `most` in steps of `step`.
     fn of(step: f64, most: f64) -> Self {
         if (1e-6..1e6).contains(&step) {
             Self::Plain((-step.log10()).ceil().max(0.0) as usize)
@@ -258,7 +258,7 @@ mod tests {
 
     use super::*;
 
-    /// Distinct labels in rising order, as many as can be read.
+    /// Checks that labels are distinct, in rising order, and of readable number.
     fn readable(low: f64, high: f64, share: f64) -> Result<(), TestCaseError> {
         let ticks = ticks(low, high, share);
         prop_assert!((TICKS.0..=TICKS.1).contains(&ticks.len()), "{low}..{high}: {ticks:?}");
@@ -270,7 +270,7 @@ mod tests {
         Ok(())
     }
 
-    /// A magnitude from 1e-30 to 1e29 with either sign, or zero.
+    /// Returns a magnitude from 1e-30 to 1e29 with either sign, or zero.
     fn value() -> impl Strategy<Value = f64> {
         let magnitude = (-30.0..29.0f64, any::<bool>());
         prop_oneof![
@@ -311,7 +311,7 @@ mod tests {
             let (low, high) = position_axis((low, high));
             readable(low, high, 1.0).unwrap();
         }
-        // The lines of a joint that moves stand where they stood.
+        // For a moving joint the grid lines stay unchanged.
         let words: Vec<String> = ticks(-1.08, 1.08, 1.0).into_iter().map(|tick| tick.1).collect();
         assert_eq!(words, ["−1", "0", "1"]);
         for none in [(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN)] {

@@ -1,4 +1,4 @@
-//! Samples that come one after the other give the same as all of them at once, in memory that does not grow.
+//! Streamed samples give the same result as all samples at once, in bounded memory.
 
 use super::curves::{Curve, Joined, POINTS_MAX, Runs};
 use super::*;
@@ -7,7 +7,7 @@ use crate::sample::JointSample;
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use proptest::prelude::*;
 
-/// A sample as any source may give it: values that are not known, errors, executions that come and go.
+/// Returns a sample as any source may supply it: unknown values, errors, executions that begin and end.
 fn any_sample() -> impl Strategy<Value = Sample> {
     let value = || prop_oneof![4 => -10.0..10.0, 1 => Just(f64::NAN), 1 => Just(0.0)];
     let joint = (prop::array::uniform12(value()), any::<bool>()).prop_map(|(v, fault)| JointSample {
@@ -45,7 +45,7 @@ fn any_sample() -> impl Strategy<Value = Sample> {
     })
 }
 
-/// Samples with times that go on.
+/// Returns samples with increasing times.
 fn any_samples(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Sample>> {
     prop::collection::vec((any_sample(), 0.0..0.1), n).prop_map(|steps| {
         let mut time_s = 0.0;
@@ -57,7 +57,7 @@ fn any_samples(n: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Sample>> 
     })
 }
 
-/// The figures as their definition has them, over all samples at once.
+/// Computes the figures from their definition, over all samples at once.
 fn by_definition(info: &RecordingInfo, samples: &[Sample]) -> Summary {
     let any = samples.iter().any(Sample::is_operating);
     let counted: Vec<&Sample> = samples.iter().filter(|s| !any || s.is_operating()).collect();
@@ -115,7 +115,7 @@ proptest! {
         let ending = crate::recording::Ending { outcome: outcome.into(), ..Default::default() };
         let (stream, all) =
             (Digest::of(&samples).failure(&info, &ending), RunFailure::of_recording(&info, &samples, &ending));
-        // Values that are not known are equal, too.
+        // Compares text, because unknown values are NaN and must count as equal.
         prop_assert_eq!(format!("{stream:?}"), format!("{all:?}"));
     }
 
@@ -134,7 +134,7 @@ proptest! {
     }
 }
 
-/// Noise with single peaks; the value of sample `i`.
+/// Returns the value of sample `i`: noise with single peaks.
 fn noise(i: usize) -> f64 {
     let mixed = (i as u64 + 1)
         .wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -143,8 +143,8 @@ fn noise(i: usize) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// However long a recording is, its curves have no more points; each stands for a piece of equal length and has the lowest and the
-/// highest value of it, in their order. A recording that is shorter is there with each of its samples.
+/// The number of points of a curve is bounded for any length of the recording. Each point stands for a piece of equal
+/// length and keeps its lowest and highest value in order. A shorter recording keeps every sample.
 #[test]
 fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     for n in [1, 2, 15_999, POINTS_MAX, POINTS_MAX + 1, 31_999, 32_000, 32_001, 100_003] {
@@ -184,7 +184,7 @@ fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     }
 }
 
-/// States that change with every sample fill no memory; of errors none is lost.
+/// States that change with every sample use bounded memory; no error is lost.
 #[test]
 fn rows_of_states_are_bounded_and_lose_no_error() {
     let (mut states, mut errors) = (Runs::new(Joined::Longer), Runs::new(Joined::Both));

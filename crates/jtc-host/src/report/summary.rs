@@ -1,26 +1,26 @@
-//! The figures of a run: tracking error and torque per joint.
+//! Figures of a run: tracking error and torque per joint.
 
 use serde::Serialize;
 
 use crate::recording::RecordingInfo;
 use crate::sample::{JointSample, Sample};
 
-/// Figures of one joint; `None` where the source does not know them.
+/// Figures of a joint; `None` for a value that the source does not know.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSummary {
-    /// As in the arm file.
+    /// Name as in the arm file.
     pub name: String,
-    /// Root mean square of the position error, mrad: what was commanded for the time of a measurement minus that (J-62).
+    /// Root mean square of the position error, mrad: the position commanded for the time of a measurement minus the measured one (J-62).
     pub rms_error_mrad: Option<f64>,
     /// Largest absolute error, mrad.
     pub max_error_mrad: Option<f64>,
     /// Largest absolute torque, N·m.
     pub peak_torque_nm: Option<f64>,
-    /// The limit, N·m.
+    /// Torque limit, N·m.
     pub torque_limit_nm: Option<f64>,
     /// Peak torque as a share of the limit, 0..1.
     pub torque_share: Option<f64>,
-    /// Largest absolute speed, rad/s: measured, or commanded where nothing was measured.
+    /// Largest absolute speed, rad/s: measured, or commanded if no speed was measured.
     pub peak_velocity_rad_s: Option<f64>,
     /// Highest bearing temperature, °C.
     pub peak_temperature_c: Option<f64>,
@@ -29,36 +29,36 @@ pub struct JointSummary {
 /// Figures of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
-    /// From the first sample to the last, s.
+    /// Time from the first to the last sample, s.
     pub recorded_s: f64,
-    /// While the trajectory was executed, s.
+    /// Duration of the execution of the trajectory, s.
     pub executed_s: f64,
-    /// Samples that the figures are made of.
+    /// Number of samples used for the figures.
     pub samples: usize,
-    /// Base to wrist.
+    /// Figures of the joints, base to wrist.
     pub joints: Vec<JointSummary>,
 }
 
 impl Summary {
-    /// The figures over the samples in which a trajectory was executed, or over all when there is none.
+    /// Computes the figures over the samples of an execution, or over all samples of a recording without an execution.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
         let mut figures = Figures::default();
         samples.iter().for_each(|sample| figures.push(sample));
         figures.summary(info)
     }
 
-    /// The joint with the largest value of `figure`, and the value.
+    /// Returns the joint with the largest value of `figure`, and the value.
     pub fn worst(&self, figure: impl Fn(&JointSummary) -> Option<f64>) -> Option<(&JointSummary, f64)> {
         self.joints.iter().filter_map(|j| figure(j).map(|v| (j, v))).max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
-/// The figures of samples that come one after the other: of all, and of those of the execution, which may be still to come.
+/// Figures of streamed samples: of all, and of an execution, which may begin later.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
-    /// Times of the first and of the last sample.
+    /// Times of the first and the last sample.
     recorded: Option<(f64, f64)>,
-    /// Those before an execution; all, where there is none.
+    /// Sums before an execution; sums of all samples without an execution.
     before: Sums,
     executed: Sums,
 }
@@ -90,7 +90,7 @@ impl Figures {
 #[derive(Clone, Debug, Default)]
 struct Sums {
     samples: usize,
-    /// Of the first and of the last one.
+    /// Times of the first and the last sample.
     times: Option<(f64, f64)>,
     joints: [JointSums; 6],
 }
@@ -105,7 +105,7 @@ impl Sums {
     }
 }
 
-/// The highest of the values that are known.
+/// Highest known value.
 #[derive(Clone, Copy, Debug, Default)]
 struct Peak(Option<f64>);
 

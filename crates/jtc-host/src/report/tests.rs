@@ -1,4 +1,4 @@
-//! The page is whole, offline and of bounded size; the figures are right.
+//! The page is complete, offline and of bounded size; the figures are correct.
 
 use super::curves::Curve;
 use super::*;
@@ -115,7 +115,7 @@ fn the_picture_is_small() {
     assert!(!picture.contains("NaN"));
 }
 
-/// A run in which joint 3 falls silent at point 600.
+/// Returns a run in which joint 3 stops answering at point 600.
 fn silent_joint() -> (RecordingInfo, Vec<Sample>) {
     let (info, mut samples) = run(1000);
     for s in &mut samples[600..] {
@@ -177,7 +177,7 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status names no joint: the one that went where no joint can go in the time is named, with the rows before.
+/// The status names no joint: the report names the joint with an impossible step, and shows the rows before it.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {
     let (mut info, mut samples) = run(1000);
@@ -224,7 +224,7 @@ fn a_recording_without_its_end_is_no_success() {
     assert_eq!(of(&samples, "stopped", ""), None);
 }
 
-/// A page of a plan shows what binds when, and figures of what is commanded: nothing of it was measured.
+/// The page of a plan shows the binding limits and the commanded figures; no value was measured.
 #[test]
 fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let arm = Arm::avena();
@@ -250,7 +250,7 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }
 
-/// A joint that stands still, moves by next to nothing, is far away or has no numbers: the picture stays small, and each axis readable.
+/// A joint that stands still, moves very little, is far away or has no values: the picture stays small, and each axis readable.
 #[test]
 fn a_picture_is_small_whatever_the_joints_do() {
     type Lead = fn(f64) -> f64;

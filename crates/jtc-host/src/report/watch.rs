@@ -1,4 +1,4 @@
-//! Looking for what broke first while samples come.
+//! Search for the first error while samples are streamed.
 
 use std::collections::VecDeque;
 
@@ -9,17 +9,17 @@ use super::failure::{Around, BEFORE, began_s, is_bad, why_it_ended};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Looks for what broke first in samples that come one after the other; finds what [`RunFailure::of_recording`] finds.
+/// Searches for the first error in streamed samples, with the same result as [`RunFailure::of_recording`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
-    /// The last ones.
+    /// Most recent samples.
     recent: VecDeque<Sample>,
-    /// A trajectory was executed.
+    /// `true` if a trajectory was executed.
     begun: bool,
-    /// When the run began, as the last sample of a motion shows it, else the time of the first sample.
+    /// Start of the run according to the last sample of a motion, else the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
-    /// The first error before an execution, which counts where there is none, and since then.
+    /// First error before an execution (used without an execution), and first error since its start.
     before: Option<Around>,
     since: Option<Around>,
 }
@@ -54,7 +54,7 @@ impl Watch {
     }
 }
 
-/// The last of these samples, and those before it.
+/// Returns the last of these samples, and those before it.
 fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
     Around {
         samples: recent.iter().copied().collect(),

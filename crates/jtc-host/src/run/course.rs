@@ -17,9 +17,9 @@ pub enum Course {
     To {
         /// Pose.
         target: Target,
-        /// Set if the flange keeps to a straight line; else the joints move in proportion to each other if that takes no longer.
+        /// `true` if the flange moves on a straight line; else the joints move in proportion to each other if that is not slower.
         line: bool,
-        /// Torque that the move leaves, % of each limit.
+        /// Torque that the move keeps free, % of each limit.
         margin_pct: f64,
     },
 }
@@ -42,12 +42,12 @@ impl Course {
         }
     }
 
-    /// Returns the trajectory, for an arm that stands at `here` (rad) on a controller with the settings `device`. `speed_pct`: % of the
-    /// speed of a trajectory that is given; `move_speed`: speed of a move, which the option `option` sets.
+    /// Returns the trajectory, for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is
+    /// the speed of a given trajectory in %; `move_speed` is the speed of a move, which `option` sets.
     ///
     /// # Errors
     ///
-    /// [`PlanError`]; [`Course::message`] has its message.
+    /// [`PlanError`]; [`Course::message`] returns its message.
     pub fn planned(
         &self,
         arm: &Arm,

@@ -1,7 +1,7 @@
 //! A run: the motions of an [`Order`], each one checked, uploaded, executed and followed to its end.
 //!
-//! The procedure stands here once. A front end (the command line, the agent, Python) implements [`Observer`]: it shows the steps, decides
-//! what happens to the motion, and keeps its samples.
+//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`]: it
+//! shows the steps, decides on changes to the motion, and stores its samples.
 mod course;
 mod start;
 
@@ -25,7 +25,7 @@ pub use start::{OpenPath, Start, StartError};
 pub struct Order<'a> {
     /// Arm of the controller.
     pub arm: &'a Arm,
-    /// Settings of the controller, and how each motion is checked and uploaded.
+    /// Settings of the controller, and options for check and upload of each motion.
     pub options: &'a CheckOptions,
     /// Trajectory of the first run.
     pub trajectory: &'a Trajectory,
@@ -33,7 +33,7 @@ pub struct Order<'a> {
     pub later: &'a Trajectory,
     /// Number of runs; 0 counts as 1.
     pub runs: u32,
-    /// Speed of an approach, % of the limits. `None`: the arm must stand at the first point of each run.
+    /// Speed of an approach, % of the limits. `None`: the arm must be at the first point of each run.
     pub approach_pct: Option<f64>,
 }
 
@@ -53,7 +53,7 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Name in events and reports.
+    /// Returns the name used in events and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Approach => "approach",
@@ -76,7 +76,7 @@ pub struct Leg {
 }
 
 impl Leg {
-    /// Returns true if the motion reached its last point.
+    /// Returns `true` if the motion reached its last point.
     pub fn is_finished(&self) -> bool {
         matches!(self.outcome, Ok(Outcome::Finished(_)))
     }
@@ -94,9 +94,9 @@ pub struct Ended {
 /// Receiver of the samples of a motion, called while the arm moves.
 pub type SampleReceiver = Box<dyn FnMut(&Sample)>;
 
-/// A front end of a run. Each method is called by [`run`], in the order in which they stand here.
+/// A front end of a run. [`run`] calls each method, in the order listed here.
 pub trait Observer<P: Port> {
-    /// Failure in the words of the front end.
+    /// Failure in the terms of the front end.
     type Failure;
 
     /// Converts the reason why a motion does not begin.
@@ -105,7 +105,7 @@ pub trait Observer<P: Port> {
     /// Converts an error before a motion began; [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
-    /// Returns true once the run must end before its next motion. In motion [`Observer::status`] decides.
+    /// Returns `true` once the run must end before its next motion. During a motion [`Observer::status`] decides.
     fn is_cancelled(&mut self) -> bool;
 
     /// The next motion has passed its check.
@@ -117,11 +117,11 @@ pub trait Observer<P: Port> {
     /// The whole motion was uploaded.
     fn uploaded(&mut self, phase: Phase, upload: &UploadReport);
 
-    /// The motion begins when this returns. Returns what receives its samples.
+    /// Reports that the motion begins when this call returns. Returns the receiver of its samples.
     ///
     /// # Errors
     ///
-    /// The run ends with this failure, and the motion does not begin.
+    /// If this fails, the run ends with the failure and the motion does not begin.
     fn begins(
         &mut self,
         session: &mut Session<P>,
@@ -129,17 +129,17 @@ pub trait Observer<P: Port> {
         checked: &CheckedTrajectory,
     ) -> Result<SampleReceiver, Self::Failure>;
 
-    /// A status arrived in motion. Returns what happens to the motion.
+    /// Evaluates a status during the motion. Returns the next action for the motion.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
     /// The flow that [`Observer::status`] returned was applied, with this result. A refused speed or resume does not end the motion.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
-    /// The motion has ended. What [`Observer::status`] returned for its last status was not applied.
+    /// Reports the end of the motion. The action that [`Observer::status`] returned for its last status was not applied.
     ///
     /// # Errors
     ///
-    /// The run ends with this failure.
+    /// If this fails, the run ends with the failure.
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
     /// Run `n` (from 1) has finished, and another one follows.
@@ -150,7 +150,7 @@ pub trait Observer<P: Port> {
 ///
 /// # Errors
 ///
-/// A failure before a motion begins. A motion that fails ends the run with `Ok`: see [`Leg::outcome`].
+/// Returns a failure that occurs before a motion begins. A motion that fails ends the run with `Ok`: see [`Leg::outcome`].
 pub fn run<P: Port, O: Observer<P>>(
     session: &mut Session<P>,
     order: &Order<'_>,

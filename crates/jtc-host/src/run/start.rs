@@ -24,13 +24,13 @@ pub enum StartError {
     /// A trajectory of the run was refused.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// The arm does not stand at the first point, nothing else is wrong, and the order has no approach.
+    /// The arm is not at the first point, no other problem exists, and the order has no approach.
     #[error(transparent)]
     Elsewhere(CheckError),
     /// An approach of the run is not possible.
     #[error("the straight way from where the arm stands to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
-    /// A run cannot follow the one before.
+    /// A run cannot follow the previous run.
     #[error(transparent)]
     Open(#[from] OpenPath),
 }
@@ -95,12 +95,12 @@ impl Diagnose for OpenPath {
 }
 
 impl Order<'_> {
-    /// Returns the motion that run `n` (from 1) begins with, for an arm that stands at `here` (rad). Before the first run it checks the
+    /// Returns the first motion of run `n` (from 1), for an arm at `here` (rad). Before the first run it checks the
     /// trajectories and the approaches of all runs, with the limits, the payload and the settings of the controller.
     ///
     /// # Errors
     ///
-    /// [`StartError`].
+    /// Returns a [`StartError`].
     pub fn start(&self, n: u32, here: &[f64; JOINTS]) -> Result<Start, StartError> {
         let trajectory = self.trajectory_of(n);
         let elsewhere = match CheckedTrajectory::check(trajectory, self.arm, here, self.options) {
@@ -121,7 +121,7 @@ impl Order<'_> {
         }
     }
 
-    /// Checks the runs after the first one, and that each leads to the next one.
+    /// Checks the runs after the first one, and that each ends at the start of the next one.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -129,7 +129,7 @@ impl Order<'_> {
             CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
         }
         let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
-        // The later runs follow each other only if there are two of them.
+        // Later runs follow each other only if there are at least two.
         let before = [self.trajectory, next];
         for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
             let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
@@ -157,7 +157,7 @@ mod tests {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
-    /// `runs` of `trajectory` and, after the first, of `later`.
+    /// Has `runs` runs, the first of `trajectory`, all others of `later`.
     struct Course<'a> {
         trajectory: &'a Trajectory,
         later: &'a Trajectory,
@@ -218,7 +218,7 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // The pose at its end is left at the speed of an approach: too fast for what the controller allows there.
+        // An approach leaves the pose at the end of the path: its speed is too high for the controller's limit at that pose.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }
@@ -232,14 +232,14 @@ mod tests {
         let StartError::Open(open) = &error else { panic!("{error}") };
         assert!(open.joint.number() == 2 && (open.distance - 1.2).abs() < 1e-3, "{error}");
         assert_eq!(error.diagnosis().code, "open-path");
-        // Only a third run would begin at the end of the second one.
+        // Only a third run would begin at the end of the second run.
         let there = motion.points.last().unwrap().position;
         let back = joint_move(&there, &[0.0; JOINTS], &Config::avena(), 30.0).unwrap();
         let and_back = |runs| Course { trajectory: &motion, later: &back, runs, approach_pct: None };
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
-        // The reason that no approach cures comes first.
+        // A problem that no approach solves is reported first.
         assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
         assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }

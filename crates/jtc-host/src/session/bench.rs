@@ -1,4 +1,4 @@
-//! Joints that are not there, for work on a bench (J-53).
+//! Absent joints, for work on a bench (J-53).
 
 use jtc_core::{JOINTS, settings};
 use jtc_wire::{Joint, SettingValue};
@@ -8,22 +8,22 @@ use crate::error::Error;
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Where the model has each joint that is set absent, rad; `None` for those that are there.
+    /// Returns the model position of each joint that is set absent, rad; `None` for the other joints.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::device_config`].
+    /// Returns the errors of [`Session::device_config`].
     pub fn absent(&mut self) -> Result<[Option<f64>; JOINTS], Error> {
         let config = self.device_config()?;
         Ok(std::array::from_fn(|j| config.absent[j].then_some(config.absent_position[j])))
     }
 
-    /// Sets the joints with a position (rad) absent, and all others not. The controller has to be in Init or Error. It executes no motion
-    /// while a joint is absent, and a drive that answers all the same is an error.
+    /// Sets the joints with a position (rad) absent and the others present. The controller must be in Init or Error.
+    /// While a joint is absent the controller executes no motion, and an answer of that joint's drive is an error.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::set_settings`].
+    /// Returns the errors of [`Session::set_settings`].
     pub fn set_absent(&mut self, absent: &[Option<f64>; JOINTS]) -> Result<(), Error> {
         let mut values = Vec::new();
         for (joint, position) in Joint::ALL.into_iter().zip(absent) {

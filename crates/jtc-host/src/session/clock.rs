@@ -1,31 +1,33 @@
-//! The time of statuses, which carry none of their own.
+//! Time of statuses, which contain no time stamp.
 
 use std::time::Duration;
 
 use jtc_wire::Status;
 
-/// Longest that a status is taken to be on its way, s.
+/// Maximum assumed transmission delay of a status, s.
 const DELAY_S: f64 = 0.1;
-/// Least time between two statuses, s: those that a slow computer reads at once are samples of their own, not one.
+/// Minimum time between two statuses, s: statuses that a slow computer reads at once remain separate samples.
 const APART_S: f64 = 1e-6;
 
-/// Time of statuses: the controller's own milliseconds while it follows the path, which no delay on the way to us can blur; the time
-/// of arrival otherwise. Path time does not pass as fast at another speed (J-57): it never leaves that of arrival for long.
+/// Clock for statuses. While the controller follows the path, the clock uses the controller's own milliseconds, without
+/// transmission jitter; otherwise the time of arrival. At another speed path time runs slower (J-57), so the clock
+/// stays within 0.1 s of the arrival.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
     point: u32,
-    /// Of the status before.
+    /// Time of the previous status.
     time_s: Option<f64>,
 }
 
 impl StatusClock {
-    /// A clock that begins at this time of the port, where the controller is at this point.
+    /// Starts a clock at this time of the port, with the controller at this point.
     pub fn begin(now: Duration, point: u32) -> Self {
         Self { start: now, arrived: now, point, time_s: None }
     }
 
-    /// Time of the next status, which arrived at this time of the port: s since the clock began. It always goes on.
+    /// Returns the time of the next status, which arrived at this time of the port: s since the start of the clock. The
+    /// time always increases.
     pub fn at(&mut self, now: Duration, status: &Status) -> f64 {
         let moved = f64::from(status.point.saturating_sub(self.point)) * 1e-3;
         let waited = now.saturating_sub(self.arrived).as_secs_f64();
@@ -55,19 +57,19 @@ mod tests {
 
     #[test]
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
-        // Delays do not blur it.
+        // Transmission delays have no effect.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // At half the speed, and while it stands.
+        // At half the speed, and during a standstill.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
-        // Read at once, standing or ahead of our time: no two have one time, by which a recording would take them for one sample.
+        // Read at once, at a standstill or ahead of the host's time: all times differ, because a recording merges samples with equal times.
         let at_once = times(&[(40, 40), (200, 40), (200, 40), (200, 400), (200, 440), (200, 440)]);
         assert!(at_once.is_sorted_by(|a, b| a < b), "{at_once:?}");
     }
 
     proptest! {
-        /// Whatever comes: statuses are missing, points begin anew, another trajectory is at another point.
+        /// Any input: missing statuses, a point index that starts again, another trajectory at another point.
         #[test]
         fn time_goes_on_and_is_that_of_arrival_to_a_tenth_of_a_second(
             begins_at in any::<u32>(),

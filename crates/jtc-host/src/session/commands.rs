@@ -1,4 +1,4 @@
-//! The simple commands.
+//! Simple commands.
 
 use std::time::Duration;
 
@@ -12,10 +12,10 @@ use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::port::Port;
 use crate::words;
 
-/// Longest that a controller waits with teaching until the arm is held, and a little more.
+/// Maximum time for which a controller delays teaching until the arm is held, plus some reserve.
 const TEACHING: Duration = Duration::from_secs(11);
 
-/// What the controller wants to be given.
+/// Parameter that the controller needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Parameter {
@@ -30,7 +30,7 @@ pub enum Parameter {
 }
 
 impl Parameter {
-    /// Its name in messages.
+    /// Returns the name for messages.
     pub fn name(self) -> &'static str {
         match self {
             Parameter::FrictionTable => "friction table",
@@ -51,13 +51,13 @@ impl Parameter {
 }
 
 impl<P: Port> Session<P> {
-    /// Somebody asks for a motion now: one who has a session for longer than for one motion calls this before each of them. On a line that is
-    /// shared with others nothing moves the arm that was asked for before somebody else stopped it; what asks is the session's beginning, or
-    /// the last call of this.
+    /// Marks the start of a motion request. Call this before each motion if the session is used for several motions. On
+    /// a shared line, requests made before another client's Stop are rejected. The time of a request is the beginning of
+    /// the session or the last call of this function.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`].
+    /// [`LinkError::Port`] if the port fails.
     pub fn ask_to_move(&mut self) -> Result<(), LinkError> {
         Ok(self.port.ask_to_move()?)
     }
@@ -66,18 +66,18 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] when the controller does not allow it in its state; [`LinkError::NotConfirmed`], [`LinkError::NoLink`] and
-    /// [`LinkError::Port`] of the line.
+    /// [`LinkError::Refused`] if the controller rejects the command in its state; [`LinkError::NotConfirmed`],
+    /// [`LinkError::NoLink`] and [`LinkError::Port`] for errors of the line.
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
     }
 
-    /// Like [`clear`](Self::clear), but returns false when the controller refuses it because nothing can be cleared yet (J-21): the fault of
-    /// a node is still there.
+    /// Like [`clear`](Self::clear), but returns `false` if the controller rejects the command because the fault of a
+    /// node is still present (J-21).
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn clear_if_possible(&mut self, jtc: bool, nodes: u8) -> Result<bool, LinkError> {
         match self.clear(jtc, nodes) {
             Ok(()) => Ok(true),
@@ -90,16 +90,16 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn clear_occurred(&mut self) -> Result<(), LinkError> {
         self.command(&fixed::CLEAR_OCCURRED_ERRORS)
     }
 
-    /// Clears the errors of the controller and of all nodes, and those that have occurred.
+    /// Clears the current errors of the controller and of all nodes, and the occurred errors.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn clear_all(&mut self) -> Result<(), LinkError> {
         self.clear(true, ALL_NODES)?;
         self.clear_occurred()
@@ -109,17 +109,17 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn reset(&mut self, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
-    /// Teaching on (only in HoldPos) or off. It begins once the arm is held at rest; this waits for it.
+    /// Switches teaching on (only in HoldPos) or off. Teaching begins once the arm is held at rest; this function waits for it.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`]; [`StateError::Timeout`] when teaching does not begin, because the arm does not come to rest;
-    /// [`StateError::Device`] when the controller has an error instead.
+    /// Returns the errors of [`Session::clear`]; [`StateError::Timeout`] if teaching does not begin because the arm
+    /// does not come to rest; [`StateError::Device`] if the controller has an error instead.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         if on {
             return self.teach_until(|| false);
@@ -127,11 +127,12 @@ impl<P: Port> Session<P> {
         Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
     }
 
-    /// Ends teaching, whoever has switched it on.
+    /// Ends teaching, including teaching that another client has switched on.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::teach`], except a denial: an agent that denies this has ended the teaching of its other client itself.
+    /// Returns the errors of [`Session::teach`], except a denial: an agent that denies this has ended the teaching of
+    /// its other client itself.
     pub fn end_teaching(&mut self) -> Result<(), Error> {
         match self.teach(false) {
             Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
@@ -139,18 +140,19 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Teaching on, and no more waiting for it once `ended` returns true. Teaching that does not begin is switched off again: the controller
-    /// would begin it as soon as the arm rests, when nobody reckons with an arm that gives way.
+    /// Switches teaching on, and stops waiting once `ended` returns `true`. If teaching does not begin in time, it is
+    /// switched off again. Otherwise the arm would become compliant as soon as it is at rest, when the operator no
+    /// longer expects it.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::teach`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::teach`]; [`Error::Cancelled`].
     pub fn teach_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         self.introduce()?;
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // It does not teach, or for somebody else.
+            // The controller does not teach, or another client has switched teaching on.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
             Ok(()) => {
@@ -161,7 +163,7 @@ impl<P: Port> Session<P> {
             }
         };
         if begun.is_err() {
-            // The first error is the one to report; what is accepted in every state needs no answer here.
+            // Report the first error; this command is accepted in every state, so its result is ignored.
             let _ = self.teach(false);
         }
         begun
@@ -175,11 +177,11 @@ impl<P: Port> Session<P> {
         if taught && !ended() { Ok(()) } else { Err(Error::Cancelled) }
     }
 
-    /// Pump on or off.
+    /// Switches the pump on or off.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn gripper(&mut self, pump: bool) -> Result<(), LinkError> {
         self.command(&fixed::gripper_control(pump))
     }
@@ -188,7 +190,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::clear`].
+    /// Returns the errors of [`Session::clear`].
     pub fn use_default(&mut self, parameter: Parameter) -> Result<(), LinkError> {
         self.command(&fixed::empty(parameter.use_default()))
     }
@@ -197,20 +199,20 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`Session::use_default`], of the first that is not accepted.
+    /// Returns the errors of [`Session::use_default`] for the first parameter that is not accepted.
     pub fn use_defaults(&mut self) -> Result<(), LinkError> {
         [Parameter::FrictionPolynomial, Parameter::Pid, Parameter::ArmModel]
             .into_iter()
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory that was just uploaded, from its first point; after a pause it goes on from there. **The arm moves.**
+    /// Starts the trajectory that was just uploaded, from its first point; after a pause from the paused point. **The arm moves.**
     ///
     /// # Errors
     ///
-    /// [`MotionError::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the controller still
-    /// holds it. [`LinkError::Refused`] when the controller does not start it: the arm is not at the first point (J-34), or is not held.
-    /// [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`MotionError::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the
+    /// controller still holds it. [`LinkError::Refused`] if the controller does not start it: the arm is not at the
+    /// first point (J-34) or is not held. [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
@@ -219,20 +221,20 @@ impl<P: Port> Session<P> {
         self.go()
     }
 
-    /// Execute, whatever the controller holds.
+    /// Sends Execute without checking the trajectory in the controller.
     pub(super) fn go(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
-    /// Goes on after a pause. What remains of a trajectory that this session uploaded is checked again where settings or payload were
-    /// changed since its check; of another one the session knows nothing to check.
+    /// Resumes after a pause. If this session uploaded the trajectory and settings or payload changed since its check,
+    /// the remainder is checked again. The session cannot check another client's trajectory.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RestRefused`], and nothing is sent, when what remains does not pass any more.
+    /// [`MotionError::RestRefused`], and nothing is sent, if the remainder no longer passes the check.
     /// [`StateError::HeldStop`], and nothing is sent, while the cause of a held stop is not cleared.
-    /// [`MotionError::NotPaused`], and nothing is sent, when nothing is paused; [`LinkError::Refused`] when the arm was moved since;
-    /// [`MotionError::LinkLost`] when no confirmation came.
+    /// [`MotionError::NotPaused`], and nothing is sent, if no motion is paused; [`LinkError::Refused`] if the arm was
+    /// moved since; [`MotionError::LinkLost`] if no confirmation arrived.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
         let status = self.fresh_status()?;
@@ -255,24 +257,24 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] when nothing moves; [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
 
-    /// Ends the trajectory; the next execution begins at its start.
+    /// Ends the trajectory; the next execution starts at its first point.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] when there is nothing to stop; [`MotionError::LinkLost`] when no confirmation came: the arm may be moving.
+    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Without a confirmation it is not known whether the arm moves: [`MotionError::LinkLost`] states it.
+    /// Sends an execution command. Without a confirmation the motion of the arm is unknown; [`MotionError::LinkLost`] reports this.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // Nothing comes before a Stop or a Pause.
+        // A Stop or a Pause is sent without any preceding frame.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
@@ -281,20 +283,21 @@ impl<P: Port> Session<P> {
         let retries = self.statistics.retries;
         let mut record = match self.request(&fixed::exec(command)) {
             Ok(record) => record,
-            // Only its record was lost.
+            // Only the record was lost.
             Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
                 return Ok(());
             }
             Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
         };
         if stopping && record.data == DataStatus::IncorrectValue {
-            // For want of an introduction: there is nothing to be wrong about a Stop but its time (J-51).
+            // The code is generic because no introduction preceded the command: a Stop can only be
+            // rejected because of the state (J-51).
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {
             return Ok(());
         }
-        // Sent again after its confirmation was lost, it is refused although the first one did its work.
+        // The command was repeated after its confirmation was lost. The repetition is rejected although the first one took effect.
         if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s))
         {
             return Ok(());
@@ -302,7 +305,7 @@ impl<P: Port> Session<P> {
         Err(self.refused(record).into())
     }
 
-    /// An error of the link while the arm moves or may move, with what is known about the motion; a refusal as it is.
+    /// Returns an error of the link while the arm moves or may move, with the known state of the motion; returns a rejection unchanged.
     pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
         if !error.is_loss() {
             return error.into();
@@ -310,13 +313,13 @@ impl<P: Port> Session<P> {
         MotionError::LinkLost { last: self.last.map(Box::new), stop_sent, source: Box::new(error) }.into()
     }
 
-    /// Waits until the controller is in HoldPos; an error at once when it reports errors.
+    /// Waits until the controller is in HoldPos; returns an error at once if it reports errors.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller reports errors, [`StateError::HeldStop`] while the cause of one is not cleared,
-    /// [`StateError::Timeout`] when it is not in HoldPos in this time;
-    /// those of [`Session::next_status`].
+    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop
+    /// is not cleared, [`StateError::Timeout`] if it is not in HoldPos in this time; the errors of
+    /// [`Session::next_status`].
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
             s.state.is_in(&[ControllerState::HoldPos, ControllerState::Error])
@@ -324,23 +327,24 @@ impl<P: Port> Session<P> {
         self.without_error(status)
     }
 
-    /// Waits until the controller holds the arm in HoldPos with every drive enabled, but those of joints that are set absent; an error at once when it reports errors. The
-    /// positions of the status are then measured ones, the pose that a run starts from.
+    /// Waits until the controller holds the arm in HoldPos with every drive enabled, except drives of joints that are
+    /// set absent. Returns an error at once if the controller reports errors. The positions of the returned status are
+    /// measured; they are the pose from which a run starts.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller reports errors, [`StateError::HeldStop`] while the cause of one is not cleared,
-    /// [`StateError::Timeout`] when it does not hold the arm in this time (it
-    /// may still lack parameters); those of [`Session::next_status`].
+    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop
+    /// is not cleared, [`StateError::Timeout`] if it does not hold the arm in this time (parameters may be missing);
+    /// the errors of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
         self.wait_ready_until(timeout, || false)
     }
 
-    /// The same, and no more waiting once `ended` returns true.
+    /// Like [`Session::wait_ready`], but stops waiting once `ended` returns `true`.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::wait_ready`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::wait_ready`]; [`Error::Cancelled`].
     pub fn wait_ready_until(&mut self, timeout: Duration, ended: impl Fn() -> bool) -> Result<Status, Error> {
         let ready = |s: &Status| s.state == ControllerState::HoldPos && words::is_held(s);
         let status = self.wait_for("HoldPos with all drives enabled", timeout, |s| {

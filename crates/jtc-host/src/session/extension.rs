@@ -1,4 +1,4 @@
-//! What goes beyond the protocol of existing devices: identity, settings, the arm as one thing, jogging (J-50 to J-58).
+//! Extensions of the protocol of existing devices: identity, settings, the arm as a whole, jogging (J-50 to J-58).
 
 use std::time::Duration;
 
@@ -14,29 +14,29 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
-/// A device reports every reason to a host that sent an extension request within the last 2 s (J-51): it is repeated in time.
+/// Interval of extension requests: a device reports every reason only to a host that sent such a request within the last 2 s (J-51).
 pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
-/// Longest that a device may take to store an arm: erasing a sector of flash does.
+/// Maximum time in which a device stores an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
 
-/// What is known of the device's extensions.
+/// State of knowledge about the device's extensions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
-    /// Nobody has asked yet.
+    /// The session has not asked yet.
     #[default]
     Unknown,
-    /// It has none.
+    /// The device has no extensions.
     None,
-    /// It has some; asked at this time of the port.
+    /// The device has extensions; the last request was sent at this time of the port.
     Asked(Duration),
 }
 
 impl<P: Port> Session<P> {
-    /// Who the device is; `None` when it has no extensions.
+    /// Returns the identity of the device; `None` if it has no extensions.
     ///
     /// # Errors
     ///
-    /// Those of the line.
+    /// Returns the errors of the line.
     pub fn info(&mut self) -> Result<Option<Info>, LinkError> {
         let info = self.ask(&fixed::GET_INFO, |answer| match answer {
             Answer::Info(info) => Some(info),
@@ -49,17 +49,17 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// What the device does about what it has found (J-69); `None` where it does not tell, or the line does not answer.
+    /// Returns the device's reactions to detected problems (J-69); `None` if the device does not report them or the line does not answer.
     pub fn reactions(&mut self) -> Option<Reactions> {
         self.info().ok().flatten()?.reactions
     }
 
-    /// What the device has found when it held the arm last (J-69); `None` where it does not tell, or the line does not answer.
+    /// Returns the cause of the device's last held stop (J-69); `None` if the device does not report it or the line does not answer.
     pub fn stop_cause(&mut self) -> Option<StopCause> {
         self.reactions()?.stop.map(|(cause, _)| cause)
     }
 
-    /// Fails where the arm is in a held stop (J-69).
+    /// Returns an error if the arm is in a held stop (J-69).
     pub(super) fn without_held_stop(&mut self, status: &Status) -> Result<(), Error> {
         if !status.is_held_stop() {
             return Ok(());
@@ -67,7 +67,7 @@ impl<P: Port> Session<P> {
         Err(StateError::HeldStop { status: Box::new(*status), cause: self.stop_cause() }.into())
     }
 
-    /// Asks the device who it is where that was not done of late: only then it reports each reason of a refusal (J-51).
+    /// Asks the device for its identity, if the last request is older than 1 s: only then it reports each reason of a rejection (J-51).
     pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
         let due = match self.extensions {
             Extensions::Unknown => true,
@@ -78,7 +78,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // Statuses come: the command itself is worth a try.
+            // Statuses arrive: the command itself is worth a try.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -87,14 +87,14 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends an extension request; an error when it is refused or not known.
+    /// Sends an extension request; returns an error if it is rejected or unknown.
     pub(super) fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         let request = frame_type(type_byte(frame));
         if self.extensions == Extensions::None {
             return Err(LinkError::NoExtension { request });
         }
         let record = match self.request(frame) {
-            // An existing device finds no such type (J-50).
+            // An existing device reports an unknown type (J-50).
             Err(LinkError::NotConfirmed { last: Some(last), .. })
                 if last.status == FrameStatus::IncorrectFrameType =>
             {
@@ -111,7 +111,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Sends an extension request and waits for what it returns.
+    /// Sends an extension request and waits for its answer.
     pub(super) fn ask<T>(
         &mut self,
         frame: &[u8],
@@ -121,7 +121,7 @@ impl<P: Port> Session<P> {
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;
-            // It follows the record.
+            // The answer follows the record.
             let mut limit = Limit::new(self.confirmation_time(jtc_wire::ANSWER_MAX));
             loop {
                 while let Some(bytes) = self.answers.pop_front() {
@@ -139,8 +139,8 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request, tries: self.timeouts.tries, last: None })
     }
 
-    /// Asks for what is longer than a frame, page by page: `request` asks for the page from an index on, and `take` returns that
-    /// page and the length of the whole.
+    /// Requests data longer than a frame page by page: `request` builds the request for the page from an index on, and
+    /// `take` returns that page and the total length.
     fn ask_pages<T, const N: usize>(
         &mut self,
         request: impl Fn(u16) -> [u8; N],
@@ -158,16 +158,16 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Who the device is, which `request` needs.
+    /// Returns the identity of the device, which `request` needs.
     fn info_for(&mut self, request: FrameType) -> Result<Info, LinkError> {
         self.info()?.ok_or(LinkError::NoExtension { request })
     }
 
-    /// Every setting as the device has it, in the order of its table.
+    /// Returns every setting of the device, in the order of its table.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoExtension`], and those of the line.
+    /// [`LinkError::NoExtension`], and the errors of the line.
     pub fn settings(&mut self) -> Result<Vec<SettingValue>, LinkError> {
         self.ask_pages(fixed::get_settings, |answer, from| match answer {
             Answer::Settings { first, total, values } if first == from => {
@@ -177,38 +177,38 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// The settings that the device computes with; those that are built in where it has no extensions.
+    /// Returns the active settings of the device; the built-in ones if it has no extensions.
     ///
     /// # Errors
     ///
-    /// Those of the line, and [`ExtensionError::NoArm`] for settings of no arm.
+    /// Returns the errors of the line, and [`ExtensionError::NoArm`] if the settings are not a valid arm.
     pub fn device_config(&mut self) -> Result<Config, Error> {
         if !self.has_extensions() && self.info()?.is_none() {
             return Ok(Config::avena());
         }
         let values = self.settings()?;
-        // Those of a later version that this one does not know are left out.
+        // Settings of a later version that this version does not know are ignored.
         let known = values.into_iter().filter(|value| settings::setting(value.setting).is_some());
         let config = settings::with_values(&Config::avena(), known);
         Ok(config.map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// The arm that the device has in use.
+    /// Returns the active arm of the device.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::arm_image`], and [`ExtensionError::NoArm`] when it is none.
+    /// Returns the errors of [`Session::arm_image`], and [`ExtensionError::NoArm`] if the image is not a valid arm.
     pub fn device_arm(&mut self) -> Result<Arm, Error> {
         let image = self.arm_image()?;
         Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// Changes settings, all of them or none.
+    /// Changes settings; either all of them or none.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`]: a value out of range, or a state that does not allow it; [`LinkError::NoExtension`], and those of the
-    /// line.
+    /// [`LinkError::Refused`] if a value is out of range or the state does not permit it; [`LinkError::NoExtension`],
+    /// and the errors of the line.
     pub fn set_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let mut frame = vec![0; 6 + jtc_wire::VALUE_LEN * values.len().min(SET_VALUES_MAX)];
         let n = set_settings(&mut frame, values.iter().copied())?;
@@ -217,16 +217,16 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// The device has extensions, as far as it was asked.
+    /// Returns `true` if the device is known to have extensions.
     pub fn has_extensions(&self) -> bool {
         matches!(self.extensions, Extensions::Asked(_))
     }
 
-    /// The speed override: path seconds per second (J-57); 1 where the device has none.
+    /// Returns the speed override in path seconds per second (J-57); 1 if the device has none.
     ///
     /// # Errors
     ///
-    /// Those of the line.
+    /// Returns the errors of the line.
     pub fn speed(&mut self) -> Result<f64, LinkError> {
         let config = Config::avena();
         let first = settings::values(&config, 0, false)
@@ -244,29 +244,29 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sets the speed override, 0.05 to 1: a motion gets there along a ramp, and later ones run at it, too (J-57).
+    /// Sets the speed override, 0.05 to 1. A running motion reaches it along a ramp; later motions use it, too (J-57).
     ///
     /// # Errors
     ///
-    /// Those of [`Session::set_settings`].
+    /// Returns the errors of [`Session::set_settings`].
     pub fn set_speed(&mut self, speed: f64) -> Result<(), Error> {
         self.set_settings(&[SettingValue { setting: settings::SPEED, joint: 0, value: speed }])
     }
 
-    /// Names the arm that the device controls.
+    /// Sets the name of the arm that the device controls.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::set_settings`].
+    /// Returns the errors of [`Session::set_settings`].
     pub fn set_name(&mut self, name: &Name) -> Result<(), LinkError> {
         self.extension(&fixed::set_name(name))
     }
 
-    /// The arm in use as one thing: a [`jtc_wire::ArmImage`].
+    /// Returns the active arm as a whole: a [`jtc_wire::ArmImage`].
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Changed`] when the arm changed meanwhile; those of [`Session::settings`].
+    /// [`ExtensionError::Changed`] if the arm changed meanwhile; the errors of [`Session::settings`].
     pub fn arm_image(&mut self) -> Result<Vec<u8>, Error> {
         let info = self.info_for(FrameType::GetArm)?;
         let image = self.ask_pages(fixed::get_arm, |answer, from| match answer {
@@ -281,11 +281,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Keeps the arm in use over a loss of power, and waits until it is kept; returns its number.
+    /// Stores the active arm in non-volatile memory, and waits until it is stored; returns its number.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::NotStored`] when the memory failed; those of [`Session::set_settings`].
+    /// [`ExtensionError::NotStored`] if the memory failed; the errors of [`Session::set_settings`].
     pub fn store_arm(&mut self) -> Result<u32, Error> {
         self.extension(&fixed::STORE_ARM)?;
         let end = self.port.now() + STORING;
@@ -304,27 +304,28 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Torque off at rest, back to Init; the parameters have to be given again (J-53).
+    /// Switches the torque off at rest and returns to Init; afterwards the parameters must be sent again (J-53).
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] when the arm is not held at rest; [`LinkError::NoExtension`], and those of the line.
+    /// [`LinkError::Refused`] if the arm is not held at rest; [`LinkError::NoExtension`], and the errors of the line.
     pub fn disable(&mut self) -> Result<(), LinkError> {
         self.extension(&fixed::DISABLE)
     }
 
-    /// Joint velocities, rad/s, base to wrist: **the arm moves**, for 200 ms, unless this is called again before (J-58).
+    /// Jogs at these joint velocities, rad/s, base to wrist: **the arm moves**, for 200 ms, unless this is called again earlier (J-58).
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] outside HoldPos, beside a paused path, or for a velocity beyond its limit;
-    /// [`LinkError::NoExtension`], and those of the line.
+    /// [`LinkError::Refused`] outside HoldPos, while a trajectory is paused, or for a velocity beyond its limit;
+    /// [`LinkError::NoExtension`], and the errors of the line.
     pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
         let mut frame = [0; 30];
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         let halts = self.port.halts();
         match self.extension(&frame) {
-            // Another program's Stop has overtaken it (J-04). The port says whose it was, and sends nothing that moves the arm.
+            // Another program's Stop has overtaken the frame (J-04). The port reports the program that
+            // stopped the arm, and sends no frame that moves it.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

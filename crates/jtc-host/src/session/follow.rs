@@ -1,4 +1,4 @@
-//! Following an execution to its end.
+//! Follows an execution to its end.
 
 use std::time::Duration;
 
@@ -8,56 +8,56 @@ use super::Session;
 use crate::error::{Error, LinkError, MotionError};
 use crate::port::{Port, PortError};
 
-/// What a callback wants.
+/// Action that a callback requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
-    /// Go on.
+    /// Continue without a change.
     #[default]
     Continue,
     /// Pause on the path (only while following).
     Pause,
-    /// Go on after a pause (only while following).
+    /// Resume after a pause (only while following).
     Resume,
-    /// Another speed on the path, in percent (only while following, and where the device can).
+    /// Another speed on the path, % (only while following, and if the device supports it).
     Speed(u8),
     /// Stop the motion and follow it to standstill (only while following).
     Stop,
-    /// Leave at once; a motion goes on without us.
+    /// Return at once; the motion continues unobserved.
     Cancel,
 }
 
-/// How an execution ended.
+/// End of an execution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// At its last point.
+    /// The motion reached its last point.
     Finished(Status),
-    /// Stopped on the way, here or by somebody else.
+    /// The motion was stopped before its end, by this client or another one.
     Stopped(Status),
 }
 
-/// A confirmed command shows in the status within this time.
+/// Time within which a confirmed command appears in the status.
 const SETTLE: Duration = Duration::from_millis(300);
 
 impl<P: Port> Session<P> {
-    /// Follows the execution that was just started. `each` sees every status.
+    /// Follows the execution that was just started. `each` receives every status.
     ///
-    /// When the link is lost on the way, a stop is sent that may still arrive, and the error states that the arm may be moving.
+    /// If the link is lost during the motion, a Stop is sent, which may still arrive. The error states that the arm may be moving.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RunFault`] when the controller ended the motion with an error, [`MotionError::HeldStop`] when it stopped it and holds
-    /// the arm, [`Error::Cancelled`] when `each` left it, [`MotionError::LinkLost`] when nothing is received any more: the arm
-    /// may be moving.
+    /// [`MotionError::RunFault`] if the controller ended the motion with an error, [`MotionError::HeldStop`] if it
+    /// stopped the motion and holds the arm, [`Error::Cancelled`] if `each` returned [`Flow::Cancel`],
+    /// [`MotionError::LinkLost`] if no more data arrive: the arm may be moving.
     pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         self.follow_with(each, |_, _| {})
     }
 
-    /// The same; `done` is called with each thing that `each` wanted and what came of it: a speed or a resume that was refused does not end
-    /// the motion.
+    /// Like [`Session::follow`]; calls `done` with each action that `each` requested and its result. A rejected speed
+    /// or resume does not end the motion.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::follow`].
+    /// Returns the errors of [`Session::follow`].
     pub fn follow_with(
         &mut self,
         mut each: impl FnMut(&Status) -> Flow,
@@ -65,7 +65,7 @@ impl<P: Port> Session<P> {
     ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
-        // On an error the controller forgets the trajectory, and its point with it.
+        // On an error the controller deletes the trajectory and its point index.
         let mut point = 0;
         let mut occurred = None;
         loop {
@@ -92,7 +92,7 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The trajectory is gone, or nodes fell out of operation.
+                // The trajectory was deleted, or nodes have left operation.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
@@ -101,7 +101,7 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            // A motion that is being stopped is stopped, whatever key comes then and whoever pauses it.
+            // A stopping motion stays stopped, even if a key is pressed then or another client pauses it.
             let again = stopping && status.trajectory == TrajectoryState::Pause;
             let flow = match flow {
                 _ if again => Flow::Stop,
@@ -114,7 +114,7 @@ impl<P: Port> Session<P> {
                 Flow::Pause if status.is_executing() => unless_ended(self.pause()),
                 Flow::Resume => self.resume(),
                 Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
-                // Once accepted it needs no repetition: the controller slows down to standstill by itself.
+                // An accepted Stop is not repeated: the controller decelerates to standstill by itself.
                 Flow::Stop if !stopping || again => {
                     stopping = true;
                     unless_ended(self.stop())
@@ -124,7 +124,7 @@ impl<P: Port> Session<P> {
             done(flow, &did);
             match (flow, did) {
                 (_, Ok(())) => {}
-                // The motion goes on as it was, or stays paused, and is followed.
+                // The motion continues unchanged, or stays paused, and is followed further.
                 (
                     Flow::Resume,
                     Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
@@ -142,7 +142,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Nothing comes back any more; what goes out may still arrive, and an arm that nobody follows had better stand.
+    /// Sends a Stop after the link is lost: frames may still arrive, and an unobserved arm should not move.
     fn lost_in_motion(&mut self, error: LinkError) -> Error {
         let sent =
             self.last.is_none_or(|s| s.is_executing()) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
@@ -150,13 +150,13 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Errors of the joints that have occurred: what the controller acted upon by itself adds to them (J-66).
+/// Returns the occurred errors of the joints; errors that the controller handles by itself are included (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// A pause or stop may cross with the end of the motion, or a pause with the Stop of another program: it is refused then, and that is no
-/// failure.
+/// Accepts a rejected pause or stop if the motion has just ended, and a pause that crosses the Stop of another program:
+/// neither is a failure.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

@@ -1,4 +1,4 @@
-//! A whole arm for a device, as one thing (J-51, J-54).
+//! Transfer of a complete arm to a device (J-51, J-54).
 use jtc_wire::{ControllerState, Name, SettingValue};
 
 use super::{PushReport, Session};
@@ -6,36 +6,37 @@ use crate::arm::{Arm, ParameterSet};
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
-/// What a device has got of an arm.
+/// Part of an arm that the device has received.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmPart<'a> {
-    /// So many settings.
+    /// Number of settings.
     Settings(usize),
-    /// Its name.
+    /// Name of the arm.
     Name,
     /// Friction, gains or model.
     Parameter(&'a PushReport),
 }
 
 impl<P: Port> Session<P> {
-    /// Gives the device the whole arm: settings and name where they differ, then friction, gains and model; reads it back and
-    /// compares. The device has to be in Init or Error where settings differ.
+    /// Sends the complete arm to the device: settings and name if they differ, then friction, gains and model. Reads
+    /// the arm back and compares it. If settings differ, the device must be in Init or Error.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Incomplete`] for an arm without gains or friction, [`ParametersError::Unstable`](crate::ParametersError) for gains
-    /// with which it is not stable, [`ExtensionError::Differs`] when what is read back is
-    /// another one; those of [`Session::set_settings`] and [`Session::push`].
+    /// [`ExtensionError::Incomplete`] for an arm without gains or friction,
+    /// [`ParametersError::Unstable`](crate::ParametersError) if the arm is not stable with its gains,
+    /// [`ExtensionError::Differs`] if the arm read back differs; the errors of [`Session::set_settings`] and
+    /// [`Session::push`].
     pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(ArmPart<'_>)) -> Result<Vec<PushReport>, Error> {
         self.push_arm_until(arm, || false, done)
     }
 
-    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then, and the device keeps what `done` was
-    /// called with.
+    /// Like [`Session::push_arm`], until `ended` returns `true` because the user cancels: then sends nothing more, and
+    /// the device keeps the parts for which `done` was called.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::push_arm`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push_arm`]; [`Error::Cancelled`].
     pub fn push_arm_until(
         &mut self,
         arm: &Arm,
@@ -50,14 +51,14 @@ impl<P: Port> Session<P> {
         Ok(pushed)
     }
 
-    /// Gives the device the whole arm like [`Session::push_arm`], and has it stored (J-54); returns the number that the stored arm
-    /// has. The arm has no torque meanwhile: with friction, gains and model the controller would leave Init and hold it, so what it
-    /// has got is withdrawn before the last of the three comes.
+    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54); returns the number of the stored arm.
+    /// The arm has no torque meanwhile: with friction, gains and model the controller would leave Init and hold it, so
+    /// the received parts are withdrawn before the last of the three arrives.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Powered`] outside Init and Error, before anything is sent; those of [`Session::push_arm`] and
-    /// [`Session::store_arm`].
+    /// [`ExtensionError::Powered`] outside Init and Error, before anything is sent; the errors of [`Session::push_arm`]
+    /// and [`Session::store_arm`].
     pub fn push_and_store_arm(
         &mut self,
         arm: &Arm,
@@ -66,12 +67,12 @@ impl<P: Port> Session<P> {
         self.push_and_store_arm_until(arm, || false, done)
     }
 
-    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then, and the device keeps what `done` was
-    /// called with.
+    /// Like [`Session::push_and_store_arm`], until `ended` returns `true` because the user cancels: then sends nothing
+    /// more, and the device keeps the parts for which `done` was called.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::push_and_store_arm`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push_and_store_arm`]; [`Error::Cancelled`].
     pub fn push_and_store_arm_until(
         &mut self,
         arm: &Arm,
@@ -92,19 +93,19 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // As after a start: what is stored is in use when a host asks for it, all of it.
+        // As after a start: a later host request activates the complete stored arm.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }
 
-    /// Without torque, the device forgets its arm: parts of another one do not go with it (J-71).
+    /// Makes a device without torque drop its arm in use, so that parts of another arm are not combined with it (J-71).
     fn withdraw_arm(&mut self) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if state == ControllerState::Init {
             self.disable()?;
         } else if state == ControllerState::Error {
             match self.disable() {
-                // Older firmware does not do that in Error, and takes each part by itself.
+                // Older firmware rejects this in Error; it accepts each part separately.
                 Err(LinkError::Refused { .. }) => {}
                 done => done?,
             }
@@ -112,7 +113,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Settings and name, where they differ.
+    /// Sends settings and name, if they differ.
     fn push_settings(
         &mut self,
         arm: &Arm,
@@ -137,7 +138,7 @@ impl<P: Port> Session<P> {
         goes_on()
     }
 
-    /// The device has this arm, read back.
+    /// Checks that the arm in the device, read back, is this arm.
     fn has_arm(&mut self, arm: &Arm, hash: u64) -> Result<(), Error> {
         if self.info()?.is_some_and(|info| info.hash == hash) {
             return Ok(());
@@ -147,7 +148,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// All that a device takes of an arm by parameter frames, and the arm's hash.
+/// Returns all parameter frames that a device needs for an arm, and the arm's hash.
 fn whole(arm: &Arm) -> Result<(ParameterSet, u64), Error> {
     let set = arm.parameter_set();
     let Some(hash) = arm.hash()? else {

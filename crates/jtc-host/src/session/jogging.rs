@@ -1,4 +1,4 @@
-//! Jogging from its begin to standstill.
+//! Jogging from its start to standstill.
 
 use std::time::Duration;
 
@@ -9,27 +9,27 @@ use crate::error::{Error, LinkError, StateError};
 use crate::port::halt::Halt;
 use crate::port::{Port, Standstill};
 
-/// How often a velocity is sent again: the controller forgets it after 200 ms (J-58).
+/// Interval at which a velocity is repeated: the controller drops it after 200 ms (J-58).
 pub const JOG_AGAIN: Duration = Duration::from_millis(50);
-/// An arm comes to rest within this time.
+/// Maximum time in which an arm comes to rest.
 const REST: Duration = Duration::from_secs(3);
 
 impl<P: Port> Session<P> {
-    /// Waits until joints may be jogged: those whose load has just been caught are not jogged yet. Anything else that forbids it is an
-    /// error at once.
+    /// Waits until joints may be jogged: joints whose load was just caught are not jogged yet. Any other reason
+    /// against jogging is an error at once.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] while the cause of one is not cleared; those of [`Session::jog`].
+    /// [`StateError::HeldStop`] while the cause of a held stop is not cleared; the errors of [`Session::jog`].
     pub fn settle_for_jog(&mut self) -> Result<(), Error> {
         self.settle_for_jog_until(|| false)
     }
 
-    /// The same, and no more waiting once `ended` returns true.
+    /// Like [`Session::settle_for_jog`], but stops waiting once `ended` returns `true`.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::jog`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::jog`]; [`Error::Cancelled`].
     pub fn settle_for_jog_until(&mut self, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.now() + REST;
         loop {
@@ -56,11 +56,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Jogs at this velocity (rad/s) until `over`. **The arm moves.** [`Session::jog_to_rest`] belongs behind it.
+    /// Jogs at this velocity (rad/s) until `over` returns `true`. **The arm moves.** Call [`Session::jog_to_rest`] afterwards.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::jog`].
+    /// Returns the errors of [`Session::jog`].
     pub fn jog_while(
         &mut self,
         velocity: &[f64; JOINTS],
@@ -73,13 +73,14 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Jogs no more, and waits until every joint stands; `None` where one does not within 3 s.
+    /// Stops jogging and waits until every joint is at rest; returns `None` if a joint is not at rest within 3 s.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] when the controller has released the arm, [`StateError::HeldStop`] when it has stopped it; those of the line.
+    /// [`StateError::Device`] if the controller has released the arm, [`StateError::HeldStop`] if it has stopped it;
+    /// the errors of the line.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
-        // Refused where nothing is jogged any more, which is just as well.
+        // A rejection is acceptable, because no joint is jogged then.
         match self.jog(&[0.0; JOINTS]) {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
             Err(error) => return Err(error),
@@ -93,7 +94,7 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // A load may sink for longer than that; the controller has it.
+                // A load may be lowered for longer than that; the controller handles it.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {
@@ -105,11 +106,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Takes statuses for this time.
+    /// Receives statuses for this time.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Port`].
+    /// [`LinkError::Port`] if the port fails.
     pub fn pass(&mut self, time: Duration) -> Result<(), LinkError> {
         let end = self.now() + time;
         while self.now() < end {

@@ -1,29 +1,29 @@
-//! A time limit for an answer of the controller that a busy computer does not use up.
+//! Timeout for an answer of the controller, tolerant of a busy host computer.
 
 use std::time::Duration;
 
-/// Longest single wait.
+/// Maximum duration of a single wait.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Time that is left for an answer. Of each wait at most its planned length counts: a computer that wakes this program late may have kept the
-/// answer, or the simulator that sends it, waiting as well.
+/// Remaining time for an answer. Each wait counts with at most its planned length: a computer that wakes this program
+/// late may also have delayed the answer, or the simulator that sends it.
 #[derive(Debug)]
 pub(super) struct Limit {
     left: Duration,
 }
 
 impl Limit {
-    /// A limit of this length.
+    /// Creates a limit of this length.
     pub fn new(time: Duration) -> Self {
         Self { left: time }
     }
 
-    /// Length of the next wait; `None` when no time is left.
+    /// Returns the length of the next wait; `None` if no time is left.
     pub fn next_wait(&self) -> Option<Duration> {
         (!self.left.is_zero()).then(|| self.left.min(STEP))
     }
 
-    /// Counts a wait that was planned for `planned` and took `took`.
+    /// Subtracts a wait that was planned for `planned` and lasted `took`.
     pub fn waited(&mut self, planned: Duration, took: Duration) {
         self.left = self.left.saturating_sub(took.min(planned));
     }
@@ -33,7 +33,7 @@ impl Limit {
 mod tests {
     use super::*;
 
-    /// Waits that all take this share of what was planned, up to the end of the limit: how long they took.
+    /// Returns the total time of waits until the limit ends, if each wait takes this share of its planned length.
     fn waited(limit_ms: u64, share: f64) -> Duration {
         let mut limit = Limit::new(Duration::from_millis(limit_ms));
         let mut all = Duration::ZERO;

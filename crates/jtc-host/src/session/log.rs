@@ -1,4 +1,4 @@
-//! The flight recorder of a device: its log is read page by page, with what a replay needs of the device (J-56).
+//! Fetches the flight recorder log of a device page by page, with the device data that a replay needs (J-56).
 
 use jtc_core::recorder::BLOCK_BYTES;
 use jtc_wire::{Answer, LOG_NO_BLOCK, LogState, RawPoint, fixed};
@@ -8,12 +8,12 @@ use crate::error::{Error, LinkError};
 use crate::log::{FlightLog, blocks_of};
 use crate::port::Port;
 
-/// What a flight recorder does.
+/// State of a flight recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogStatus {
-    /// What it does, or why it stopped.
+    /// Current activity, or the reason why recording stopped.
     pub state: LogState,
-    /// Number behind that of its newest block.
+    /// Number after that of the newest block.
     pub end: u32,
 }
 
@@ -28,20 +28,20 @@ struct Page {
 }
 
 impl<P: Port> Session<P> {
-    /// What the flight recorder does. It goes on recording.
+    /// Returns the state of the flight recorder. The recorder continues to record.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] by a device without a recorder; those of the line.
+    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] by a device without a recorder; the errors of the line.
     pub fn log_status(&mut self) -> Result<LogStatus, LinkError> {
         self.log_page(LOG_NO_BLOCK, 0).map(|page| page.status)
     }
 
-    /// Forgets the log; the recorder begins anew.
+    /// Deletes the log; the recorder starts a new one.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::log_status`].
+    /// Returns the errors of [`Session::log_status`].
     pub fn clear_log(&mut self) -> Result<(), LinkError> {
         self.extension(&fixed::CLEAR_LOG)
     }
@@ -60,21 +60,22 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Reads the whole log, the arm in use, and the points of the trajectory that the log needs. Recording rests meanwhile; the arm may
-    /// move. `done` learns of each part: bytes of the log that are here, and how many there are.
+    /// Reads the complete log, the active arm, and the points of the trajectory that the log needs. Recording is
+    /// suspended meanwhile; the arm may move. Calls `done` after each part with the received bytes of the log and the
+    /// total.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::log_status`] and [`Session::arm_image`].
+    /// Returns the errors of [`Session::log_status`] and [`Session::arm_image`].
     pub fn fetch_log(&mut self, done: impl FnMut(usize, usize)) -> Result<FlightLog, Error> {
         self.fetch_log_until(|| false, done)
     }
 
-    /// The same, until `ended` returns true.
+    /// Like [`Session::fetch_log`], until `ended` returns `true`.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::fetch_log`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::fetch_log`]; [`Error::Cancelled`].
     pub fn fetch_log_until(
         &mut self,
         ended: impl Fn() -> bool,
@@ -87,13 +88,13 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            // The first answer says where the log begins.
+            // The first answer contains the start of the log.
             let (block, offset) =
                 (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);
             let page = self.log_page(block, offset as u16)?;
             (log.state, log.points_hash) = (page.status.state, page.points_hash);
             if page.block != block || first.is_none() || usize::from(page.offset) != offset {
-                // The oldest of it, or what is left after it was cleared and begun anew.
+                // Oldest block, or the first one after the log was cleared and restarted.
                 bytes.clear();
                 first = Some(page.block);
             }
@@ -117,7 +118,7 @@ impl<P: Port> Session<P> {
         Ok(log)
     }
 
-    /// Points of the trajectory in the device's memory; fewer where it has not as many.
+    /// Returns points of the trajectory in the device's memory; fewer than `count` if the memory has fewer.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

@@ -1,4 +1,4 @@
-//! Friction, gains and arm model to the controller.
+//! Transfer of friction, gains and arm model to the controller.
 
 use std::time::Duration;
 
@@ -11,34 +11,34 @@ use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::frame;
 use crate::port::Port;
 
-/// How long gains that are given under torque are on trial (J-71), and the time until the controller has told of it.
+/// Trial time of gains that are set under torque (J-71), plus the time until the controller has reported the result.
 const TRIAL: Duration = Duration::from_millis(2_500);
 
 /// A parameter that the controller confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PushReport {
-    /// Which.
+    /// Parameter.
     pub parameter: Parameter,
-    /// Bytes of its frame.
+    /// Size of its frame, bytes.
     pub bytes: usize,
-    /// Times it was sent on purpose (the friction table: twice).
+    /// Number of intended transmissions (the friction table: two).
     pub times: u32,
-    /// s.
+    /// Duration, s.
     pub time_s: f64,
 }
 
 impl<P: Port> Session<P> {
-    /// Sends what `set` has, after all of it was checked; `done` is called after each.
+    /// Checks all of `set`, then sends its parameters; calls `done` after each.
     ///
-    /// Gains that are given while the arm is held are on trial for two seconds: the controller takes them back if the arm does not stand
-    /// them, and holds it in a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71). [`Session::await_trial`] waits for what comes of
-    /// it.
+    /// Gains that are set while the arm is held are on trial for two seconds. If the arm is not stable with them, the
+    /// controller restores the old gains and holds the arm in a held stop of the kind [`jtc_wire::StopKind::Gains`]
+    /// (J-71). [`Session::await_trial`] waits for the result.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Value`] before anything is sent, for numbers that no frame carries or that are not physical;
-    /// [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] when the controller refuses one, which keeps what it had;
-    /// the other [`LinkError`]s of the line.
+    /// [`ParametersError::Value`] before anything is sent, for values that no frame can carry or that are not physical;
+    /// [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and keeps its
+    /// old one; the other [`LinkError`]s of the line.
     pub fn push(
         &mut self,
         set: &ParameterSet,
@@ -47,11 +47,11 @@ impl<P: Port> Session<P> {
         self.push_until(set, || false, done)
     }
 
-    /// The same, until `ended` returns true because a person wants it to end: nothing more is sent then.
+    /// Like [`Session::push`], until `ended` returns `true` because the user cancels: then sends nothing more.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::push`]; [`Error::Cancelled`].
+    /// Returns the errors of [`Session::push`]; [`Error::Cancelled`].
     pub fn push_until(
         &mut self,
         set: &ParameterSet,
@@ -61,7 +61,7 @@ impl<P: Port> Session<P> {
         set.check()?;
         let mut frames = Vec::new();
         if let Some(friction) = &set.friction {
-            // The table is longer than CRC-16 protects against every double bit error: sent twice, both must be confirmed.
+            // The table is too long for CRC-16 to detect every double bit error: it is sent twice, and both must be confirmed.
             let (parameter, times) = match friction {
                 jtc_core::Friction::Table(_) => (Parameter::FrictionTable, 2),
                 jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, 1),
@@ -74,7 +74,7 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
-        // Parameters lead to torque: a Stop of another program ends them.
+        // Complete parameters switch the torque on, so a Stop of another program ends the transfer.
         let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {
@@ -93,21 +93,21 @@ impl<P: Port> Session<P> {
         Ok(all)
     }
 
-    /// Waits while gains that have just been given are on trial (J-71); `begun` is called first if they are. Call it right after
-    /// [`Session::push`] or [`Session::push_arm`]. Returns whether there was a trial; without torque, and on a device without extensions, there
-    /// was not.
+    /// Waits while new gains are on trial (J-71); if they are, calls `begun` first. Call it right after
+    /// [`Session::push`] or [`Session::push_arm`]. Returns `true` if there was a trial; `false` without torque, and on a
+    /// device without extensions.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] when the controller took them back, or stopped the arm for another reason meanwhile,
-    /// [`StateError::Device`] when the arm was released; the [`LinkError`]s of the line.
+    /// [`StateError::HeldStop`] if the controller restored the old gains, or stopped the arm for another reason
+    /// meanwhile, [`StateError::Device`] if the arm was released; the [`LinkError`]s of the line.
     pub fn await_trial(&mut self, begun: impl FnOnce()) -> Result<bool, Error> {
         let age = |reactions: Reactions| reactions.stop.map(|(_, ms)| ms);
         let state = self.fresh_status()?.state;
         let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
         let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
         begun();
-        // The arm may have been in a held stop before.
+        // The arm may have been in an earlier held stop.
         let before = age(reactions).unwrap_or(u32::MAX);
         let end = self.port.now() + TRIAL;
         while self.port.now() < end {
@@ -123,12 +123,12 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// A refused value by its name, where one of the set is beyond the bounds of the controllers that are known.
+/// Returns an error that names the rejected value, if a value of the set is beyond the bounds of known controllers.
 fn explained(error: LinkError, set: &ParameterSet) -> Error {
     let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
         return error.into();
     };
-    // Only what this frame carried.
+    // Only the values that this frame carried.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },

@@ -1,4 +1,4 @@
-//! What the arm carries at its flange (J-60).
+//! Payload at the flange of the arm (J-60).
 
 use jtc_core::{Config, Payload, settings};
 use jtc_dynamics::Dynamics;
@@ -9,26 +9,27 @@ use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// What the controller computes with at the flange; [`Payload::NONE`] where it has no extensions.
+    /// Returns the payload that the controller assumes at the flange; [`Payload::NONE`] if it has no extensions.
     ///
     /// # Errors
     ///
-    /// Those of [`Session::device_config`].
+    /// Returns the errors of [`Session::device_config`].
     pub fn payload(&mut self) -> Result<Payload, Error> {
         Ok(self.device_config()?.payload)
     }
 
-    /// Gives the payload, which comes into the torque over half a second. An Execute, Teaching and jogging wait for that.
+    /// Sets the payload, which enters the torque over half a second. Execute, teaching and jogging wait for that.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::NoBody`] for what is none, and nothing is sent; [`ExtensionError::TooHeavy`] where a joint could not hold it in
-    /// the pose of the arm; [`ExtensionError::PayloadInMotion`] while the arm moves by command; those of
-    /// [`Session::set_settings`]. The controller keeps the payload that it has.
+    /// [`ExtensionError::NoBody`] if the payload is not a physical body, and nothing is sent;
+    /// [`ExtensionError::TooHeavy`] if a joint could not hold it in the pose of the arm;
+    /// [`ExtensionError::PayloadInMotion`] during a commanded motion; the errors of [`Session::set_settings`]. After an
+    /// error the controller keeps its payload.
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();
-        // Such as no controller takes.
+        // A payload that every controller rejects.
         let alone = settings::with_values(&Config::avena(), values.iter().copied());
         if let Err(settings::SettingError::Value { .. }) = alone.as_ref() {
             return Err(
@@ -46,7 +47,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Why a payload that is a body was refused, as far as that can be found out.
+    /// Returns the reason why a physically valid payload was rejected, if it can be determined.
     fn why_refused(&mut self, payload: &Payload) -> Result<Option<ExtensionError>, Error> {
         let config = self.device_config()?;
         if let Err(e) = config.parameter_bounds.check_payload(payload) {

@@ -1,6 +1,7 @@
-//! Host supervision (J-59): while the arm moves for this session, the session repeats GetInfo, so that the controller knows that its host is there.
+//! Host supervision (J-59): while the arm moves for this session, the session repeats GetInfo, so that the controller
+//! knows that its host is alive.
 //!
-//! A session that only watches sends nothing. The request also tells the controller that its host knows every data status (J-51).
+//! A session that only observes sends nothing. The request also tells the controller that its host knows every data status (J-51).
 
 use std::time::Duration;
 
@@ -12,47 +13,48 @@ use super::extension::{ASK_AGAIN, Extensions};
 use crate::error::LinkError;
 use crate::port::Port;
 
-/// A command shows in the statuses within this time.
+/// Time within which a command appears in the statuses.
 const SHOWS: Duration = Duration::from_secs(1);
 /// Shortest time between two requests: a status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
 const SHORTEST: Duration = Duration::from_millis(20);
 
-/// What the session knows of host supervision, and what it has sent for it.
+/// State of host supervision in the session.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Presence {
-    /// When this session commanded the motion or the teaching that goes on.
+    /// Time at which this session commanded the current motion or teaching.
     commanded: Option<Duration>,
-    /// The session waits for teaching to begin.
+    /// `true` while the session waits for teaching to begin.
     waits: bool,
-    /// The arm moves, or can be led, by the last status.
+    /// `true` if the arm moves, or can be guided by hand, according to the last status.
     moves: bool,
-    /// The controller's `host_timeout_ms` as it was last read or set, ms; 0: no supervision. A controller without torque may get another.
+    /// The controller's `host_timeout_ms` at the last read or write, ms; 0: no supervision. A controller without torque
+    /// may get another value.
     host_timeout_ms: Option<f64>,
-    /// The controller has accepted an extension request.
+    /// `true` if the controller has accepted an extension request.
     answered: bool,
-    /// When GetInfo was sent last.
+    /// Time of the last GetInfo.
     asked_at: Duration,
-    /// Requests whose answers have not arrived.
+    /// Number of requests without an answer.
     unanswered: u8,
 }
 
 impl Presence {
-    /// The session commands a motion or teaching.
+    /// Notes that the session commands a motion or teaching.
     pub fn command(&mut self, now: Duration) {
         self.commanded = Some(now);
     }
 
-    /// The session waits for teaching to begin, or no longer.
+    /// Sets or clears the wait for teaching.
     pub fn wait_for_teaching(&mut self, waits: bool) {
         self.waits = waits;
     }
 
-    /// The controller has accepted an extension request.
+    /// Notes that the controller has accepted an extension request.
     pub fn accepted(&mut self) {
         self.answered = true;
     }
 
-    /// Takes a status.
+    /// Evaluates a status.
     pub fn take_status(&mut self, status: &Status, now: Duration) {
         self.moves = status.state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
         if !self.moves && !self.waits {
@@ -63,12 +65,12 @@ impl Presence {
         }
     }
 
-    /// The arm moves for this session.
+    /// Returns `true` if the arm moves for this session.
     fn is_shown(&self) -> bool {
         self.commanded.is_some() && (self.moves || self.waits)
     }
 
-    /// Time between two requests: at least three within the controller's timeout.
+    /// Returns the time between two requests: at least three requests within the controller's timeout.
     fn period(&self) -> Duration {
         match self.host_timeout_ms {
             Some(ms) if ms > 0.0 => Duration::from_secs_f64(ms / 3000.0).clamp(SHORTEST, ASK_AGAIN),
@@ -76,7 +78,7 @@ impl Presence {
         }
     }
 
-    /// Takes what an answer shows; returns when a GetInfo that it answers was sent.
+    /// Evaluates an answer; returns the time at which the answered GetInfo was sent.
     pub fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {
@@ -89,7 +91,7 @@ impl Presence {
         None
     }
 
-    /// Takes the timeout from settings that were read or set.
+    /// Stores the timeout from settings that were read or set.
     fn take(&mut self, values: impl Iterator<Item = SettingValue>) {
         if let Some(ms) = host_timeout_ms(values) {
             self.host_timeout_ms = Some(ms);
@@ -97,14 +99,14 @@ impl Presence {
     }
 }
 
-/// The setting `host_timeout_ms` among these values, ms.
+/// Returns the setting `host_timeout_ms` among these values, ms.
 pub fn host_timeout_ms(mut values: impl Iterator<Item = SettingValue>) -> Option<f64> {
     let setting = settings::named("host_timeout_ms")?;
     values.find(|value| value.setting == setting.number).map(|value| value.value)
 }
 
 impl<P: Port> Session<P> {
-    /// Sends GetInfo when it is due; returns the time until it is due again.
+    /// Sends GetInfo if it is due; returns the time until it is due again.
     pub(super) fn show_presence(&mut self) -> Result<Duration, LinkError> {
         let Extensions::Asked(at) = self.extensions else { return Ok(Duration::MAX) };
         if !self.presence.is_shown() {
@@ -121,12 +123,12 @@ impl<P: Port> Session<P> {
         Ok(period)
     }
 
-    /// Notes settings that the device has accepted.
+    /// Stores the timeout from settings that the device has accepted.
     pub(super) fn set_presence(&mut self, values: &[SettingValue]) {
         self.presence.take(values.iter().copied());
     }
 
-    /// Waits for the answers to what [`show_presence`](Self::show_presence) has sent: a device refuses a request meanwhile (J-50).
+    /// Waits for the answers to requests of [`show_presence`](Self::show_presence): a device rejects another request meanwhile (J-50).
     pub(super) fn await_presence(&mut self) -> Result<(), LinkError> {
         let end = self.presence.asked_at + self.confirmation_time(jtc_wire::ANSWER_MAX);
         while self.presence.unanswered > 0 && self.port.now() < end {
@@ -142,7 +144,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.settings() {
-            // Without it the usual period counts; a line that is lost is found by the command that follows.
+            // Without the timeout the default period is used; the following command detects a lost line.
             Err(
                 LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::NoExtension { .. },
             ) => Ok(()),

@@ -1,4 +1,4 @@
-//! From connecting to an arm that can be moved.
+//! Waiting for an arm that is ready to move.
 
 use std::time::Duration;
 
@@ -9,17 +9,19 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{held_stop, words};
 
-/// How long the drives may take: 4 s for their first enable.
+/// Timeout for the drives: their first enable takes 4 s.
 pub const BRING_UP: Duration = Duration::from_secs(15);
 
 impl<P: Port> Session<P> {
-    /// Waits until the controller holds the arm with all drives enabled, where it is on the way to that, and returns the status that a
-    /// motion can be checked with. `waits` is called with what is waited for.
+    /// Waits until the controller holds the arm with all drives enabled, if the controller is starting up. Returns the
+    /// status for the check of a motion. Calls `waits` with a description of the wait.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] where the cause of one is not cleared yet, [`StateError::NotReady`] where nothing is under way that would lead there, [`StateError::Absent`] where joints are set absent, [`StateError::EncoderJumped`] where an encoder has jumped,
-    /// [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns true; those of the line.
+    /// [`StateError::HeldStop`] if the cause of a held stop is not cleared, [`StateError::NotReady`] if the controller
+    /// is not starting up, [`StateError::Absent`] if joints are set absent, [`StateError::EncoderJumped`] if an encoder
+    /// has jumped, [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns
+    /// `true`; the errors of the line.
     pub fn ready_to_move(
         &mut self,
         mut waits: impl FnMut(&'static str),

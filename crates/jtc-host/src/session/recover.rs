@@ -28,10 +28,11 @@ const STOP_TIME: Duration = Duration::from_secs(5);
 const BOOT: Duration = Duration::from_secs(1);
 /// Time from a parameter's confirmation to the status that shows it.
 const TAKEN_IN: Duration = Duration::from_millis(60);
-/// Maximum number of steps before the recovery fails, and maximum number of error clears.
+/// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
 /// Maximum number of clears of a held stop: meanwhile a compliant joint comes to rest, or an operator frees the joint.
 const HELD_CLEARS: u8 = 6;
+/// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;
 /// Time until a command takes effect.
 const EFFECT: Duration = Duration::from_millis(500);
@@ -181,7 +182,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // No step is known for an unknown state.
+                // No step is taken in a state that this version does not know.
                 None => break,
             }
             status = self.session.fresh_status()?;

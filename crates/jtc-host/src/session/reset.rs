@@ -1,4 +1,4 @@
-//! Resets of nodes, which can take the torque away that holds the arm.
+//! Resets of nodes, which can remove the torque that holds the arm.
 
 use jtc_bus::GRIPPER;
 use jtc_wire::{Code, ControllerState};
@@ -8,11 +8,11 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::words;
 
-/// Whether a reset of these nodes (bits 0..6) can take the torque away that the arm has in a state.
+/// Returns `true` if a reset of these nodes (bits 0..6) can remove the torque that the arm has in a state.
 ///
 /// # Errors
 ///
-/// [`StateError::WouldFall`] where it moves, and a joint is among them.
+/// [`StateError::WouldFall`] if the arm moves and a joint is among the nodes.
 pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<bool, StateError> {
     let moves = state.is_in(&[ControllerState::Operate, ControllerState::Teaching]);
     if moves && nodes & !(1 << GRIPPER) != 0 {
@@ -22,11 +22,11 @@ pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<boo
 }
 
 impl<P: Port> Session<P> {
-    /// Resets nodes (bits 0..6); where the arm has torque only if it `may_fall`.
+    /// Resets nodes (bits 0..6); if the arm has torque, only if `may_fall` is set.
     ///
     /// # Errors
     ///
-    /// [`StateError::WouldFall`] and [`StateError::MayFall`], before anything is sent; those of [`Session::reset`].
+    /// [`StateError::WouldFall`] and [`StateError::MayFall`], before anything is sent; the errors of [`Session::reset`].
     pub fn reset_held(&mut self, nodes: u8, may_fall: bool) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if reset_takes_torque(nodes, state)? && !may_fall {

@@ -1,4 +1,4 @@
-//! A run from its start to its end, with what was seen on the way.
+//! A run from its start to its end, with its samples.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,19 +13,19 @@ use crate::report::Summary;
 use crate::sample::Sample;
 use crate::{Arm, Error};
 
-/// What a run was: how it ended, and a sample of each status from its start.
+/// Result of a run: its end, and a sample of each status from its start.
 #[derive(Debug)]
 #[must_use = "a run may have failed: look at its outcome"]
 pub struct Run {
-    /// How it ended: an error of [`Session::execute`] or of [`Session::follow`] when it failed. Such a run has samples, too, those that
-    /// one wants to look at most.
+    /// End of the run: an error of [`Session::execute`] or of [`Session::follow`] if it failed. A failed run has
+    /// samples, too, for the analysis of the failure.
     pub outcome: Result<Outcome, Error>,
-    /// Oldest first; commanded values are those of the trajectory at the point that the controller reports.
+    /// Samples, oldest first; commanded values are those of the trajectory at the point that the controller reports.
     pub samples: Vec<Sample>,
 }
 
 impl Run {
-    /// The figures of the run: tracking error, speed and torque of each joint. `arm` gives names and limits.
+    /// Returns the figures of the run: tracking error, speed and torque of each joint. `arm` supplies names and limits.
     pub fn summary(&self, arm: &Arm) -> Summary {
         Summary::of(&RecordingInfo::of(arm), &self.samples)
     }
@@ -34,7 +34,7 @@ impl Run {
 impl<P: Port> Session<P> {
     /// Executes the trajectory that was just uploaded and follows it to its end. **The arm moves.**
     ///
-    /// `each` is called with each status and returns what to do: go on, pause, resume, stop. An observer that was set before is replaced.
+    /// `each` receives each status and returns the next action: continue, pause, resume, stop. This call replaces an earlier observer.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);
@@ -42,12 +42,12 @@ impl<P: Port> Session<P> {
         Run { outcome, samples: samples.take() }
     }
 
-    /// Like [`Session::run`], for a run of any length: `observe` receives each sample as it comes, and `done` each [`Flow`] with what came of
-    /// it, as in [`Session::follow_with`].
+    /// Like [`Session::run`], for a run of any length: `observe` receives each sample on arrival, and `done` each
+    /// [`Flow`] with its result, as in [`Session::follow_with`].
     ///
     /// # Errors
     ///
-    /// Those of [`Session::execute`] and [`Session::follow`].
+    /// Returns the errors of [`Session::execute`] and [`Session::follow`].
     pub fn run_with(
         &mut self,
         checked: &CheckedTrajectory,

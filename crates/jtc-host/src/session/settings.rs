@@ -1,4 +1,4 @@
-//! Settings that people name: checked whole before anything of them is sent (J-53).
+//! Settings that users name: all are checked before any is sent (J-53).
 
 use jtc_core::settings;
 use jtc_wire::SettingValue;
@@ -8,8 +8,8 @@ use crate::error::{Error, ExtensionError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Changes settings, all of them or none, like [`Session::set_settings`]; what is wrong with a value, or with all of them beside those that
-    /// the device has, is found out before anything is sent.
+    /// Changes settings, all of them or none, like [`Session::set_settings`]. Before anything is sent, checks each
+    /// value, and all values together with the settings that the device has.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Where the arm stands, for a pose.
+//! Capture of the arm's pose at rest.
 
 use std::time::Duration;
 
@@ -9,18 +9,18 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{sample, words};
 
-/// What moves by less than this within [`WATCHED`] stands, rad: the slowest jog moves twice as far.
+/// Movement within [`WATCHED`] below which the arm is at rest, rad: the slowest jog moves twice as far.
 const STILL: f64 = 1.2e-3;
-/// So long the arm is watched: a slow jog is in no status.
+/// Observation time: a slow jog appears in no field of the status.
 const WATCHED: Duration = Duration::from_millis(250);
 
 impl<P: Port> Session<P> {
-    /// The status of an arm that stands, for as long as it is watched: its positions are those of a pose.
+    /// Observes the arm and returns its status if it is at rest: the positions are those of a pose.
     ///
     /// # Errors
     ///
-    /// [`StateError::Moving`] where it moves, [`StateError::NotMeasured`] where it is not known where a joint is; those of
-    /// [`Session::next_status`].
+    /// [`StateError::Moving`] if the arm moves, [`StateError::NotMeasured`] if the position of a joint is unknown; the
+    /// errors of [`Session::next_status`].
     pub fn standing(&mut self) -> Result<Status, Error> {
         let begin = self.fresh_status()?;
         let (start, mut now) = (self.now(), begin);
@@ -36,7 +36,7 @@ impl<P: Port> Session<P> {
 
 fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
     let moving = |what: String| Err(StateError::Moving { what });
-    // Also where it begins, turns round or ends, and has no speed for a moment.
+    // Also at the beginning, at a reversal and at the end of a motion, when the speed is zero for a moment.
     if now.is_executing() {
         return moving("the arm is on the path of a trajectory".into());
     }
@@ -66,7 +66,7 @@ mod tests {
 
     use super::*;
 
-    /// A slow jog is in no field of the status: places that differ show it.
+    /// A slow jog appears in no field of the status; different positions show it.
     #[test]
     fn an_arm_that_is_jogged_slowly_does_not_stand() {
         let at = |q: f32| {
@@ -82,7 +82,7 @@ mod tests {
         }
         let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
         assert_eq!(stands(&executing, &executing).unwrap_err().diagnosis().kind, ErrorKind::Refused);
-        // Led by hand, or paused, it may stand.
+        // An arm that is guided by hand or paused may be at rest.
         stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
     }
 }

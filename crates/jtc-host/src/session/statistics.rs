@@ -1,28 +1,28 @@
-//! What passed over the link.
+//! Statistics of the link.
 
 /// Counters of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct LinkStatistics {
-    /// Bytes to the controller.
+    /// Bytes sent to the controller.
     pub bytes_sent: u64,
-    /// Bytes from the controller.
+    /// Bytes received from the controller.
     pub bytes_received: u64,
-    /// Frames to the controller.
+    /// Frames sent to the controller.
     pub frames_sent: u64,
-    /// Statuses that arrived whole.
+    /// Complete statuses received.
     pub statuses: u64,
     /// Bytes from the controller that belong to no status.
     pub bad_bytes: u64,
-    /// Records of frames that arrived damaged at the controller.
+    /// Records of frames that the controller received damaged.
     pub bad_frames: u64,
-    /// Frames sent again.
+    /// Frames that were repeated.
     pub retries: u64,
-    /// Since the session began, or for how long was counted, s.
+    /// Time since the session began, or counting time, s.
     pub time_s: f64,
 }
 
 impl LinkStatistics {
-    /// What passed since `before`, which is of the same session.
+    /// Returns the statistics since `before`, a snapshot of the same session.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             bytes_sent: self.bytes_sent.saturating_sub(before.bytes_sent),
@@ -36,7 +36,7 @@ impl LinkStatistics {
         }
     }
 
-    /// Statuses per second.
+    /// Returns the number of statuses per second.
     pub fn status_rate(&self) -> f64 {
         if self.time_s > 0.0 { self.statuses as f64 / self.time_s } else { 0.0 }
     }

@@ -1,4 +1,4 @@
-//! Upload of a trajectory: several frames in flight, each segment confirmed, what was lost is sent again.
+//! Upload of a trajectory: several frames in flight, each segment confirmed, lost segments repeated.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -15,19 +15,19 @@ use crate::frame;
 use crate::port::{Port, PortError, line_time};
 use crate::trajectory::UploadOptions;
 
-/// Times that one segment is sent.
+/// Maximum number of times that a segment is sent.
 const SEGMENT_TRIES: u32 = 16;
-/// Times that the whole is begun again.
+/// Maximum number of restarts of the complete upload.
 const RESTARTS: u32 = 3;
-/// Records that the controller queues, less one for safety.
+/// Number of records that the controller queues, minus one for safety.
 const WINDOW_MAX: usize = 7;
 
-/// How far an upload is.
+/// Progress of an upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Progress {
     /// Segments confirmed.
     pub segments_done: usize,
-    /// Segments in all.
+    /// Total number of segments.
     pub segments: usize,
     /// Bytes of confirmed segments.
     pub bytes_done: usize,
@@ -37,58 +37,58 @@ pub struct Progress {
     pub bytes_per_s: f64,
     /// Time left at this rate, s.
     pub left_s: f64,
-    /// Segments sent again.
+    /// Number of repeated segments.
     pub retries: u32,
 }
 
-/// What an upload took.
+/// Figures of a completed upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct UploadReport {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// Segments.
+    /// Number of segments.
     pub segments: usize,
     /// Bytes of all segments.
     pub bytes: usize,
-    /// First byte to last confirmation, s.
+    /// Time from the first byte to the last confirmation, s.
     pub time_s: f64,
     /// Bytes per second.
     pub bytes_per_s: f64,
-    /// Share of what the line can carry, where it has a speed.
+    /// Share of the capacity of the line, if the line has a rate.
     pub line_share: Option<f64>,
-    /// Segments sent again.
+    /// Number of repeated segments.
     pub retries: u32,
-    /// Times the whole was begun again.
+    /// Number of restarts of the complete upload.
     pub restarts: u32,
 }
 
 impl UploadReport {
-    /// Share of what the line can carry, %; none behind a pseudo-terminal that is faster than its rate.
+    /// Returns the share of the capacity of the line, %; `None` for a pseudo-terminal that is faster than its rate.
     pub fn line_share_percent(&self) -> Option<f64> {
         self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
     }
 }
 
 struct InFlight {
-    /// When the line will have carried it.
+    /// Time at which the line will have transmitted the frame.
     done: Duration,
 }
 
-/// State of one upload.
+/// State of an upload.
 struct Upload {
     frames: Vec<Vec<u8>>,
     confirmed: usize,
     next: usize,
     in_flight: VecDeque<InFlight>,
-    /// Rest of the frame being written.
+    /// Remainder of the frame that is being written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
-    /// Send one at a time until it is clear what the controller has.
+    /// `true`: segments are sent singly until the state of the controller is clear.
     probing: bool,
     tries: u32,
     retries: u32,
     restarts: u32,
-    /// Stops and Pauses of other programs before it.
+    /// Number of Stops and Pauses of other programs before the upload.
     halts: u64,
     window: usize,
     chunk: usize,
@@ -113,7 +113,7 @@ impl Upload {
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
             .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
-        // Enough in flight for 60 ms, which covers the latency of USB adapters.
+        // Enough frames in flight for 60 ms, which covers the latency of USB adapters.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
         Ok(Self {
@@ -130,7 +130,7 @@ impl Upload {
             restarts: 0,
             halts: 0,
             window: window.clamp(3, WINDOW_MAX),
-            // 10 ms of line, so that statuses are taken in meanwhile.
+            // Equivalent of 10 ms on the line, so that statuses are received meanwhile.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
@@ -159,7 +159,7 @@ impl Upload {
         self.tries = 0;
     }
 
-    /// All again from the first unconfirmed segment, one at a time at first.
+    /// Repeats everything from the first unconfirmed segment, at first singly.
     fn go_back(&mut self) {
         self.retries += (self.next - self.confirmed) as u32;
         self.next = self.confirmed;
@@ -183,17 +183,18 @@ impl Upload {
 }
 
 impl<P: Port> Session<P> {
-    /// Uploads a trajectory that passed the check; done when the controller reports it complete (TES Stop). Nothing moves.
-    /// `progress` is called after each confirmed segment and may end it with [`Flow::Cancel`].
+    /// Uploads a trajectory that passed the check; returns when the controller reports it complete (TES Stop). The arm
+    /// does not move. Calls `progress` after each confirmed segment; it may cancel the upload with [`Flow::Cancel`].
     ///
-    /// What the controller held before is lost with the first segment.
+    /// The first segment deletes the previous trajectory of the controller.
     ///
     /// # Errors
     ///
-    /// [`UploadError::SegmentRefused`] when the controller refuses a segment, for example because it does not hold the arm or because its
-    /// own check (J-36) found a problem; [`UploadError::Incomplete`] when the line lost too much to complete it; [`Error::Cancelled`]
-    /// when `progress` ended it; those of [`Session::next_status`] when the controller or the port is gone. The controller then
-    /// holds no complete trajectory, and nothing can be executed.
+    /// [`UploadError::SegmentRefused`] if the controller rejects a segment, for example because it does not hold the
+    /// arm or because its own check (J-36) found a problem; [`UploadError::Incomplete`] if the line lost too much to
+    /// complete it; [`Error::Cancelled`] if `progress` ended it; the errors of [`Session::next_status`] if the
+    /// controller or the port is lost. After an error the controller holds no complete trajectory, and no motion can be
+    /// executed.
     pub fn upload(
         &mut self,
         checked: &CheckedTrajectory,
@@ -207,7 +208,7 @@ impl<P: Port> Session<P> {
         Ok(report)
     }
 
-    /// Sends points that are `step_ms` apart.
+    /// Sends points at intervals of `step_ms`.
     fn send(
         &mut self,
         points: &[RawPoint],
@@ -268,7 +269,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// The controller has the whole trajectory.
+    /// Returns `true` if the controller has the complete trajectory.
     fn complete(&mut self) -> Result<bool, Error> {
         if self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop) {
             return Ok(true);
@@ -281,11 +282,11 @@ impl<P: Port> Session<P> {
         Ok(false)
     }
 
-    /// Writes a piece or waits for a record; true when a segment was confirmed.
+    /// Writes a piece or waits for a record; returns `true` if a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
             if up.next == 0 {
-                // A controller takes the host of a segment 0 without a request before it for one that knows no extensions (J-30).
+                // If no request precedes segment 0, the controller assumes a host without support for extensions (J-30).
                 self.introduce()?;
             }
             up.writing = Some((up.next, 0));
@@ -339,7 +340,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match record.data {
-            // The only one in flight, and refused as out of order: it had arrived, its confirmation was lost.
+            // The only segment in flight is rejected as out of order: it had arrived, but its confirmation was lost.
             DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
                 up.confirm();
                 Ok(())
@@ -350,7 +351,7 @@ impl<P: Port> Session<P> {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
                 }
                 if self.port.halts().all != up.halts {
-                    // The controller dropped the upload at the Stop of another program before the port withheld the rest.
+                    // The controller dropped the upload at the Stop of another program before the port withheld the remaining segments.
                     return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
@@ -359,12 +360,12 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// No record came in time.
+    /// Handles a record that did not arrive in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
-        // All sent and complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)
+        // All segments are sent and the trajectory is complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)
         if up.next == up.frames.len()
             && up.confirmed > 0
             && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)
@@ -377,7 +378,7 @@ impl<P: Port> Session<P> {
         self.start_over(up)
     }
 
-    /// Lets what is in flight come to its end, then goes back to the first segment that is not confirmed.
+    /// Waits for the frames in flight, then goes back to the first segment that is not confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
             return Err(self.upload_failed(up).into());
@@ -387,7 +388,7 @@ impl<P: Port> Session<P> {
             self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
         }
         let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
-        // Records follow their frames at once; a status period more for those that do not.
+        // Records follow their frames at once; late ones get another status period.
         let end = quiet + Duration::from_millis(60);
         loop {
             let now = self.port.now();

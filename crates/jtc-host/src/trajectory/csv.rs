@@ -10,7 +10,7 @@ use super::{Form, Loaded, Point, ScaleError, Trajectory};
 use crate::file::{FileError, Place, number, rows, short};
 use crate::waypoints;
 
-/// Columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
+/// Number of columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
 const COLUMNS: usize = 1 + 3 * JOINTS;
 
 pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
@@ -47,7 +47,7 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
             return Err(FileError::at(Place::line(line), format!("{n} columns and no header; {help}")));
         }
     }
-    // The float form always has a fraction somewhere; the int16 form never.
+    // The float form always contains a fraction; the int16 form never does.
     let whole = rows(text)
         .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
     if whole { int16(text) } else { float(text) }
@@ -154,18 +154,18 @@ fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileE
     }
 }
 
-/// Name of column `c` after the time.
+/// Returns the name of column `c` after the time.
 fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Which value a header names, and its unit in that of the header-less forms: 0 time, 1.. their columns.
+/// Returns the value that a header names, and its unit relative to the header-less forms: 0 is the time, 1.. are their columns.
 fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
         return Some((0, 1.0));
     }
-    // Units may follow: q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
+    // A unit may follow: q1_rad, qd1_rad_s, qdd1_rad_s2, q1_deg, qd1_deg_s, qdd1_deg_s2.
     let (name, unit) = match (name.split_once("_rad"), name.split_once("_deg")) {
         (Some((head, _)), _) => (head, 1.0),
         (None, Some((head, _))) => (head, 1f64.to_radians()),
@@ -237,22 +237,22 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
 }
 
 impl Trajectory {
-    /// As CSV with a header, all channels, full precision.
+    /// Returns the trajectory as CSV with a header, all channels, full precision.
     pub fn to_csv(&self) -> String {
         self.csv_with(|v| format!(",{v}"))
     }
 
-    /// The same with 17 significant digits in each number.
+    /// Like [`Trajectory::to_csv`], with 17 significant digits in each number.
     pub fn to_exact_csv(&self) -> String {
-        // Adding zero makes −0 a plain one.
+        // Adding zero turns −0 into 0.
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
     }
 
-    /// In the header-less form of 19 columns of integers: exactly what the wire carries.
+    /// Returns the trajectory in the header-less form of 19 columns of integers: exactly the values on the wire.
     ///
     /// # Errors
     ///
-    /// The first number that a trajectory frame cannot carry.
+    /// Returns the first value that a trajectory frame cannot carry.
     pub fn to_int16_csv(&self) -> Result<String, ScaleError> {
         let mut out = String::new();
         for (i, raw) in self.raw()?.iter().enumerate() {

@@ -1,38 +1,39 @@
-//! Fits a trajectory, points at a fixed step, to samples at any times, with velocities and accelerations where there are none.
+//! Fits a trajectory (points at a fixed step) to samples at any times, and derives missing velocities and accelerations.
 //!
 //! Units are those of a trajectory: s, rad, rad/s, rad/s², joints from base to wrist.
 //!
-//! # What is derived
+//! # Derived values
 //!
 //! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives velocities and
 //!   accelerations. Its end conditions are rest: the velocity at the first and at the last sample is 0. The acceleration there is
 //!   not, so the motion begins and ends with a step in acceleration.
 //! - **Positions and velocities**: a cubic spline through the velocities, of each joint alone, gives the accelerations; the rounding
-//!   of positions does not disturb it. Its end conditions are those of a natural spline: the jerk is 0 at the ends. The
-//!   velocities are taken as they are, at the ends too.
+//!   of positions does not disturb it. The end conditions are those of a natural spline: the jerk is 0 at the ends. The
+//!   velocities are used unchanged, at the ends too.
 //! - **All three channels**: nothing is derived.
 //!
 //! # Time
 //!
-//! Samples whose times lie on a grid of whole milliseconds (to 50 µs, steps of 1..1000 ms) become the points as they are. All others
-//! are resampled to 10 ms, or to a longer step where 10 ms would make more points than the controller holds. Between samples a
-//! quintic is followed that has position, velocity and acceleration of both its ends. When the whole takes no whole number of steps,
-//! the last step is longer than its share: the last point is the last sample.
+//! Samples whose times lie on a grid of whole milliseconds (to 50 µs, steps of 1..1000 ms) become the points unchanged.
+//! All others are resampled to 10 ms, or to a longer step if 10 ms would give more points than the controller holds.
+//! Between samples the trajectory follows a quintic with the position, velocity and acceleration of both its ends. If
+//! the duration is not a whole number of steps, the last step is longer than its share: the last point is the last
+//! sample.
 //!
 //! # Overshoot
 //!
-//! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a step it swings
-//! over, by some 10 % of the step where the samples are equally far apart. Nothing is limited here; [`Fitted::overshoot`] gives how far
-//! each joint goes. What the fit made of the samples,
-//! between the points too, is what [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) looks at. Samples closer to each
-//! other where the direction changes keep it small.
+//! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a
+//! step it overshoots by some 10 % of the step if the samples are equally spaced. The fit limits nothing;
+//! [`Fitted::overshoot`] reports the overshoot of each joint.
+//! [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) checks the fitted trajectory, also between the points.
+//! Denser samples near a change of direction keep the overshoot small.
 //!
 //! # Example
 //!
 //! ```
 //! use jtc_host::trajectory::fit::Samples;
 //!
-//! // Joint 1 goes to 0.5 rad in two seconds, over a place where it is after 0.8 s.
+//! // Joint 1 moves to 0.5 rad in two seconds, through a position at 0.8 s.
 //! let position = [0.0, 0.2, 0.5].map(|q| [q, 0.0, 0.0, 0.0, 0.0, 0.0]).to_vec();
 //! let fitted = Samples { times: vec![0.0, 0.8, 2.0], position, ..Samples::default() }.fit()?;
 //! assert_eq!((fitted.trajectory.step_ms, fitted.trajectory.points.len()), (10, 201));
@@ -51,16 +52,16 @@ use super::overshoot::{Overshoot, overshoots};
 use super::spline::{column, quintic, spline_bends, spline_slopes};
 use super::{Point, Trajectory};
 
-/// Samples of a motion, as files have them.
+/// Samples of a motion, as read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// s, strictly increasing; the first one need not be 0.
+    /// Times, s, strictly increasing; the first one need not be 0.
     pub times: Vec<f64>,
-    /// rad, one for each time.
+    /// Positions, rad, one for each time.
     pub position: Vec<[f64; JOINTS]>,
-    /// rad/s, one for each time; `None`: derived.
+    /// Velocities, rad/s, one for each time; `None`: derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
-    /// rad/s², one for each time; `None`: derived. Accelerations without velocities are not used.
+    /// Accelerations, rad/s², one for each time; `None`: derived. Accelerations without velocities are not used.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }
 
@@ -69,50 +70,50 @@ pub struct Samples {
 pub struct Fitted {
     /// Points at a fixed step.
     pub trajectory: Trajectory,
-    /// What was derived and resampled, in words.
+    /// Derived and resampled values, as text.
     pub notes: Vec<String>,
-    /// Where the spline through positions alone leaves the interval between two samples, by joint; none where velocities were given.
+    /// Overshoot of each joint: the spline through positions alone leaves the interval between two samples. Empty if velocities were given.
     pub overshoot: Vec<Overshoot>,
 }
 
-/// Step that irregular files are resampled to, ms.
+/// Step for resampling irregular files, ms.
 const STEP_MS: u16 = 10;
-/// Deviation of a regular time column, s.
+/// Maximum deviation of a regular time column, s.
 const REGULAR: f64 = 50e-6;
-/// Longest trajectory that is resampled, s: longer ones do not fit into the controller at any useful step.
+/// Longest trajectory that is resampled, s: a longer one does not fit into the controller at any useful step.
 const DURATION_MAX: f64 = 86_400.0;
 
-/// Why samples make no trajectory.
+/// Reason why samples give no trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
-    /// A channel has another number of samples than there are times.
+    /// The number of samples in a channel differs from the number of times.
     #[error("{samples} samples of the {channel} for {times} times")]
     Count {
         /// "position", "velocity" or "acceleration".
         channel: &'static str,
-        /// Its samples.
+        /// Number of samples in the channel.
         samples: usize,
-        /// How many there must be.
+        /// Required number.
         times: usize,
     },
-    /// A number that is none, at this sample (from 0).
+    /// A value is not a finite number, at this sample (from 0).
     #[error("sample {0}: a number is not finite")]
     NotFinite(usize),
     /// Time does not increase at this sample (from 0).
     #[error("sample {0}: its time does not lie after that of the sample before")]
     Time(usize),
-    /// Longer than a day, s.
+    /// The samples are longer than a day, s.
     #[error("{0} s are longer than a day")]
     Duration(f64),
 }
 
 impl Samples {
-    /// The trajectory through the samples; no sample makes an empty one, which no check passes.
+    /// Returns the trajectory through the samples; without samples an empty trajectory, which no check passes.
     ///
     /// # Errors
     ///
-    /// [`FitError`]: channels of different length, a number that is not finite, times that do not increase, or more than a day.
+    /// [`FitError`]: channels of different length, a value that is not finite, times that do not increase, or more than a day.
     pub fn fit(self) -> Result<Fitted, FitError> {
         self.whole()?;
         let mut notes = Vec::new();
@@ -146,7 +147,7 @@ impl Samples {
         Ok(Fitted { trajectory: Trajectory { step_ms, points }, notes, overshoot })
     }
 
-    /// As many samples in each channel as there are times, all of them numbers.
+    /// Checks that each channel has as many samples as there are times, and that all values are finite.
     fn whole(&self) -> Result<(), FitError> {
         let times = self.times.len();
         let channels = [
@@ -165,7 +166,7 @@ impl Samples {
         self.times.iter().position(|t| !t.is_finite()).map_or(Ok(()), |i| Err(FitError::NotFinite(i)))
     }
 
-    /// The step when all times lie on a grid of whole milliseconds.
+    /// Returns the step if all times lie on a grid of whole milliseconds.
     fn regular_step(&self) -> Option<u16> {
         let [first, second, ..] = self.times[..] else { return Some(STEP_MS) };
         let step = ((second - first) * 1e3).round();
@@ -176,7 +177,7 @@ impl Samples {
         self.times.iter().enumerate().all(regular).then_some(step as u16)
     }
 
-    /// The samples with velocity and acceleration.
+    /// Returns the samples with velocity and acceleration.
     fn points(&self) -> Vec<Point> {
         let mut points: Vec<Point> =
             self.position.iter().map(|p| Point { position: *p, ..Point::default() }).collect();
@@ -218,7 +219,7 @@ impl Samples {
     }
 }
 
-/// 10 ms, more where that would be too many points.
+/// Returns 10 ms, or a longer step if 10 ms would give too many points.
 fn resampled_step(duration: f64) -> u16 {
     let fits = (duration * 1e3 / (POINTS_MAX - 1) as f64).ceil();
     fits.clamp(f64::from(STEP_MS), 60_000.0) as u16
@@ -281,7 +282,7 @@ mod tests {
         assert_eq!(resampled_step(1200.0), 101);
     }
 
-    /// The documented overshoot: joint 1 steps by 1 rad between two of ten equally far samples.
+    /// The documented overshoot: joint 1 steps by 1 rad between two of ten equally spaced samples.
     #[test]
     fn a_spline_swings_over_after_a_step() {
         let position: Vec<_> = (0..10).map(|i| [f64::from(u8::from(i >= 5)); 6]).collect();
@@ -293,7 +294,7 @@ mod tests {
         };
         let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
         assert!((0.08..0.12).contains(&over), "{over}");
-        // End conditions: at rest, but not free of acceleration where the path begins to bend at once.
+        // End conditions: at rest, but with acceleration if the path begins to bend at once.
         assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
         let bent = Samples {
             times: vec![0.0, 0.5, 1.0],
@@ -318,7 +319,7 @@ mod tests {
         let never = Samples { times: vec![f64::NAN], position: vec![[0.0; 6]], ..Samples::default() };
         assert_eq!(never.fit(), Err(FitError::NotFinite(0)));
         assert_eq!(Samples::default().fit().unwrap().trajectory.points.len(), 0);
-        // Accelerations alone are not used: they would contradict the derived velocities.
+        // Accelerations alone are not used, because they would contradict the derived velocities.
         let alone = Samples { velocity: None, acceleration: Some(vec![[9.0; 6]; 3]), ..good };
         assert!(alone.fit().unwrap().trajectory.points.iter().all(|p| p.acceleration[0] != 9.0));
     }

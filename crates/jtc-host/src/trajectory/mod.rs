@@ -1,4 +1,4 @@
-//! Trajectories: points at a fixed step, from the files that people have.
+//! Trajectories: points at a fixed step, read from common file formats.
 
 mod csv;
 pub mod fit;
@@ -21,30 +21,30 @@ pub use segments::UploadOptions;
 
 use crate::file::{FileError, UNITS_KNOWN, read_text};
 
-/// One point of a trajectory.
+/// A point of a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
-    /// rad.
+    /// Positions, rad.
     pub position: [f64; JOINTS],
-    /// rad/s.
+    /// Velocities, rad/s.
     pub velocity: [f64; JOINTS],
-    /// rad/s².
+    /// Accelerations, rad/s².
     pub acceleration: [f64; JOINTS],
 }
 
 impl From<&Point> for SetPoint {
-    /// As the point is given, before the wire rounds it.
+    /// Converts the point before the wire rounds it.
     fn from(p: &Point) -> Self {
         Self { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
     }
 }
 
-/// Points at a fixed step.
+/// A trajectory: points at a fixed step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trajectory {
     /// Time between points, ms.
     pub step_ms: u16,
-    /// First to last.
+    /// Points, first to last.
     pub points: Vec<Point>,
 }
 
@@ -58,7 +58,7 @@ pub enum Form {
     Int16,
     /// 19 columns of floats.
     Float,
-    /// JSON of our own form.
+    /// JSON in the project's own form.
     Json,
     /// `trajectory_msgs/JointTrajectory` as YAML or JSON.
     JointTrajectory,
@@ -69,15 +69,15 @@ pub enum Form {
 /// A trajectory from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
-    /// The trajectory.
+    /// Trajectory.
     pub trajectory: Trajectory,
-    /// What the file was.
+    /// Form of the file.
     pub form: Form,
-    /// What was derived, resampled or left out.
+    /// Derived, resampled and ignored data.
     pub notes: Vec<String>,
-    /// How far the curve goes beyond the waypoints of a file that has positions alone.
+    /// Overshoot of the curve beyond the waypoints of a file with positions alone.
     pub overshoot: Vec<Overshoot>,
-    /// The file names the units of its numbers.
+    /// `true` if the file names the units of its numbers.
     pub units_named: bool,
 }
 
@@ -87,11 +87,11 @@ impl Loaded {
         Self { trajectory, form, notes, overshoot, units_named: matches!(form, Form::Json | Form::Recording) }
     }
 
-    /// From a file of any form; `joint_names` are those of the arm, where they are known.
+    /// Reads a file of any form; `joint_names` are the names of the arm's joints, if known.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is no trajectory of a known form, with line and column.
+    /// Returns an error, with line and column, if the file cannot be read or is not a trajectory of a known form.
     pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         if replay::is_recording(path, None) {
             return replay::load(path);
@@ -106,16 +106,16 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
-    /// From a recording, as it was measured instead of as it was commanded: its last motion by hand, or else its last execution.
+    /// Reads the measured motion of a recording instead of the commanded one: its last motion by hand, or else its last execution.
     ///
     /// # Errors
     ///
-    /// A file that is no recording, or holds no such motion.
+    /// Returns an error if the file is not a recording, or contains no such motion.
     pub fn load_measured(path: &Path) -> Result<Self, FileError> {
         replay::load_measured(path)
     }
 
-    /// The same numbers as degrees, degrees/s and degrees/s²; an error where the file names its units itself.
+    /// Converts the values from degrees, degrees/s and degrees/s²; returns an error if the file names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN));
@@ -132,11 +132,11 @@ impl Loaded {
         Ok(self)
     }
 
-    /// From a text whose form is recognised by its content.
+    /// Parses a text whose form is recognised by its content.
     ///
     /// # Errors
     ///
-    /// A text that is no trajectory of a known form, with line and column.
+    /// Returns an error, with line and column, if the text is not a trajectory of a known form.
     pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
@@ -150,21 +150,21 @@ impl Loaded {
     }
 }
 
-/// A number that a trajectory frame cannot carry.
+/// A value that a trajectory frame cannot carry.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("point {point}, {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
 pub struct ScaleError {
-    /// Point from 0.
+    /// Index of the point, from 0.
     pub point: usize,
-    /// Of this joint.
+    /// Joint of the value.
     pub joint: Joint,
     /// "position", "velocity" or "acceleration".
     pub channel: &'static str,
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// Largest value.
+    /// Largest possible value.
     pub limit: f64,
-    /// Unit of both.
+    /// Unit of both values.
     pub unit: &'static str,
 }
 
@@ -180,17 +180,17 @@ impl From<&RawPoint> for Point {
 }
 
 impl Point {
-    /// As the wire carries it; `index` is for the error.
+    /// Returns the point as on the wire; `index` is for the error.
     ///
     /// # Errors
     ///
-    /// The first number that a trajectory frame cannot carry.
+    /// Returns the first value that a trajectory frame cannot carry.
     pub fn raw(&self, index: usize) -> Result<RawPoint, ScaleError> {
         let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
             let mut out = [0i16; JOINTS];
             for (joint, (to, v)) in Joint::ALL.into_iter().zip(out.iter_mut().zip(values)) {
                 let exact = v * 32767.0 / scale;
-                // Neither clipped nor wrapped; a hair for the rounding of the multiplication. NaN is in no range.
+                // Neither clipped nor wrapped; a small tolerance covers the rounding of the multiplication. NaN is outside every range.
                 if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
                     return Err(ScaleError { point: index, joint, channel, value: *v, limit: scale, unit });
                 }
@@ -207,16 +207,16 @@ impl Point {
 }
 
 impl Trajectory {
-    /// All points as the wire carries them.
+    /// Returns all points as on the wire.
     ///
     /// # Errors
     ///
-    /// The first number that a trajectory frame cannot carry.
+    /// Returns the first value that a trajectory frame cannot carry.
     pub fn raw(&self) -> Result<Vec<RawPoint>, ScaleError> {
         self.points.iter().enumerate().map(|(i, p)| p.raw(i)).collect()
     }
 
-    /// From the first to the last point, s.
+    /// Returns the time from the first to the last point, s.
     pub fn duration_s(&self) -> f64 {
         self.points.len().saturating_sub(1) as f64 * f64::from(self.step_ms) * 1e-3
     }

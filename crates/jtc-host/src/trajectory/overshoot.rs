@@ -1,26 +1,26 @@
-//! How far the curve through waypoints goes beyond them.
+//! Overshoot of the curve through waypoints.
 
 use jtc_wire::Joint;
 
 use super::Point;
 
-/// The furthest place of one joint outside of the interval between two waypoints.
+/// Largest overshoot of a joint beyond the interval between two waypoints.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Overshoot {
-    /// Of this joint.
+    /// Joint.
     pub joint: Joint,
-    /// How far it is outside, rad.
+    /// Distance outside the interval, rad.
     pub beyond_rad: f64,
-    /// Where it is then, rad.
+    /// Position at the overshoot, rad.
     pub position_rad: f64,
-    /// Waypoint (from 1) after which that is.
+    /// Waypoint (from 1) before the overshoot.
     pub after: usize,
 }
 
-/// Less than this, rad, is no overshoot that anybody could see: 1 mm at a metre.
+/// Smallest overshoot that is reported, rad: 1 mm at a metre.
 const LEAST: f64 = 1e-3;
 
-/// Of each joint that has one the largest, for the cubics with these positions and velocities at these times (s).
+/// Returns the largest overshoot of each joint that has one, for the cubics with these positions and velocities at these times (s).
 pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
     let of_joint = |joint: Joint| {
         let j = joint.index();
@@ -43,16 +43,16 @@ fn outside(x: f64, low: f64, high: f64) -> f64 {
     (x - high).max(low - x)
 }
 
-/// Where a cubic over the unit interval turns round, from 0 to `d` with the slopes `v0` and `v1`.
+/// Returns the extrema of a cubic over the unit interval, from 0 to `d` with the slopes `v0` and `v1`.
 fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
     let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
-    // v0 + 2·c2·u + 3·c3·u² = 0, in the form that does not lose digits.
+    // v0 + 2·c2·u + 3·c3·u² = 0, solved in the form without cancellation.
     let root = (c2 * c2 - 3.0 * c3 * v0).sqrt();
     let q = -(c2 + root.copysign(c2));
     [q / (3.0 * c3), v0 / q].map(|u| (u > 0.0 && u < 1.0).then_some(u * (v0 + u * (c2 + u * c3))))
 }
 
-/// All of them in one sentence; none where there is none.
+/// Returns all overshoots in one sentence; `None` for an empty list.
 pub fn overshoot_words(all: &[Overshoot]) -> Option<String> {
     let each = all.iter().map(|o| {
         format!(
@@ -88,11 +88,11 @@ mod tests {
         );
         let words = overshoot_words(&loaded.overshoot).unwrap();
         assert!(words.contains("joint 1 by 0.125 rad (to +0.625 rad, after waypoint 2)"), "{words}");
-        // Times that are resampled change nothing.
+        // Resampled times change nothing.
         let uneven = text.replace("\n3,", "\n3.0004,");
         let over = Loaded::parse(&uneven, None).unwrap().overshoot;
         assert!(over.len() == 1 && (over[0].beyond_rad - 0.125).abs() < 1e-3, "{over:?}");
-        // Along a line there is none.
+        // A straight line has no overshoot.
         let straight =
             "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1,0.1,0,0,0,0,0\n2,0.3,0,0,0,0,0\n3,0.4,0,0,0,0,0\n";
         assert_eq!(Loaded::parse(straight, None).unwrap().overshoot, []);

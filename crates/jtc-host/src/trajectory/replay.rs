@@ -1,7 +1,7 @@
-//! The trajectory that a recording is of.
+//! Extraction of the trajectory from a recording.
 //!
-//! A sample of an execution holds the millisecond of its path at which the controller was, so the path is found whatever the line
-//! and the host did to the times of the samples, and also where it was paused.
+//! A sample of an execution contains the controller's path time in milliseconds. Therefore the path can be
+//! reconstructed even if line, host or pauses disturbed the times of the samples.
 
 use std::path::Path;
 
@@ -15,24 +15,24 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Points further apart than this are left as they are, ms.
+/// Minimum spacing of points, ms; points further apart are kept.
 const GRID_MS: u32 = 10;
 
-/// Distance of measured positions, s: closer ones show the noise of the encoders as speed.
+/// Spacing of measured positions, s: with closer ones the encoder noise appears as speed.
 const MEASURED_S: f64 = 0.04;
-/// Movement below this is standing still, rad.
+/// Movement below which the arm counts as at rest, rad.
 const STILL: f64 = 0.002;
 
-/// First words of the header of a recording as CSV.
+/// First columns in the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
 
-/// The file is a recording: MCAP by its name, CSV by its header.
+/// Returns `true` if the file is a recording: MCAP by its name, CSV by its header.
 pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
     let mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     mcap || text.is_some_and(|text| text.trim_start_matches('\u{feff}').starts_with(CSV_HEADER))
 }
 
-/// Reads a recording and takes its last execution out of it.
+/// Reads a recording and extracts its last execution.
 pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     if let Some(mut whole) = held(&recording) {
@@ -53,7 +53,7 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// The trajectory that the recording of a run holds, exactly as it was run, and whole also where the run was broken off.
+/// Returns the trajectory stored in the recording of a run, exactly as it was run; complete even if the run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.broken_off(whole) {
@@ -77,7 +77,7 @@ fn held(recording: &Recording) -> Option<Loaded> {
 fn read(path: &Path) -> Result<Recording, FileError> {
     Recording::read(path).map_err(|e| match e {
         RecordingError::Io { path, source } => FileError::Io { path, source },
-        // Its words begin with the name of the file.
+        // The message begins with the name of the file.
         other => {
             let words = other.to_string();
             let name = path.display().to_string();
@@ -88,7 +88,7 @@ fn read(path: &Path) -> Result<Recording, FileError> {
     })
 }
 
-/// Reads a recording and takes what was measured out of it: its last teaching, or else its last execution.
+/// Reads a recording and extracts the measured motion: its last teaching, or else its last execution.
 pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
@@ -98,7 +98,7 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// The last motion by hand, or else of a trajectory, as it was measured, without the standing still before and after it.
+/// Returns the measured motion, by hand or else along a trajectory (the last one), without the standstill before and after it.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };
@@ -118,7 +118,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
         let problem = "the recording holds no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
-    // With a resting pose at each end.
+    // Includes a pose at rest at each end.
     let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
     let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
     let start = times.first().copied().unwrap_or(0.0);
@@ -131,7 +131,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// The last motion by hand, on the clock of whoever recorded it.
+/// Returns the last motion by hand, on the clock of the recording.
 fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let taught = |s: &Sample| s.state == ControllerState::Teaching;
     let end = samples.iter().rposition(taught).map_or(0, |i| i + 1);
@@ -139,8 +139,8 @@ fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
 }
 
-/// The last execution, over its pauses, on the clock of its path: that of the host blurs it, and has no meaning in virtual time. Where the
-/// arm came to rest is the end of it.
+/// Returns the last execution, including its pauses, on the clock of its path. The host's clock has jitter, and no
+/// meaning in virtual time. The last sample is the pose in which the arm came to rest.
 fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
     let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
@@ -161,7 +161,7 @@ fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     timed
 }
 
-/// Places of a path that were seen, at the controller's milliseconds.
+/// Observed positions of a path, by the controller's milliseconds.
 #[derive(Default)]
 struct Seen {
     ms: Vec<u32>,
@@ -169,7 +169,7 @@ struct Seen {
 }
 
 impl Seen {
-    /// Every tenth millisecond, and both ends: a path that is known at each millisecond has more points than the controller holds.
+    /// Keeps every tenth millisecond and both ends: a path known at each millisecond has more points than the controller holds.
     fn thinned(self) -> Self {
         let last = self.ms.len().saturating_sub(1);
         if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
@@ -198,7 +198,7 @@ impl Seen {
     }
 }
 
-/// The path of the last execution in the samples.
+/// Returns the path of the last execution in the samples.
 fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
     let mut path = Seen::default();
     for sample in samples {
@@ -208,7 +208,7 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
-            // The set values are known on the path only. It ends at rest, nearly where it was a moment before.
+            // Set values are known on the path only. The path ends at rest, close to the previous sample.
             (Some(TrajectoryState::Finish), Some(place)) => {
                 Point { position: place.position, ..Point::default() }
             }
@@ -218,7 +218,7 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
             continue;
         }
         if path.ms.last().is_some_and(|point| sample.point < *point) {
-            // Another execution begins, the one after an approach for example.
+            // Another execution begins, for example after an approach.
             path = Seen::default();
         }
         path.ms.push(sample.point);
@@ -251,12 +251,12 @@ mod tests {
     use super::*;
     use crate::sample::JointSample;
 
-    /// A sample at `point` with the set positions of a smooth path of 2 s.
+    /// Returns a sample at `point` with the set positions of a smooth path of 2 s.
     fn sample(trajectory: TrajectoryState, point: u32) -> Sample {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
-        // The host's times are of no use in virtual time.
+        // The host's times have no meaning in virtual time.
         Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
@@ -272,7 +272,7 @@ mod tests {
         let loaded = executed(&samples).unwrap();
         assert_eq!(loaded.form, Form::Recording);
         assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
-        // Its last 40 ms are unknown.
+        // The last 40 ms of the path are unknown.
         for (i, point) in loaded.trajectory.points.iter().enumerate() {
             let s = i as f64 * f64::from(loaded.trajectory.step_ms) / 2_000.0;
             let q = 0.3 * s * s * (3.0 - 2.0 * s);
@@ -289,8 +289,8 @@ mod tests {
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
-    /// `jtc sim` records each millisecond: a minute of that is more points than the controller holds. What was commanded comes back,
-    /// velocities and accelerations too.
+    /// `jtc sim` records each millisecond: a minute of it has more points than the controller holds. The commanded
+    /// values are restored, including velocities and accelerations.
     #[test]
     fn a_long_path_known_at_each_millisecond_can_be_run_again() {
         let at = |ms: u32| {
@@ -314,7 +314,7 @@ mod tests {
         }
     }
 
-    /// What a hand led, between rests of any length, whatever was executed before.
+    /// A motion by hand is found between rests of any length and after any earlier execution.
     #[test]
     fn a_motion_by_hand_is_found_as_it_was_measured() {
         let at = |ms: u32| {
@@ -334,7 +334,7 @@ mod tests {
         let (first, last) = (led.points[0], led.points.last().unwrap());
         assert!(first.position[3].abs() < 2e-3 && (last.position[3] - 0.4).abs() < 2e-3);
         assert_eq!((first.velocity, last.velocity), ([0.0; JOINTS], [0.0; JOINTS]));
-        // Without any, what was executed.
+        // Without a motion by hand, the last execution is used.
         let run: Vec<Sample> = (0..50)
             .map(|k| Sample {
                 time_s: f64::from(k) * 0.04,

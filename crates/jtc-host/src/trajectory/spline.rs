@@ -8,7 +8,7 @@ pub(super) fn column(rows: &[[f64; JOINTS]], j: usize) -> Vec<f64> {
     rows.iter().map(|r| r[j]).collect()
 }
 
-/// First derivatives at the knots of a cubic spline through `y`; at its ends at rest, or else free of bending.
+/// Returns the first derivatives at the knots of a cubic spline through `y`; its ends are at rest, or else without curvature.
 pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     let n = y.len();
     if n < 2 {
@@ -43,7 +43,7 @@ pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     right
 }
 
-/// Second derivatives at the knots of the cubic spline with these slopes.
+/// Returns the second derivatives at the knots of the cubic spline with these slopes.
 pub(super) fn spline_bends(t: &[f64], y: &[f64], slopes: &[f64]) -> Vec<f64> {
     let n = y.len();
     if n < 2 {
@@ -62,7 +62,7 @@ pub(super) fn spline_bends(t: &[f64], y: &[f64], slopes: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// The quintic through both points at the fraction `u` of `h` seconds, with its derivatives.
+/// Returns the quintic through both points at the fraction `u` of `h` seconds, with its derivatives.
 pub(super) fn quintic(a: &Point, b: &Point, h: f64, u: f64) -> Point {
     let mut out = Point::default();
     for j in 0..JOINTS {

@@ -1,4 +1,4 @@
-//! JSON of our own form, and `trajectory_msgs/JointTrajectory` as JSON or YAML.
+//! JSON in the project's own form, and `trajectory_msgs/JointTrajectory` as JSON or YAML.
 
 use jtc_core::JOINTS;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use super::fit::{FitError, Samples};
 use super::{Form, Loaded, Trajectory};
 use crate::file::{FileError, Place};
 
-/// Our JSON form.
+/// The project's own JSON form.
 #[derive(Serialize, Deserialize)]
 struct JsonForm {
     step_ms: Option<u16>,
@@ -26,7 +26,7 @@ struct JsonPoint {
     acceleration_rad_s2: Option<[f64; JOINTS]>,
 }
 
-/// `trajectory_msgs/JointTrajectory`, alone or inside the messages that carry it.
+/// A `trajectory_msgs/JointTrajectory`, alone or inside the messages that contain it.
 #[derive(Deserialize)]
 struct RosForm {
     joint_names: Option<Vec<String>>,
@@ -70,7 +70,7 @@ impl RosTime {
 
 pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
     let wrong = |e: serde_json::Error| FileError::at(Place::line(e.line()), format!("JSON: {e}"));
-    // Looked at as a whole only where its own form does not fit.
+    // The ROS form is tried only if the project's own form does not fit.
     match serde_json::from_str::<JsonForm>(text) {
         Ok(form) => own(form),
         Err(e) if text.contains("position_rad") => Err(wrong(e)),
@@ -117,14 +117,14 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // The grid of the file itself, also where a step above 1 s would count as irregular.
+    // Keeps the step of the file itself, even if a step above 1 s would count as irregular.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
     }
     Ok(loaded)
 }
 
-/// Values that all points have, or none.
+/// Returns the values if all points have them; `None` if no point has them.
 fn all_or_none<P, const N: usize>(
     points: &[P],
     name: &str,
@@ -208,7 +208,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     }
 }
 
-/// Where each of our joints stands in the file, base to wrist.
+/// Returns the index in the file of each joint of the arm, base to wrist.
 fn joint_order(
     found: &[String],
     names: Option<&[String; JOINTS]>,
@@ -225,7 +225,7 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // Prefixes differ between files of the same arm: the number at the end is that of the joint.
+        // Prefixes differ between files of the same arm; the number at the end is the joint number.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();
@@ -265,7 +265,7 @@ fn last_number(name: &str) -> Option<u32> {
 }
 
 impl Trajectory {
-    /// As JSON with all channels.
+    /// Returns the trajectory as JSON with all channels.
     pub fn to_json(&self) -> String {
         let points = self.points.iter().map(|p| JsonPoint {
             time_s: None,

@@ -7,23 +7,23 @@ use super::flange::{self, ANGLES, NAMES};
 use super::{FileWaypoint, Target, WaypointFile};
 use crate::file::{FileError, Place, number, rows, short};
 
-/// What the columns are, in words.
+/// Description of the known columns.
 pub(super) const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
-/// What a column, or the key of an object, holds.
+/// Content of a column, or of a key of an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Column {
     Time,
     Pose,
     Leg,
-    /// From 0.
+    /// Joint, from 0.
     Joint(usize),
-    /// From 0, in the order of the names.
+    /// Value of the flange, from 0, in the order of the names.
     Flange(usize),
 }
 
-/// Where the columns are, and the radians in a unit of each.
+/// Positions of the columns, and the factor from each unit to radians.
 #[derive(Default)]
 struct Header {
     names: Vec<String>,
@@ -53,13 +53,13 @@ pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
     Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
 }
 
-/// Whether the name of a column says the unit of an angle, in letters of any case.
+/// Returns `true` if the name of a column contains the unit of an angle, in upper or lower case.
 pub(super) fn names_unit(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     name.contains("_deg") || name.contains("_rad")
 }
 
-/// What the name of a column says, in letters of any case, and the radians in its unit.
+/// Returns the column for a name, in upper or lower case, and the factor from its unit to radians.
 pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     let name = name.trim_matches('"').to_ascii_lowercase();
     match name.as_str() {
@@ -84,7 +84,7 @@ pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     (1..=JOINTS).contains(&joint).then(|| (Column::Joint(joint - 1), unit))
 }
 
-/// Whether waypoint files have a column of this name.
+/// Returns `true` if waypoint files have a column of this name.
 pub(crate) fn is_column(name: &str) -> bool {
     column(name).is_some()
 }
@@ -177,7 +177,7 @@ impl Header {
         Ok(FileWaypoint { target, time, leg, place })
     }
 
-    /// A pose of the flange, or the `point` alone; cells that are empty are not given.
+    /// Returns a pose of the flange, or the `point` alone; empty cells count as missing.
     fn flange(&self, line: usize, cells: &[&str], point: bool) -> Result<Target, FileError> {
         let mut given = [None; NAMES.len()];
         for (to, column) in given.iter_mut().zip(&self.flange) {

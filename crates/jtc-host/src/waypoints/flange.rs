@@ -1,19 +1,19 @@
-//! Poses of the flange as files give them: ten numbers, of which three are a position and three or four an orientation.
+//! Flange poses in files: ten values. Three are a position, three or four an orientation.
 
 use jtc_plan::kinematics::Orientation;
 
 use super::Target;
 
-/// Names of the numbers: a position (m), a quaternion, and roll, pitch and yaw (rad).
+/// Names of the values: a position (m), a quaternion, and roll, pitch and yaw (rad).
 pub(super) const NAMES: [&str; 10] = ["x", "y", "z", "qx", "qy", "qz", "qw", "roll", "pitch", "yaw"];
-/// Those that are angles.
+/// Indices of the angles.
 pub(super) const ANGLES: std::ops::Range<usize> = 7..10;
 
-/// The pose that these numbers are; `None` where none of them is given. Of a `point` the orientation does not count, and may be missing.
+/// Returns the pose for these values; `None` if all are missing. For a `point` the orientation is not needed.
 ///
 /// # Errors
 ///
-/// What is missing, or twice there.
+/// Returns a message about a missing or duplicate value.
 pub(super) fn target(given: &[Option<f64>; NAMES.len()], point: bool) -> Result<Option<Target>, String> {
     let [x, y, z, qx, qy, qz, qw, roll, pitch, yaw] = *given;
     if given.iter().all(Option::is_none) {

@@ -18,7 +18,7 @@ struct Whole {
     waypoints: Vec<Entry>,
 }
 
-/// One waypoint as it is written; angles in rad.
+/// A waypoint as written in the file; angles in rad.
 #[derive(Default)]
 struct Entry {
     time: Option<f64>,
@@ -26,9 +26,9 @@ struct Entry {
     leg: Option<String>,
     joints: [Option<f64>; JOINTS],
     flange: [Option<f64>; NAMES.len()],
-    /// A key names the unit of an angle.
+    /// `true` if a key contains the unit of an angle.
     unit_named: bool,
-    /// Two keys for one number, as they are written.
+    /// Two keys for the same value, as written in the file.
     twice: Option<(String, String)>,
 }
 
@@ -63,7 +63,7 @@ impl<'de> Deserialize<'de> for Entry {
     }
 }
 
-/// Reads the keys of an object as the names of columns.
+/// Visitor that reads the keys of an object as the names of columns.
 struct Keys;
 
 impl<'de> Visitor<'de> for Keys {
@@ -105,7 +105,7 @@ impl<'de> Visitor<'de> for Keys {
     }
 }
 
-/// Puts a value where it belongs; whether there is one.
+/// Stores a value if it is present; returns `true` if it is.
 fn set<T>(to: &mut Option<T>, value: Option<T>) -> bool {
     let given = value.is_some();
     if given {

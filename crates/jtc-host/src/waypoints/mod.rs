@@ -1,8 +1,10 @@
-//! Waypoint files: the places that a motion is to lead through, with or without times, for [`plan`](crate::plan).
+//! Waypoint files: positions for a motion, with or without times, for [`plan`](crate::plan).
 //!
-//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose of the flange
-//! in the base frame (m, with a quaternion or roll, pitch and yaw), of which the joint positions nearest to the waypoint before are
-//! taken. `leg` is how the arm gets there: straight in joint space, or with the flange on a [line or an arc](LegKind). Times are s from the first waypoint. The forms are CSV with a header and JSON with the same keys:
+//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a
+//! pose of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). For a pose of the flange the
+//! joint positions nearest to the previous waypoint are used. `leg` selects the motion to the waypoint: straight in
+//! joint space, or with the flange on a [line or an arc](LegKind). Times are s from the first waypoint. The forms are
+//! CSV with a header and JSON with the same keys:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -34,71 +36,71 @@ use crate::error::facts;
 use crate::file::{FileError, Place, UNITS_KNOWN, read_text, short};
 use crate::plan::PlanError;
 
-/// Most waypoints of a file.
+/// Maximum number of waypoints in a file.
 pub const WAYPOINTS_MAX: usize = 10_000;
 
-/// Where a waypoint is.
+/// Position of a waypoint.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Target {
     /// Joint positions, rad, base to wrist.
     Joints([f64; JOINTS]),
-    /// A pose of the arm, by its name.
+    /// Name of a pose of the arm.
     Pose(String),
-    /// A pose of the flange in the base frame: m, and its orientation.
+    /// Pose of the flange in the base frame: position, m, and orientation.
     Flange([f64; 3], Orientation),
 }
 
-/// One waypoint of a file.
+/// A waypoint of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FileWaypoint {
-    /// Where it is.
+    /// Position.
     pub target: Target,
-    /// When to be there, s from the first waypoint; `None`: as soon as the limits allow.
+    /// Time of the waypoint, s from the first one; `None`: as soon as the limits permit.
     pub time: Option<f64>,
-    /// How the arm gets there from the waypoint before, where the file says it.
+    /// Motion from the previous waypoint, if the file specifies it.
     pub leg: Option<LegKind>,
-    /// Where it stands in the file.
+    /// Location in the file.
     pub place: Place,
 }
 
 /// The waypoints of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WaypointFile {
-    /// In their order.
+    /// Waypoints, in order.
     pub waypoints: Vec<FileWaypoint>,
-    /// The file names the units of its numbers.
+    /// `true` if the file names the units of its numbers.
     pub units_named: bool,
     path: PathBuf,
 }
 
-/// Why a file of waypoints cannot be used.
+/// Reason why a waypoint file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WaypointError {
-    /// It cannot be read, or is of no known form.
+    /// The file cannot be read, or its form is unknown.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A name in it is none of a pose that the arm has and can be in.
+    /// A name in the file is not a pose that the arm has and can reach.
     #[error("{}{place}: {source}", path.display())]
     Pose {
         /// The file.
         path: PathBuf,
         /// Line and column.
         place: Place,
-        /// What is wrong with the name.
+        /// Problem with the name.
         source: Box<PoseError>,
     },
-    /// The flange cannot be brought there.
+    /// The arm cannot move the flange to the pose.
     #[error("{}{place}: {source}", path.display())]
     Flange {
         /// The file.
         path: PathBuf,
         /// Line, or number of the waypoint.
         place: Place,
-        /// Why not.
+        /// Reason.
         source: Box<kinematics::PoseError>,
     },
-    /// There is no such way through them; the number of the waypoint is in it.
+    /// No such path through the waypoints exists; the error contains the number of the waypoint.
     #[error(transparent)]
     Route(#[from] PlanError),
 }
@@ -110,7 +112,7 @@ impl Diagnose for WaypointError {
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => {
-                // Numbers that are no pose, for whichever arm.
+                // Values that are not a valid pose for any arm.
                 let kind = match **source {
                     kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
                         ErrorKind::Usage
@@ -133,23 +135,23 @@ impl Diagnose for WaypointError {
 }
 
 impl WaypointFile {
-    /// From a CSV or JSON file, recognised by its content.
+    /// Reads a CSV or JSON file, recognised by its content.
     ///
     /// # Errors
     ///
-    /// A file that cannot be read or is none of the forms, with line, column and value.
+    /// Returns an error, with line, column and value, if the file cannot be read or is not one of the forms.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let file = Self::parse(&text).map_err(|e| e.in_file(path))?;
         Ok(Self { path: path.to_owned(), ..file })
     }
 
-    /// The same waypoints, in errors as those of this file.
+    /// Sets the path of the file, which errors name.
     pub fn in_file(self, path: &Path) -> Self {
         Self { path: path.to_owned(), ..self }
     }
 
-    /// From the text of such a file.
+    /// Parses the text of a waypoint file.
     ///
     /// # Errors
     ///
@@ -168,7 +170,7 @@ impl WaypointFile {
         Ok(file)
     }
 
-    /// A point on the way of an arc has the arc's end behind it, and that has such a point before it.
+    /// Checks that each `via` point is followed by the end of an arc, and that each arc has a `via` point before it.
     fn check_arcs(&self) -> Result<(), FileError> {
         let kind = |i: usize| self.waypoints.get(i).and_then(|w| w.leg);
         for (i, waypoint) in self.waypoints.iter().enumerate() {
@@ -191,24 +193,24 @@ impl WaypointFile {
         Ok(())
     }
 
-    /// Whether the flange is to keep to a line or an arc somewhere; `line`: legs of which the file does not say how are lines.
+    /// Returns `true` if the flange moves on a line or an arc on any leg; `line`: legs without a specified motion are lines.
     pub fn has_lines(&self, line: bool) -> bool {
         let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Indices of the waypoints to which a leg in joint space leads from one pose of the flange to another.
+    /// Returns the indices of the waypoints that are reached by a leg in joint space from one flange pose to another.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
         (1..self.waypoints.len()).filter(|&i| is_joint(i) && by_flange(i - 1) && by_flange(i)).collect()
     }
 
-    /// The same numbers as degrees.
+    /// Converts the values from degrees.
     ///
     /// # Errors
     ///
-    /// A file that names its units itself.
+    /// Returns an error if the file names its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN).in_file(&self.path));
@@ -223,13 +225,14 @@ impl WaypointFile {
         Ok(self)
     }
 
-    /// The waypoints as places of an arm, for [`Planner::through`](crate::plan::Planner::through). Of a pose of the flange the joint positions
-    /// nearest to the waypoint before are taken, or nearest to the zero pose for the first one.
+    /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). For a
+    /// pose of the flange the joint positions nearest to the previous waypoint are used, or nearest to the zero pose
+    /// for the first waypoint.
     ///
     /// # Errors
     ///
-    /// [`WaypointError::Pose`] for a name that is none of this arm's poses, with the one that looks most like it;
-    /// [`WaypointError::Flange`] for a pose of the flange that the arm does not reach.
+    /// [`WaypointError::Pose`] if a name is not one of this arm's poses, with the most similar name;
+    /// [`WaypointError::Flange`] if the arm does not reach a pose of the flange.
     pub fn positions(&self, arm: &Arm) -> Result<Vec<jtc_plan::Waypoint>, WaypointError> {
         let start = self.waypoints.first().and_then(|w| w.time).unwrap_or(0.0);
         let config = arm.config();
@@ -245,12 +248,12 @@ impl WaypointFile {
         Ok(found)
     }
 
-    /// The waypoints as a route, for [`Planner::on_route`](crate::plan::Planner::on_route), and their times; `line`: legs of which the file
-    /// does not say how are lines. `blends` are those of [`Route::new`].
+    /// Returns the waypoints as a route, for [`Planner::on_route`](crate::plan::Planner::on_route), and their times;
+    /// `line`: legs without a specified motion are lines. `blends` are the arguments of [`Route::new`].
     ///
     /// # Errors
     ///
-    /// As [`positions`](Self::positions); [`WaypointError::Route`] for a line or an arc that cannot be.
+    /// As [`positions`](Self::positions); [`WaypointError::Route`] for an impossible line or arc.
     pub fn route(
         &self,
         arm: &Arm,
@@ -273,7 +276,7 @@ impl WaypointFile {
         Ok((route, self.waypoints.iter().map(|w| w.time.map(|t| t - start)).collect()))
     }
 
-    /// Where the waypoint is, of this arm.
+    /// Returns the position of the waypoint for this arm.
     fn target(&self, waypoint: &FileWaypoint, arm: &Arm) -> Result<kinematics::Target, WaypointError> {
         let (path, place) = (self.path.clone(), waypoint.place.clone());
         Ok(match &waypoint.target {
@@ -312,12 +315,12 @@ impl WaypointFile {
                 .at(*position)
                 .and_then(|pose| kinematics.solve(&pose, before))
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
-            // There is one where a waypoint asks for it.
+            // `kinematics` is present if a waypoint needs it.
             (Target::Flange(..), None) => Ok(*before),
         }
     }
 
-    /// What is wrong with a plan through these waypoints, with the place of the one that it is about.
+    /// Returns the message of a plan's error, with the location in the file of the waypoint concerned.
     pub fn located(&self, error: &PlanError) -> String {
         match error.waypoint().and_then(|waypoint| self.place_of(waypoint)) {
             Some(place) => format!("{place}: {error}"),
@@ -325,18 +328,18 @@ impl WaypointFile {
         }
     }
 
-    /// Where waypoint `number` (from 1) stands in the file, with the file.
+    /// Returns the location of waypoint `number` (from 1), including the file.
     pub fn place_of(&self, number: usize) -> Option<String> {
         let waypoint = self.waypoints.get(number.checked_sub(1)?)?;
         Some(format!("{}{}", self.path.display(), waypoint.place))
     }
 }
 
-/// How the arm gets to a waypoint, by the word in a file; `None`: the file does not say it.
+/// Returns the motion to a waypoint for a word in a file; `None` if the word is empty.
 ///
 /// # Errors
 ///
-/// A word that is none of them.
+/// Returns an error if the word is unknown.
 fn leg_kind(word: &str) -> Result<Option<LegKind>, String> {
     Ok(Some(match word.to_ascii_lowercase().as_str() {
         "" => return Ok(None),
@@ -357,7 +360,7 @@ fn leg_word(leg: LegKind) -> &'static str {
     }
 }
 
-/// Waypoints as CSV, to a millionth of a radian.
+/// Formats waypoints as CSV, to a millionth of a radian.
 pub fn to_csv<'a>(positions: impl IntoIterator<Item = &'a [f64; JOINTS]>) -> String {
     let mut text = String::from("q1,q2,q3,q4,q5,q6\n");
     for position in positions {

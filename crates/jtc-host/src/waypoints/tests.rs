@@ -1,4 +1,4 @@
-//! Waypoint files, and the errors of broken ones.
+//! Waypoint files, and the errors of invalid files.
 
 use proptest::prelude::*;
 
@@ -36,7 +36,7 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The pose of the flange where the arm is, given back as a quaternion or as angles, leads there again.
+/// The flange pose of a joint position, written as a quaternion or as angles, leads back to that position.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();
@@ -71,7 +71,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
             assert!((found[j] - q[j]).abs() < 1e-6, "{text}: {found:?}");
         }
     }
-    // Too far away, in no orientation, and half given.
+    // Too far away, without an orientation, and incomplete.
     let far =
         WaypointFile::parse("x,y,z,roll,pitch,yaw\n9,0,0,0,0,0\n").unwrap().positions(&arm).unwrap_err();
     assert!(far.to_string().starts_with(", line 2: out of reach"), "{far}");
@@ -81,7 +81,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     assert!(long.to_string().contains("the quaternion has the length 1.414"), "{long}");
 }
 
-/// Times count from the first waypoint, and may be left out.
+/// Times count from the first waypoint, and are optional.
 #[test]
 fn times_are_from_the_first_waypoint() {
     let times = |text: &str| read(text).iter().map(|w| w.time).collect::<Vec<_>>();
@@ -100,7 +100,7 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     assert!(named.in_degrees().unwrap_err().to_string().contains("are known"));
 }
 
-/// A unit in the name of a column or key counts in letters of any case, and no option turns the numbers once more.
+/// A unit in the name of a column or key is recognised in upper and lower case, and no option converts the numbers again.
 #[test]
 fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     let joint_headers = [
@@ -144,7 +144,7 @@ fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     assert!(plain.in_degrees().is_ok());
 }
 
-/// Keys of an object with 60 for the first and 0 for the others.
+/// Returns the keys of an object with 60 for the first and 0 for the others.
 fn header_keys(names: &str) -> String {
     let value = |i: usize| if i == 0 { 60 } else { 0 };
     names
@@ -155,7 +155,7 @@ fn header_keys(names: &str) -> String {
         .join(", ")
 }
 
-/// Which of two values for one number is meant is not guessed.
+/// If a value is given twice, the reader does not guess.
 #[test]
 fn two_names_for_one_number_are_refused() {
     let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";
@@ -219,7 +219,7 @@ fn a_broken_file_is_refused_with_its_place() {
 }
 
 proptest! {
-    /// Whatever a file holds, it is read or refused.
+    /// Any file content is read or rejected.
     #[test]
     fn any_text_is_read_or_refused(text in "(q[1-6](_deg)?,|t,|pose,|[0-9.e-]{1,4},|\n|[{}\\[\\]\":a-z]){0,60}") {
         let _ = WaypointFile::parse(&text).map(|file| file.positions(&arm()));

@@ -1,9 +1,10 @@
-//! Waypoints of a recorded motion: as few of its positions as keep every other one within a tolerance of the legs between them.
+//! Thinning of a recorded motion: few of its positions remain, and every other one is within a tolerance of the legs between them.
 
 use jtc_core::JOINTS;
 
-/// Numbers of those of `positions` (rad) that remain when each of the others has to be within `tolerance` (rad, the joint that is
-/// furthest) of the straight leg between its neighbours that remain (Ramer 1972; Douglas & Peucker 1973). The ends always remain.
+/// Returns the indices of the `positions` (rad) that remain if every other one must be within `tolerance` (rad, of the
+/// joint with the largest distance) of the straight leg between its remaining neighbours (Ramer 1972; Douglas & Peucker
+/// 1973). The ends always remain.
 pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     let last = positions.len().saturating_sub(1);
     let mut keep = vec![false; positions.len()];
@@ -12,7 +13,7 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
             *kept = true;
         }
     }
-    // A list instead of a recursion: a path may have many positions.
+    // A list instead of recursion, because a path may have many positions.
     let mut parts = vec![(0, last)];
     while let Some((from, to)) = parts.pop() {
         let between = (from + 1..to).map(|i| (i, distance(&positions[i], &positions[from], &positions[to])));
@@ -25,7 +26,7 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     (0..positions.len()).filter(|i| keep[*i]).collect()
 }
 
-/// How far `p` is from the leg between `a` and `b`: of the joint that is furthest, where the leg is nearest to `p`, rad.
+/// Returns the distance of `p` from the leg between `a` and `b`: of the joint with the largest one, at the point nearest to `p`, rad.
 fn distance(p: &[f64; JOINTS], a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     let dot =
         |u: &dyn Fn(usize) -> f64, v: &dyn Fn(usize) -> f64| (0..JOINTS).map(|j| u(j) * v(j)).sum::<f64>();
@@ -42,7 +43,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// Of any walk, what was left out is near a leg between what remains.
+        /// For any walk, every removed position is near a leg between remaining ones.
         #[test]
         fn what_is_left_out_is_within_the_tolerance(
             steps in prop::collection::vec(prop::array::uniform6(-0.1..0.1f64), 2..80),
@@ -61,7 +62,7 @@ mod tests {
             for leg in kept.windows(2) {
                 let (a, b) = (&positions[leg[0]], &positions[leg[1]]);
                 for p in &positions[leg[0]..=leg[1]] {
-                    // By trying many places of the leg instead of the formula.
+                    // Compares with a search over many points of the leg instead of the formula.
                     let near = (0..=1000)
                         .map(|k| {
                             let u = f64::from(k) / 1000.0;

@@ -1,4 +1,4 @@
-//! A session on a line that is shared with others: whose refusal a refusal is.
+//! A session on a shared line: rejections by the device and by the agent are distinguished.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,11 +11,11 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denials that arrive with the next bytes that are read: of frames before, and of the frame that was written last.
+/// Denials that arrive with the next bytes read: for earlier frames, and for the last written frame.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 
-/// A line on which every frame is refused.
+/// A line that rejects every frame.
 struct SharedLine<P> {
     port: P,
     arriving: Denials,
@@ -42,7 +42,7 @@ impl<P: Port> Port for SharedLine<P> {
     }
 }
 
-/// A session on such a line; `own` is denied with each frame.
+/// Returns a session on such a line; each frame is denied with `own`.
 fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     let arriving = Denials::default();
     let denials = arriving.clone();
@@ -58,7 +58,7 @@ fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     (Session::new(SharedLine { port: device, arriving: arriving.clone(), denied: None }), arriving)
 }
 
-/// A denial that comes late is not taken for one of the frame that is sent next.
+/// A late denial does not count for the next frame.
 #[test]
 fn a_late_denial_is_not_that_of_the_next_frame() {
     let (mut s, arriving) = session(None);
@@ -74,7 +74,7 @@ fn a_late_denial_is_not_that_of_the_next_frame() {
     assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");
 }
 
-/// One that comes with the refusal is.
+/// A denial that arrives with the rejection counts for it.
 #[test]
 fn a_denial_is_that_of_the_frame_before_it() {
     let (mut s, _) = session(Some("another one commands"));

@@ -1,4 +1,4 @@
-//! The client against the whole simulated controller: parameters, uploads on good and bad lines, execution, recovery.
+//! The client with the complete simulated controller: parameters, uploads on good and bad lines, execution, recovery.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -17,7 +17,7 @@ use jtc_sim::{Fault, FaultKind, Trigger};
 
 use super::{Sim, inject, motion, ready, session};
 
-/// There and back between two poses and then at rest, `points` in all.
+/// Returns a motion between two poses and back, then at rest, with `points` points in total.
 fn trajectory(points: usize) -> Trajectory {
     let config = Config::avena();
     let there = plan::joint_move(&[0.0; 6], &[0.6, -0.5, 0.4, 0.8, -0.3, 0.9], &config, 60.0).unwrap();
@@ -29,7 +29,7 @@ fn trajectory(points: usize) -> Trajectory {
     Trajectory { step_ms: there.step_ms, points: all }
 }
 
-/// Checked for the default arm, which stands at the first point.
+/// Checks a trajectory for the default arm at its first point.
 fn checked(t: &Trajectory, upload: UploadOptions) -> CheckedTrajectory {
     let options = CheckOptions { upload, ..CheckOptions::default() };
     CheckedTrajectory::check(t, &Arm::avena(), &t.points[0].position, &options).unwrap()
@@ -58,7 +58,7 @@ fn parameters_go_over_and_the_controller_becomes_ready() {
     assert_eq!((status.jtc_init, status.node_init, status.friction_type), (0, 0, 0));
 }
 
-/// At least 98 % of what the line can carry.
+/// An upload uses at least 98 % of the capacity of the line.
 #[test]
 fn uploads_fill_the_line() {
     for (baud, points) in [(115_200, 2_000), (921_600, 12_000), (3_000_000, 12_000)] {
@@ -75,7 +75,7 @@ fn uploads_fill_the_line() {
     }
 }
 
-/// A line that garbles bytes towards the host.
+/// A line that corrupts bytes towards the host.
 struct Noisy {
     port: SimPort,
     random: u64,
@@ -104,7 +104,7 @@ impl Port for Noisy {
     }
 }
 
-/// J-04: records are one-shot; one that is lost on the way to the host must not cost the upload, nor a command.
+/// J-04: records are one-shot; a record lost on the way to the host must not fail the upload or a command.
 #[test]
 fn j04_lost_confirmations_are_survived() {
     for seed in 1..6 {
@@ -124,7 +124,7 @@ fn j04_lost_confirmations_are_survived() {
     }
 }
 
-/// J-04, J-30: whatever the line loses, in the end the controller has every point.
+/// J-04, J-30: despite any losses on the line the controller finally has every point.
 #[test]
 fn uploads_survive_a_bad_line() {
     for (seed, kind) in [
@@ -161,7 +161,7 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
     assert_eq!(status.point, (t.trajectory().duration_s() * 1e3).round() as u32);
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
-    // Again from Finish: refused, the arm is at the end (J-34).
+    // Execute again from Finish is rejected, because the arm is at the end (J-34).
     let error = s.execute(&t).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Device);
     assert!(error.hint().contains("--approach"), "{error}");
@@ -201,7 +201,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
-    // That of the last status on the path: up to 40 ms before the fault.
+    // Point of the last status on the path: up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
@@ -211,7 +211,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
         .unwrap_or_else(|e| panic!("{e}: {steps:?}"));
     assert_eq!((status.state, status.errors), (ControllerState::HoldPos.into(), 0), "{steps:?}");
     assert!(steps.iter().any(|s| matches!(s, RecoverStep::Clear(_))));
-    // J-24: nothing moves on its own.
+    // J-24: the arm never moves on its own.
     assert_ne!(status.trajectory, TrajectoryState::Execute);
 }
 
@@ -223,7 +223,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let diagnosis = error.diagnosis();
     assert_eq!((diagnosis.kind, diagnosis.code), (ErrorKind::NoLink, "no-link"));
     assert_eq!(silent.clear(true, 0).unwrap_err().diagnosis().kind, ErrorKind::NoLink);
-    // A file is none of the things that one can plug in.
+    // A file is not a connected device.
     let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
     let mut s = ready(Some(921_600));
@@ -235,7 +235,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// A push ends a run: the arm yields and is held, and goes on when that was cleared.
+/// A push ends a run: the arm yields and is held; the motion can be resumed after clearing.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let mut s = ready(None);
@@ -261,7 +261,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         jtc_host::words::errors_line(&held)
     );
     assert!(jtc_host::words::next_step(&held).to_string().contains("jtc clear"));
-    // Nothing that moves the arm is sent, and the reason is the cause.
+    // No frame that moves the arm is sent, and the error names the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();
     assert!(error.code() == "held-stop" && error.to_string().contains("joint 5"), "{error}");
@@ -271,7 +271,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     assert!(!cleared.is_held_stop() && cleared.errors == 0);
 }
 
-/// An encoder that jumps holds the arm; until its drive is reset nothing is executed, and that is the reason given.
+/// After an encoder jump the arm is held; until its drive is reset no motion is executed, and the error gives this reason.
 #[test]
 fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     let mut s = ready(None);
@@ -287,7 +287,7 @@ fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
-/// An arm that gives way when nobody waits for it any more is nobody's wish.
+/// The arm must not become compliant when no client waits for teaching any more.
 #[test]
 fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     let mut s = ready(None);
@@ -298,7 +298,7 @@ fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     s.wait_ready(Duration::from_secs(15)).unwrap();
 }
 
-/// The controller answers "incorrect value" only: joint, value and bounds are found on this side.
+/// The controller answers only "incorrect value": the host determines joint, value and bounds.
 #[test]
 fn j06_a_refused_parameter_is_named() {
     let mut s = ready(Some(921_600));
@@ -321,7 +321,7 @@ fn j06_a_refused_parameter_is_named() {
     set.model.as_mut().unwrap().links[0].mass = 51.0;
     let text = refusal(&mut s, &set);
     assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
-    // What the arm was given before is still what it uses.
+    // The arm still uses its earlier parameters.
     assert_eq!(s.fresh_status().unwrap().jtc_init, 0);
     s.push(&good, |_| ()).unwrap();
 }

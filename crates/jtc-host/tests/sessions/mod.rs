@@ -1,4 +1,4 @@
-//! Sessions with the whole simulated controller, and with one that answers by script.
+//! Sessions with the complete simulated controller, and with a scripted one.
 
 mod checked;
 mod denied;
@@ -25,7 +25,7 @@ fn session(baud: Option<u32>) -> Sim {
     Session::new(SimPort::new(World::new(SimConfig { baud, ..SimConfig::default() })))
 }
 
-/// In HoldPos with the default parameters.
+/// Returns a session in HoldPos with the default parameters.
 fn ready(baud: Option<u32>) -> Sim {
     let mut s = session(baud);
     s.use_defaults().unwrap();
@@ -33,7 +33,7 @@ fn ready(baud: Option<u32>) -> Sim {
     s
 }
 
-/// From the zero pose to this place of joint 1, at so many percent of the limits.
+/// Returns a motion from the zero pose to this position of joint 1, at `percent` of the limits.
 fn motion(to: f64, percent: f64) -> Trajectory {
     plan::joint_move(&[0.0; 6], &[to, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
 }
@@ -42,7 +42,7 @@ fn inject(s: &mut Sim, kind: FaultKind, trigger: Trigger, ms: u64) {
     s.port_mut().world_mut().inject(Fault { kind, trigger, duration_ms: Some(ms) });
 }
 
-/// A fault from now on, and the error that it makes.
+/// Injects a fault now and waits for its error.
 fn fail(s: &mut Sim, kind: FaultKind, ms: u64) {
     inject(s, kind, Trigger::At(0), ms);
     s.wait_for("error", Duration::from_secs(1), |s| s.state == ControllerState::Error).unwrap();

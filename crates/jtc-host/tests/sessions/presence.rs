@@ -1,4 +1,4 @@
-//! Host supervision (J-59): the controller notices a session that is there, one that has gone, and not one that only watches.
+//! Host supervision (J-59): the controller detects a session that is alive, and one that is lost; it ignores one that only observes.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use jtc_wire::{ControllerState, SettingValue, Status, TrajectoryState};
 
 use super::{Sim, motion, session};
 
-/// Held by a controller with this `host_timeout_ms`, set by another session: this one has to find it out.
+/// Returns a session with a held arm and this `host_timeout_ms`, set by another session: the session must read it.
 fn supervised(ms: u16, baud: Option<u32>) -> Sim {
     let mut first = session(baud);
     let setting = settings::named("host_timeout_ms").unwrap().number;
@@ -24,7 +24,7 @@ fn supervised(ms: u16, baud: Option<u32>) -> Sim {
     s
 }
 
-/// Executes a motion of about 6 s, up to when the arm moves.
+/// Executes a motion of about 6 s, until the arm moves.
 fn begin(s: &mut Sim) {
     let (motion, options) = (motion(1.0, 12.0), CheckOptions::default());
     let checked = CheckedTrajectory::check(&motion, &Arm::avena(), &[0.0; 6], &options).unwrap();
@@ -67,7 +67,7 @@ fn j59_a_session_that_watches_its_teaching_keeps_it_going() {
     }
 }
 
-/// What a session asks for beside the requests that show its presence is answered.
+/// Other requests of a session are answered, too, in addition to its presence requests.
 #[test]
 fn j50_requests_wait_for_the_answer_that_is_on_its_way() {
     let mut s = supervised(100, Some(115_200));

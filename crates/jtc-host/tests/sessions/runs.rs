@@ -1,4 +1,4 @@
-//! Runs (J-55): the same procedure for every front end.
+//! Runs (J-55): the common procedure of all front ends.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,19 +11,19 @@ use jtc_wire::Status;
 
 use super::{Sim, motion, ready};
 
-/// A front end that writes down what it is told.
+/// A front end that records its calls.
 #[derive(Default)]
 struct Diary {
     steps: Vec<String>,
     samples: Rc<RefCell<usize>>,
-    /// Number of questions after which it cancels the run.
+    /// Number of calls of `is_cancelled` after which the run is cancelled.
     cancels_at: Option<usize>,
     asked: usize,
-    /// In motion it wants a stop at this point, ms.
+    /// Point in motion at which a stop is requested, ms.
     stops_at: Option<u32>,
-    /// In motion it wants the full speed at each status.
+    /// `true`: full speed is requested at each status in motion.
     speeds: bool,
-    /// Statuses in motion, and flows that were applied.
+    /// Number of statuses in motion, and of applied flows.
     statuses: usize,
     applied: usize,
 }
@@ -95,7 +95,7 @@ impl Observer<SimPort> for Diary {
     }
 }
 
-/// Runs `trajectory` `runs` times on an arm that is held in the zero pose, with approaches.
+/// Runs `trajectory` `runs` times on an arm held in the zero pose, with approaches.
 fn runs(diary: &mut Diary, session: &mut Sim, trajectory: &Trajectory, runs: u32) -> Result<Ended, String> {
     let (arm, options) = (Arm::avena(), CheckOptions::default());
     let approach_pct = Some(50.0);
@@ -119,7 +119,7 @@ fn j55_a_run_that_does_not_lead_back_has_an_approach_before_each_motion() {
     assert!((session.fresh_status().expect("a status").positions()[0] - 0.3).abs() < 2e-3);
 }
 
-/// Whenever the front end cancels: no motion begins after that, and one that goes on comes to its end.
+/// After a cancellation no motion begins, and a current one runs to its end.
 #[test]
 fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     let mut counted = Diary::default();
@@ -145,7 +145,7 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     }
 }
 
-/// The last status of a motion shows its end: nothing is applied to it any more, and a front end must tell that to who waits for it.
+/// The last status of a motion shows its end: no flow is applied any more, and a front end must report this to its client.
 #[test]
 fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
     let mut diary = Diary { speeds: true, ..Diary::default() };

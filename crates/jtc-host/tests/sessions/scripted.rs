@@ -1,4 +1,4 @@
-//! A session with a controller that answers by script: what it sends, and what it reports when the link is lost.
+//! A session with a scripted controller: the frames that it sends, and its reports when the link is lost.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -6,7 +6,7 @@ use std::time::Duration;
 use jtc_host::session::Flow;
 use jtc_host::{Diagnose, Error, ErrorKind, MotionError};
 
-/// What the session wrote, while a controller behind a scripted port sends nothing or the same status again and again.
+/// Bytes that the session wrote, while a scripted controller sends nothing or repeats one status.
 mod answers {
     use std::cell::RefCell;
     use std::rc::Rc;
@@ -19,7 +19,7 @@ mod answers {
 
     pub type Written = Rc<RefCell<Vec<u8>>>;
 
-    /// Answers each frame with `status` and its record; silent when there is none. Statuses come every 40 ms until `end`.
+    /// Answers each frame with `status` and its record, and sends statuses every 40 ms; silent from `end` on.
     pub fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
         let written = Written::default();
         let taken = Rc::clone(&written);
@@ -49,7 +49,7 @@ mod answers {
     }
 }
 
-/// J-34: resume goes on with what is paused and starts nothing else.
+/// J-34: resume continues a paused motion and starts no other one.
 #[test]
 fn j34_resume_only_after_a_pause() {
     use TrajectoryState::{Execute, Finish, Null, Stop};
@@ -68,7 +68,7 @@ fn j34_resume_only_after_a_pause() {
             "{error}"
         );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
-        // Only a motion that may be slowing down can be resumed by the same command a little later.
+        // Only a motion that may be decelerating can be resumed by the same command shortly afterwards.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
     let (mut s, written) = answers::session(
@@ -80,7 +80,7 @@ fn j34_resume_only_after_a_pause() {
         Duration::MAX,
     );
     s.resume().unwrap();
-    // The host may ask who the device is and for its settings, and nothing else, before it goes on.
+    // Before Execute the host may request only the identity and the settings of the device.
     let written = written.borrow();
     let (before, last) = written.split_last_chunk::<7>().unwrap();
     assert_eq!(*last, jtc_wire::fixed::exec(jtc_wire::ExecCommand::Execute));
@@ -92,7 +92,7 @@ fn j34_resume_only_after_a_pause() {
     }
 }
 
-/// A link that is lost in motion: the error states that the arm may be moving, and a stop goes out that may still arrive.
+/// Link lost in motion: the error states that the arm may be moving, and a Stop is sent, which may still arrive.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let moving = jtc_wire::Status {
@@ -126,8 +126,8 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a record may have come, and another line may have stopped the arm since: what moves it, or lets go of it, is sent
-/// again only where the record says that it came damaged.
+/// A frame without a record may have arrived, and another line may have stopped the arm since. Therefore a frame that
+/// moves or releases the arm is repeated only if the record reports damage.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -136,7 +136,7 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // The records that this frame gets, one after the other; then it gets none. The controller does what it says, or not.
+    // Records for this frame in order; after them none. `done` selects if the controller executes the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);
@@ -190,7 +190,7 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     let (mut s, written) = session(&fixed::TEACHING_MODE_ENABLE, &[], false);
     s.teach(true).unwrap_err();
     assert_eq!(count(&written, &fixed::TEACHING_MODE_ENABLE), 1);
-    // A Stop is sent until it is confirmed.
+    // A Stop is repeated until it is confirmed.
     let (mut s, written) = session(&fixed::STOP, &[], false);
     s.stop().unwrap_err();
     assert_eq!(count(&written, &fixed::STOP), 4);

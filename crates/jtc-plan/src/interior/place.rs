@@ -1,11 +1,11 @@
-//! Limits at one place of a path, in the coefficients of a spline.
+//! Limits at a point of a path, in the coefficients of a spline.
 use crate::along::Plan;
 use crate::{JOINTS, JointVec};
 
-/// Three neighbouring coefficients from an index on make a value.
+/// Weights of three neighbouring coefficients from an index on that make up a value.
 pub(super) type Three = [f64; 3];
 
-/// A place at which limits hold: one end of a cell.
+/// A point at which limits hold: an end of a cell.
 pub(super) struct Place {
     /// Index of the first coefficient.
     pub at: usize,
@@ -13,25 +13,26 @@ pub(super) struct Place {
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// By bend, slope and squared speed, as shares of the limits: jerk but for the speed as a factor, and acceleration (without bend).
+    /// Coefficients by bend, slope and squared speed, as shares of the limits: jerk without the factor of speed, and
+    /// acceleration (without bend).
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
-    /// Highest squared speed, where it is asked for here, with acceleration and torque.
+    /// Highest squared speed, if speed, acceleration and torque are limited here.
     pub cap: f64,
-    /// Its reciprocal speed counts this long, and that of the middle of the cell, with the squared speed there.
+    /// Weights of the reciprocal speed here and at the middle of the cell in the time, with the squared speed at the middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
 }
 
 pub(super) struct Torque {
-    /// Of the path's direction.
+    /// First derivative of the path.
     pub first: JointVec,
-    /// By slope.
+    /// Coefficient of the slope.
     pub mass: JointVec,
-    /// By squared speed.
+    /// Coefficient of the squared speed.
     pub speed: JointVec,
-    /// What is left without friction, up and down, N·m.
+    /// Torque left without friction, up and down, N·m.
     pub high: JointVec,
     pub low: JointVec,
 }
@@ -41,24 +42,25 @@ fn dot(three: &Three, c: &[f64]) -> f64 {
 }
 
 impl Place {
-    /// Shares of the jerk limits, but for the speed as a factor.
+    /// Returns shares of the jerk limits, without the factor of speed.
     fn jerks(&self, b: f64, slope: f64, bend: f64) -> JointVec {
         let [by_bend, by_slope, by_b] = &self.jerk;
         std::array::from_fn(|j| by_bend[j] * bend + by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Shares of the acceleration limits.
+    /// Returns shares of the acceleration limits.
     fn accelerations(&self, b: f64, slope: f64) -> JointVec {
         let [by_slope, by_b] = &self.acceleration;
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Where the arm rests there is nothing but jerk along the path.
+    /// At rest there is only jerk along the path.
     pub fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Its part of the time, and of the sum of the logarithms of what is left of the limits; `None` outside of them.
+    /// Returns this place's part of the time, and of the sum of the logarithms of the remaining margins; `None` outside
+    /// the limits.
     pub fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
@@ -98,7 +100,7 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds its part of the derivatives of the time and of `barrier` times the barriers by the coefficients.
+    /// Adds the contribution to the derivatives of the time and of `barrier` times the barriers by the coefficients.
     pub fn add_to(
         &self,
         gradient: &mut [f64],
@@ -143,7 +145,7 @@ impl Place {
         }
     }
 
-    /// First derivatives of the barriers by squared speed, slope and bend, and second ones (00, 11, 22, 01, 02, 12).
+    /// Returns the first derivatives of the barriers by squared speed, slope and bend, and the second ones (00, 11, 22, 01, 02, 12).
     fn barriers(&self, plan: &Plan, b: f64, slope: f64, bend: f64) -> ([f64; 3], [f64; 6]) {
         let speed = b.sqrt();
         let (mut g, mut h) = ([0.0f64; 3], [0.0f64; 6]);
@@ -183,7 +185,7 @@ impl Place {
     }
 }
 
-/// Adds a barrier whose derivatives are `one` and `two` to the gradient and the second derivatives (00, 11, 22, 01, 02, 12).
+/// Adds a barrier with the derivatives `one` and `two` to the gradient and the second derivatives (00, 11, 22, 01, 02, 12).
 fn add(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 3], one: f64, two: f64) {
     for i in 0..3 {
         g[i] += one * d[i];
@@ -194,7 +196,7 @@ fn add(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 3], one: f64, two: f64) {
     h[5] += two * d[1] * d[2];
 }
 
-/// The same of one that does not depend on the bend.
+/// Adds the derivatives of a term that does not depend on the bend.
 fn add_two(g: &mut [f64; 3], h: &mut [f64; 6], d: &[f64; 2], one: f64, two: f64) {
     g[0] += one * d[0];
     g[1] += one * d[1];

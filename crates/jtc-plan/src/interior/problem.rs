@@ -1,4 +1,4 @@
-//! The limits of a plan's cells as places.
+//! Limits of a plan's cells as points.
 use super::Problem;
 use super::place::{Place, Three, Torque};
 use super::spline::knot;
@@ -36,7 +36,7 @@ impl Span {
 const SHARE: f64 = 0.995;
 
 impl<'a> Problem<'a> {
-    /// `slower`: factors of the time in each cell.
+    /// Creates the problem; `slower` contains the factors of the time in each cell.
     pub fn new(plan: &'a Plan, slower: &[f64]) -> Option<Self> {
         let cells = plan.cells;
         let count = cells.len();
@@ -85,7 +85,8 @@ impl<'a> Problem<'a> {
         Some(problem)
     }
 
-    /// Jerk at one end of a cell, and where `whole` has how long it counts, the other limits.
+    /// Adds the jerk limit at one end of a cell. If `whole` has a duration, also adds the other limits with that
+    /// weight.
     fn push(
         &mut self,
         (cell, side): (usize, usize),
@@ -121,7 +122,7 @@ impl<'a> Problem<'a> {
         self.places.push(place);
     }
 
-    /// Jerk in the middle of a cell, where its parts meet that are alike at the ends.
+    /// Adds the jerk limit in the middle of a cell, between its two equal parts.
     fn push_middle(&mut self, cell: usize, slower: &[f64], at: usize, values: Values) {
         let of = &self.plan.cells[cell];
         let [from, to] = of.ends.map(|end| end.point);
@@ -136,7 +137,7 @@ impl<'a> Problem<'a> {
         self.places.push(place);
     }
 
-    /// One at which there is jerk, and nothing else counts.
+    /// Returns a place with a jerk limit only.
     fn place(
         &self,
         cell: usize,

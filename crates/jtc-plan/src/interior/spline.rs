@@ -1,13 +1,14 @@
-//! Knots of a spline, and its law of time.
+//! Knots of a spline, and its time law.
 use super::Problem;
 use crate::law::{Law, Phase};
 
-/// Share by which the speed may change in two phases of a law, and into how many pairs of phases a cell is divided at most.
+/// Largest change of speed in two phases of a law, as a share, and largest number of phase pairs into which a cell is
+/// divided.
 const ALIKE: f64 = 0.2;
 const PARTS_MAX: f64 = 4.0;
 
 impl Problem<'_> {
-    /// The law of a spline.
+    /// Returns the time law of a spline.
     pub fn law(&self, c: &[f64]) -> Law {
         let cells = self.plan.cells;
         let spans = self.knots.len() - 1;
@@ -27,7 +28,7 @@ impl Problem<'_> {
         phases.push(Phase { length: start, jerk: acceleration / start, ..Phase::default() });
         for pair in states.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            // The jerk of a phase is one, that of the spline grows with the speed.
+            // A phase has constant jerk; the jerk of the spline grows with the speed.
             let parts = ((to.1 - from.1).abs() / (ALIKE * from.1.min(to.1))).ceil().clamp(1.0, PARTS_MAX);
             let mut before = from;
             for part in 1..=parts as usize {
@@ -43,7 +44,7 @@ impl Problem<'_> {
     }
 }
 
-/// Parameter, speed and acceleration of a spline at a share of a cell with these ends.
+/// Returns parameter, speed and acceleration of a spline at a share of a cell with these ends.
 fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64, f64) {
     let way = share * (to.0 - from.0);
     let acceleration = from.2 + share * (to.2 - from.2);
@@ -51,7 +52,7 @@ fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64,
     (from.0 + way, square.max(0.0).sqrt(), acceleration)
 }
 
-/// Two phases of one length such that parameter, speed and acceleration are those at both ends; the time at the end.
+/// Adds two phases of equal length that match parameter, speed and acceleration at both ends; returns the time at the end.
 fn phases_between(
     phases: &mut Vec<Phase>,
     start: f64,
@@ -69,7 +70,7 @@ fn phases_between(
     start + length
 }
 
-/// The knot with an index; beyond the ends, the last one there.
+/// Returns the knot with an index; outside the range, the first or the last one.
 pub(super) fn knot(knots: &[f64], k: isize) -> f64 {
     knots[k.clamp(0, knots.len() as isize - 1) as usize]
 }

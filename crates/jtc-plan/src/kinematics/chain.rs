@@ -2,11 +2,11 @@
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, Pose};
 use nalgebra::{Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 
-/// A place of the flange, in the base frame.
+/// A pose of the flange, in the base frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Frame {
     pub rotation: Matrix3<f64>,
-    /// m.
+    /// Position, m.
     pub position: Vector3<f64>,
 }
 
@@ -24,37 +24,37 @@ impl From<&Frame> for Pose {
     }
 }
 
-/// The rotation about `axis`, a unit vector, by `angle` rad.
+/// Returns the rotation about `axis`, a unit vector, by `angle` rad.
 pub(crate) fn turn(axis: &Vector3<f64>, angle: f64) -> Matrix3<f64> {
     exponential(&(axis * angle))
 }
 
-/// The rotation with this rotation vector (rad).
+/// Returns the rotation with this rotation vector (rad).
 pub(crate) fn exponential(vector: &Vector3<f64>) -> Matrix3<f64> {
     Rotation3::new(*vector).into_inner()
 }
 
-/// The rotation vector (rad) of a rotation, of length π at most.
+/// Returns the rotation vector (rad) of a rotation, with a length of at most π.
 pub(crate) fn logarithm(rotation: &Matrix3<f64>) -> Vector3<f64> {
     UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(*rotation)).scaled_axis()
 }
 
-/// The axes of an arm, where the forward kinematics has them.
+/// Axes of an arm at the positions of the forward kinematics.
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     dynamics: Dynamics,
-    /// Divides lengths in the Jacobian and in residuals, m: the arm stretched from its first axis to the flange.
+    /// Divisor of lengths in the Jacobian and in residuals, m: length of the stretched arm from its first axis to the flange.
     pub length: f64,
-    /// The arm at the positions 0, which the closed forms compute from.
+    /// The arm at the joint positions 0, the basis of the closed forms.
     pub zero: Axes,
 }
 
-/// The axes and the flange at some joint positions, in the base frame.
+/// Axes and flange at some joint positions, in the base frame.
 #[derive(Clone, Debug)]
 pub(crate) struct Axes {
     /// Directions, unit vectors.
     pub axis: [Vector3<f64>; JOINTS],
-    /// A point on each, m.
+    /// A point on each axis, m.
     pub point: [Vector3<f64>; JOINTS],
     pub flange: Frame,
 }
@@ -76,14 +76,15 @@ impl Chain {
         self.dynamics.forward_kinematics(q)[JOINTS]
     }
 
-    /// What is missing from `axes` to `goal`: translation over [`Chain::length`], then rotation vector (rad), in the base frame.
+    /// Returns the residual from `axes` to `goal`: translation divided by [`Chain::length`], then rotation vector
+    /// (rad), in the base frame.
     pub fn residual(&self, goal: &Frame, axes: &Axes) -> Vector6<f64> {
         let shift = (goal.position - axes.flange.position) / self.length;
         let turn = logarithm(&(goal.rotation * axes.flange.rotation.transpose()));
         Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
     }
 
-    /// The geometric Jacobian of the flange with translations over [`Chain::length`], so that its singular values have a meaning.
+    /// Returns the geometric Jacobian of the flange with translations over [`Chain::length`], so that its singular values are meaningful.
     pub fn scaled_jacobian(&self, axes: &Axes) -> Matrix6<f64> {
         let mut jacobian = axes.jacobian();
         jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / self.length);
@@ -101,7 +102,7 @@ fn axes(dynamics: &Dynamics, q: &JointVec) -> Axes {
 }
 
 impl Axes {
-    /// The geometric Jacobian of the flange: translation (m/rad), then rotation (rad/rad), in the base frame.
+    /// Returns the geometric Jacobian of the flange: translation (m/rad), then rotation (rad/rad), in the base frame.
     pub fn jacobian(&self) -> Matrix6<f64> {
         let mut jacobian = Matrix6::zeros();
         for j in 0..JOINTS {
@@ -112,13 +113,13 @@ impl Axes {
         jacobian
     }
 
-    /// How the Jacobian changes while the joints move with the velocity `qd`.
+    /// Returns the rate of change of the Jacobian while the joints move with the velocity `qd`.
     pub fn jacobian_rate(&self, qd: &Vector6<f64>) -> Matrix6<f64> {
         let mut rate = Matrix6::zeros();
         let flange = self.jacobian().fixed_rows::<3>(0) * qd;
         let mut spin = Vector3::zeros();
         for j in 0..JOINTS {
-            // Of the point on the axis, which the joints before it move.
+            // Velocity of the point on the axis, caused by the joints before it.
             let moved = (0..j).map(|k| self.axis[k].cross(&(self.point[j] - self.point[k])) * qd[k]);
             let speed = moved.fold(Vector3::zeros(), |sum, v| sum + v);
             let turned = spin.cross(&self.axis[j]);
@@ -138,7 +139,8 @@ mod tests {
     use crate::kinematics::test_arms;
     use proptest::prelude::*;
 
-    /// Of the frame by central differences of the forward kinematics, (translation, rotation) per unit of the parameter.
+    /// Returns central differences of the frame from the forward kinematics, (translation, rotation) per unit of the
+    /// parameter.
     fn difference(before: &Frame, after: &Frame, step: f64) -> Vector6<f64> {
         let shift = (after.position - before.position) / (2.0 * step);
         let turn = logarithm(&(after.rotation * before.rotation.transpose())) / (2.0 * step);

@@ -1,23 +1,24 @@
-//! Inverse kinematics in closed form, for the two geometries that have one and that most arms have.
+//! Inverse kinematics in closed form, for two geometries that cover most arms.
 //!
 //! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and of the first three axes two neighbours are parallel
 //!   or meet. The first three joints bring the point to its place, the last three give the orientation.
-//! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the arms of
-//!   Universal Robots (Hawkins 2013). The first joint brings the point where they meet to its place along the parallel axes, the
-//!   fifth and the sixth turn the flange, and the three parallel joints are a planar arm.
+//! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the
+//!   arms of Universal Robots (Hawkins 2013). The first joint brings the intersection of axes 5 and 6 to its place
+//!   along the parallel axes, the fifth and the sixth turn the flange, and the three parallel joints are a planar arm.
 //!
-//! All is computed in the base frame from the axes at the positions 0 (product of exponentials, Brockett 1984; the decomposition is
-//! that of Elias and Wen, IK-Geo, 2022): how the frames lie on the axes does not matter.
+//! Everything is computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
+//! 1984; decomposition by Elias and Wen, IK-Geo, 2022), so the choice of the frames on the axes does not matter.
 use jtc_dynamics::JointVec;
 use nalgebra::{Matrix3, Vector3};
 
 use super::chain::{Axes, Frame, turn};
 use super::subproblems::{across, turn_onto, turn_to_length, turn_to_value, turned};
 
-/// Sine of an angle, and distance in m, that count as none when a geometry is recognised: what the digits of a robot description
-/// leave. What is computed for the ideal geometry is refined with the arm as it is.
+/// Sine of an angle, and distance in m, that count as zero when a geometry is recognised: the rounding errors of a
+/// robot description. Solutions for the ideal geometry are refined with the actual arm.
 pub(crate) const EXACT: f64 = 1e-5;
-/// The same for an arm whose calibration took it from its ideal geometry: the closed form has good starting values for a search.
+/// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry: the closed form gives good starting
+/// values for a search.
 pub(crate) const NEAR: f64 = 0.02;
 
 /// A geometry with a closed form.
@@ -29,7 +30,7 @@ pub(crate) enum Geometry {
     ThreeParallel { centre: Vector3<f64> },
 }
 
-/// What two neighbours of the first three axes are to each other.
+/// Relation between two adjacent axes of the first three.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Shoulder {
     /// Axes 2 and 3 are parallel.
@@ -43,7 +44,7 @@ pub(crate) enum Shoulder {
 }
 
 impl Geometry {
-    /// That of an arm, with deviations up to `tolerance`.
+    /// Returns the geometry of an arm, with deviations up to `tolerance`.
     pub fn of(zero: &Axes, tolerance: f64) -> Option<Self> {
         let parallel = |a: usize, b: usize| zero.axis[a].cross(&zero.axis[b]).norm() < tolerance;
         if let Some(centre) = meeting(zero, 3, 4, tolerance)
@@ -67,8 +68,8 @@ impl Geometry {
         None
     }
 
-    /// Joint positions that bring the flange to `goal`, up to rounding and the deviations from the ideal geometry: up to eight,
-    /// some of which may not fit. Joints that the goal leaves free are where `hint` has them.
+    /// Returns joint positions that bring the flange to `goal`, up to rounding and the deviations from the ideal
+    /// geometry. There are at most eight, and some may not fit. Joints that the goal leaves free stay at `hint`.
     pub fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
@@ -86,11 +87,11 @@ impl Geometry {
     }
 }
 
-/// The point in which two axes meet, if they do.
+/// Returns the point in which two axes meet, if they do.
 fn meeting(zero: &Axes, a: usize, b: usize, tolerance: f64) -> Option<Vector3<f64>> {
     let (u, v) = (zero.axis[a], zero.axis[b]);
     let normal = u.cross(&v);
-    // Of nearly parallel axes a meeting point says nothing.
+    // The meeting point of nearly parallel axes is undefined.
     if normal.norm() < 0.05 {
         return None;
     }
@@ -113,15 +114,16 @@ impl Motion {
     }
 }
 
-/// `point` after a rotation about axis `j` by `angle`.
+/// Returns `point` after a rotation about axis `j` by `angle`.
 fn moved(zero: &Axes, j: usize, angle: f64, point: &Vector3<f64>) -> Vector3<f64> {
     zero.point[j] + turned(&zero.axis[j], angle, &(point - zero.point[j]))
 }
 
 impl Shoulder {
-    /// The first three joints that bring `centre` to `target`, up to four.
+    /// Returns up to four solutions of the first three joints that bring `centre` to `target`.
     ///
-    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ takes y to z: both are as far along axis 2 and from each point of it.
+    /// With y = E₃·centre and z = E₁⁻¹·target, E₂ takes y to z: both have the same coordinate along axis 2 and the same
+    /// distance from each of its points.
     fn place(
         &self,
         zero: &Axes,
@@ -131,7 +133,8 @@ impl Shoulder {
     ) -> Vec<[f64; 3]> {
         let (h, p) = (&zero.axis, &zero.point);
         let (forearm, reach) = (centre - p[2], target - p[0]);
-        // Joint 1 from where z is to be along axis 2, and joint 3 from the same of y, each in m from the point of its own axis.
+        // Joint 1 from the required position of z along axis 2, and joint 3 from that of y, each in m from the point of
+        // its own axis.
         let first = |along: f64| {
             let found = turn_to_value(&h[1], &h[0], &reach, along - h[1].dot(&p[0]), -hint[0]);
             found.into_iter().map(|angle| -angle).collect::<Vec<_>>()
@@ -176,7 +179,7 @@ impl Shoulder {
     }
 }
 
-/// The last three joints for each of their two ways to turn the flange.
+/// Adds the last three joints for both ways to turn the flange.
 fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, found: &mut Vec<JointVec>) {
     let h = &zero.axis;
     let before = turn(&h[0], arm[0]) * turn(&h[1], arm[1]) * turn(&h[2], arm[2]);
@@ -189,7 +192,7 @@ fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, 
     }
 }
 
-/// The angle of a rotation about `axis`.
+/// Returns the angle of a rotation about `axis`.
 fn angle_of(rotation: &Matrix3<f64>, axis: &Vector3<f64>) -> f64 {
     let least = Vector3::ith(axis.iamin(), 1.0);
     let side = across(axis, &least);
@@ -205,12 +208,12 @@ fn three_parallel(
 ) {
     let (h, p) = (&zero.axis, &zero.point);
     let along = &h[1];
-    // The parallel joints leave the centre where it is along their axes.
+    // The parallel joints do not move the centre along their axes.
     let height = along.dot(&(centre - p[0]));
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;
         let rest = turn(&h[0], back) * goal.rotation;
-        // They leave the angle between their axes and the last one too.
+        // These joints do not change the angle between their axes and the last one either.
         for q5 in turn_to_value(along, &h[4], &h[5], along.dot(&(rest * h[5])), hint[4]) {
             let fifth = turn(&h[4], q5);
             let q6 = -turn_onto(&h[5], &(fifth.transpose() * along), &(rest.transpose() * along), -hint[5]);
@@ -223,7 +226,7 @@ fn three_parallel(
     }
 }
 
-/// Joints 2, 3 and 4, whose axes are parallel: axis 4 to the point `to`, and turned by `sum` (rad) about axis 2 altogether.
+/// Solves joints 2, 3 and 4, whose axes are parallel: axis 4 reaches the point `to`, and the total turn about axis 2 is `sum` (rad).
 fn planar_arm(
     zero: &Axes,
     to: &Vector3<f64>,

@@ -1,59 +1,59 @@
-//! Why the flange cannot be brought somewhere.
+//! Errors of flange poses and lines.
 use jtc_wire::Joint;
 
 use super::singular::Singularity;
 
-/// Why there are no joint positions for a pose of the flange, or no way along a line of it.
+/// Reason why a pose of the flange has no joint positions, or why the flange cannot follow a line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
     /// A number is NaN or infinite.
     #[error("{what} is {value}, not a finite number")]
     NotFinite {
-        /// What it is, such as `position x`.
+        /// Name of the value, such as `position x`.
         what: &'static str,
-        /// The number.
+        /// Value.
         value: f64,
     },
-    /// A quaternion of another length than 1.
+    /// A quaternion whose length is not 1.
     #[error("the quaternion has the length {length:.6}, that of an orientation has 1")]
     NotUnit {
-        /// Its length.
+        /// Length of the quaternion.
         length: f64,
     },
-    /// A rotation matrix that is not one.
+    /// A matrix that is not a rotation matrix.
     #[error("the rotation matrix is none: its axes miss length 1 and right angles by {deviation:.2e}")]
     NotRotation {
         /// Largest entry of RᵀR − 1, or 2 for a reflection.
         deviation: f64,
     },
-    /// The arm is too short, or too bulky, to have the flange there in any orientation.
+    /// The arm is too short, or too bulky, to bring the flange to the position in any orientation.
     #[error(
         "out of reach: {distance:.3} m from the origin of the base, and the flange comes no nearer to it than {missing:.4} m"
     )]
     OutOfReach {
-        /// From the origin of the base to the position, m.
+        /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// From the nearest position of the flange that was found to the one that was asked for, m.
+        /// Distance from the nearest flange position found to the requested one, m.
         missing: f64,
     },
-    /// The flange can be there, but not in this orientation.
+    /// The flange can reach the position, but not in this orientation.
     #[error(
         "out of reach in this orientation: the flange can be there, {distance:.3} m from the origin of the base, but turned by {missing:.3} rad \
          against it at the nearest"
     )]
     Orientation {
-        /// From the origin of the base to the position, m.
+        /// Distance of the position from the origin of the base, m.
         distance: f64,
-        /// From the nearest orientation of the flange there that was found to the one that was asked for, rad.
+        /// Angle from the nearest flange orientation found at the position to the requested one, rad.
         missing: f64,
     },
-    /// The arm would reach it with a joint outside its limits only.
+    /// The arm would reach the pose only with a joint outside its limits.
     #[error("{joint} would be at {value:.4} rad, its limits are {low:.4} and {high:.4} rad")]
     OutsideLimits {
-        /// The joint that is farthest outside, in the solution that is the least outside.
+        /// Joint that is farthest outside, in the solution that is least outside.
         joint: Joint,
-        /// Its position there, rad.
+        /// Position of the joint there, rad.
         value: f64,
         /// Lowest position, rad.
         low: f64,
@@ -63,83 +63,85 @@ pub enum PoseError {
     /// A line of the flange leads through or past a singular pose.
     #[error("{0}")]
     Singular(Singularity),
-    /// A line of the flange asks a joint to turn far within a moment.
+    /// A line of the flange requires a large turn of a joint within a short distance.
     #[error("{joint} would have to turn by {step:.3} rad within {distance:.6} m")]
     JointStep {
-        /// The joint.
+        /// Joint.
         joint: Joint,
-        /// By how much it would have to turn, rad.
+        /// Required turn of the joint, rad.
         step: f64,
-        /// Within which distance on the line, m.
+        /// Distance on the line within which the joint must turn, m.
         distance: f64,
     },
-    /// Three points that are on no circle.
+    /// Three points that are not on a circle.
     #[error(
         "the arc's three points are on no circle: the second is {distance:.2e} m from the line through the others"
     )]
     Arc {
-        /// Distance of the second from the straight line, m; 0 where first and last point are the same.
+        /// Distance of the second point from the straight line, m; 0 if the first and the last point are the same.
         distance: f64,
     },
     /// Two orientations that are half a turn apart.
     #[error("the orientation is half a turn from that of the waypoint before: which way to turn is open")]
     HalfTurn,
-    /// A point on an arc, and no arc behind it.
+    /// A point on an arc without an arc after it.
     #[error("a point on the way of an arc (`via`), and the waypoint behind it is not the end of an arc")]
     NoArc,
     /// An arc without the point that it passes.
     #[error("the end of an arc, and the waypoint before it is not a point on the arc's way (`via`)")]
     NoVia,
-    /// Joint positions at the end of a line that the arm does not have there.
+    /// Joint positions at the end of a line that the arm does not reach in its configuration.
     #[error(
         "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
     )]
     Configuration {
-        /// The joint that is farthest away.
+        /// Joint that is farthest away.
         joint: Joint,
-        /// Its position at the end of the line, rad.
+        /// Position of the joint at the end of the line, rad.
         value: f64,
-        /// That of the waypoint, rad.
+        /// Position of the waypoint, rad.
         wanted: f64,
     },
-    /// A blend radius that is no length.
+    /// An invalid blend radius.
     #[error("a blend radius of {radius} m")]
     Blend {
-        /// What was given, m.
+        /// Given radius, m.
         radius: f64,
     },
     /// A path without a leg that moves the flange.
     #[error("the path has no leg that moves the flange")]
     NoMotion,
-    /// What happens at one of several waypoints.
+    /// Error at one of several waypoints.
     #[error("waypoint {waypoint}: {source}")]
     Waypoint {
-        /// Counted from 1.
+        /// Waypoint, counted from 1.
         waypoint: usize,
-        /// What it is.
+        /// Error at the waypoint.
         source: Box<PoseError>,
     },
-    /// What happens on one of several legs.
+    /// Error on one of several legs.
     #[error("leg {leg} (to waypoint {}), {distance:.4} m of {length:.4} m along it: {source}", leg + 1)]
     Leg {
-        /// Counted from 1; it leads from the waypoint with the same number to the next.
+        /// Leg, counted from 1; it leads from the waypoint with the same number to the next.
         leg: usize,
-        /// How far along the leg, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS) m where it is more than the way).
+        /// Distance along the leg, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS) m if that is more than the
+        /// distance).
         distance: f64,
-        /// How long the leg is, in the same unit.
+        /// Length of the leg, in the same unit.
         length: f64,
-        /// What it is.
+        /// Error on the leg.
         source: Box<PoseError>,
     },
 }
 
 impl PoseError {
-    /// The same, of the waypoint with this number, counted from 1.
+    /// Wraps the error with the number of the waypoint, counted from 1.
     pub(crate) fn at_waypoint(self, waypoint: usize) -> Self {
         Self::Waypoint { waypoint, source: Box::new(self) }
     }
 
-    /// The waypoint that it is about, counted from 1, where its message names one: of a leg the one that it leads to.
+    /// Returns the waypoint that the message names, counted from 1, if it names one: for a leg, the waypoint at its
+    /// end.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Waypoint { waypoint, .. } => Some(*waypoint),
@@ -148,7 +150,7 @@ impl PoseError {
         }
     }
 
-    /// What helps.
+    /// Returns a hint for the correction.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => {

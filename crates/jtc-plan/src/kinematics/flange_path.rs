@@ -11,40 +11,42 @@ use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
-/// Largest turn of a joint between two samples, rad. Within it a singular pose cannot be passed unseen, and the iteration stays with
-/// its solution.
+/// Largest turn of a joint between two samples, rad. Within this turn a singular pose cannot be missed, and the
+/// iteration stays with its solution.
 const TURN: f64 = 0.02;
 /// Largest and smallest distance between two samples, m.
 const STEP: (f64, f64) = (0.01, 1e-7);
-/// A joint that turns by less between two breaks looks like one simple curve, rad.
+/// Turn of a joint between two breaks up to which the curve counts as simple, rad.
 const SIMPLE: f64 = 0.25;
-/// Places of the rest of a leg that are tried to see whether it leaves the arm's reach.
+/// Number of points on the remaining leg that are tried to determine if it leaves the arm's reach.
 const LOOK_AHEAD: usize = 40;
 
-/// A way through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
+/// A path through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
 ///
-/// Its parameter is the length of the legs, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS)); with a blend radius of 0 it has a
-/// stop at each corner. Positions are computed by inverse kinematics wherever they are asked for, so the flange is on its line up to
-/// rounding; derivatives come from the Jacobian and its rate.
+/// Its parameter is the length of the legs, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS)); with a blend
+/// radius of 0 it has a stop at each corner. Positions are computed by inverse kinematics for each query, so the flange
+/// is on its line up to rounding; derivatives come from the Jacobian and its rate.
 ///
-/// The arm keeps the configuration (elbow, wrist, shoulder) that it starts in.
+/// The arm keeps its initial configuration (elbow, wrist, shoulder).
 #[derive(Clone, Debug)]
 pub struct FlangePath {
     chain: Chain,
     trace: Trace,
-    /// Joint positions along the path, rising in the parameter, which the iteration starts from.
+    /// Joint positions along the path, by rising parameter, from which the iteration starts.
     samples: Vec<(f64, JointVec)>,
     breaks: Vec<f64>,
 }
 
 impl FlangePath {
-    /// The path from the joint positions `start` (rad) along `legs`, its corners blended within `blend` m of each (at most half of
-    /// each leg; 0: a stop). The first waypoint is the start, so that leg 1 leads to waypoint 2; legs that move nothing are passed over.
+    /// Creates the path from the joint positions `start` (rad) along `legs`, with corners blended within `blend` m (at
+    /// most half of each leg; 0: a stop). The first waypoint is the start, so that leg 1 leads to waypoint 2. Legs
+    /// without motion are skipped.
     ///
     /// # Errors
     ///
-    /// [`PoseError::Waypoint`] for a pose that is none or has no solution within the limits, [`PoseError::Leg`] for what happens along a
-    /// leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first such place; waypoints come first.
+    /// [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits, [`PoseError::Leg`]
+    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first
+    /// such place; waypoints come first.
     pub fn new(
         kinematics: &Kinematics,
         start: &JointVec,
@@ -67,12 +69,12 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
-    /// Where leg `number` (from 1), an arc, passes its point on the way; a corner that is rounded may cut it off.
+    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point; a rounded corner may cut it off.
     pub(crate) fn via(&self, number: usize) -> Option<f64> {
         self.trace.via(number)
     }
 
-    /// The pose of the flange at `s`.
+    /// Returns the pose of the flange at `s`.
     pub fn flange(&self, s: f64) -> Pose {
         (&self.trace.at(s).frame).into()
     }
@@ -111,7 +113,7 @@ impl Path for FlangePath {
     }
 }
 
-/// Newton's iteration from near a solution, and the arm there.
+/// Runs Newton's iteration from near a solution; returns the solution and the arm there.
 fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
     let mut axes = chain.at(&q);
     let mut residual = chain.residual(goal, &axes);
@@ -123,14 +125,14 @@ fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
         if left.norm() < residual.norm() {
             (q, axes, residual) = (tried, there, left);
         } else {
-            // Down to rounding, or no number.
+            // Down to rounding, or not a finite number.
             break;
         }
     }
     (q, axes)
 }
 
-/// First and second derivative of the joint positions by the path's parameter.
+/// Returns the first and second derivative of the joint positions by the path's parameter.
 fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>)> {
     let stack = |a: &Vector3<f64>, b: &Vector3<f64>| Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z);
     let factors = axes.jacobian().lu();
@@ -139,7 +141,7 @@ fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>
     Some((first, factors.solve(&rest)?))
 }
 
-/// Where the path changes its form, and so often that no joint turns far in between.
+/// Returns the places of a change of form, and enough places in between that no joint turns far.
 fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     let mut all = trace.breaks();
     let mut turned = [0.0; JOINTS];
@@ -158,14 +160,14 @@ fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     all
 }
 
-/// Walks along a path in small steps and stays with one solution.
+/// Follows a path in small steps and stays with one solution.
 struct Follower<'a> {
     kinematics: &'a Kinematics,
     trace: &'a Trace,
     s: f64,
     q: JointVec,
     axes: Axes,
-    /// Sign of the Jacobian's determinant, which changes in a singular pose only.
+    /// Sign of the Jacobian's determinant, which changes only in a singular pose.
     sign: f64,
 }
 
@@ -185,7 +187,7 @@ impl<'a> Follower<'a> {
         for corner in corners {
             while self.s < corner {
                 let left = corner - self.s;
-                // No crumb at the end.
+                // Avoids a tiny step at the end.
                 let wanted = if step >= left { corner } else { self.s + step.min(0.5 * left) };
                 match self.try_step(wanted)? {
                     Some(()) => {
@@ -199,14 +201,14 @@ impl<'a> Follower<'a> {
         Ok(samples)
     }
 
-    /// Goes on to `s` if no joint turns too far on the way; an error if the path ends there.
+    /// Advances to `s` if no joint turns too far on the way; returns an error if the path ends there.
     fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
         let chain = &self.kinematics.chain;
         let place = self.trace.at(s);
         let (q, axes) = newton(chain, &place.frame, self.q);
         let (joint, turn) = largest_turn(&self.q, &q);
         let left = chain.residual(&place.frame, &axes);
-        // Written so that NaN is no arrival.
+        // Written so that NaN does not count as arrival.
         let arrived = left.norm() <= TOLERANCE;
         if arrived && turn <= TURN {
             self.check(s, &q, &axes)?;
@@ -224,7 +226,7 @@ impl<'a> Follower<'a> {
         Err(self.on_leg(s, PoseError::JointStep { joint, step: turn, distance }))
     }
 
-    /// Limits and singular poses at a place of the path.
+    /// Checks limits and singular poses at a point of the path.
     fn check(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
         let chain = &self.kinematics.chain;
         self.check_limits(s, q)?;
@@ -240,9 +242,9 @@ impl<'a> Follower<'a> {
         outside(q, &self.kinematics.limits).map_or(Ok(()), |error| Err(self.on_leg(s, error)))
     }
 
-    /// Limits where a joint turns back between here and `s`.
+    /// Checks the limits at every turning point of a joint between here and `s`.
     fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
-        // Just inside, so that a corner's derivatives are those of this side.
+        // Just inside, so that a corner's derivatives are taken on this side.
         let inset = 1e-3 * (s - self.s);
         let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
         let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));
@@ -258,7 +260,7 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// What a singular pose at `s` means: the end of the arm's reach if the leg goes on to where no solution is.
+    /// Returns the error for a singular pose at `s`: the end of the arm's reach if the rest of the leg has no solution.
     fn singular(&self, s: f64, axes: &Axes) -> PoseError {
         let (_, along, length) = self.trace.whereabouts(s);
         for k in 0..=LOOK_AHEAD {
@@ -278,7 +280,7 @@ impl<'a> Follower<'a> {
     }
 }
 
-/// The joint that turns the farthest, and how far, rad.
+/// Returns the joint that turns farthest, and its turn, rad.
 fn largest_turn(from: &JointVec, to: &JointVec) -> (Joint, f64) {
     let turns = Joint::ALL.map(|joint| (joint, (to[joint.index()] - from[joint.index()]).abs()));
     turns.into_iter().fold(turns[0], |worst, turn| if turn.1 > worst.1 { turn } else { worst })

@@ -7,55 +7,55 @@ use super::chain::{Frame, exponential, logarithm};
 use super::orientation::checked;
 use super::subproblems::turned;
 
-/// A turn of the flange by 1 rad counts as this length of a leg, m, where that is more than the flange's way: legs that mostly turn it
-/// are as long as their turn.
+/// Length of a leg that a turn of the flange by 1 rad counts as, m, if that is more than the flange's translation: the
+/// length of a leg that mostly turns the flange is its turn.
 pub const RADIUS: f64 = 0.25;
 
-/// Legs shorter than this, m, move nothing.
+/// Length below which a leg counts as no movement, m.
 pub(crate) const SHORTEST: f64 = 1e-9;
 /// Distance of the second of three points from the line through the others, m, below which they are in line.
 const IN_LINE: f64 = 1e-6;
-/// Turns that miss half a turn by less, rad, might go either way.
+/// Deviation from half a turn below which the direction of a turn is ambiguous, rad.
 const HALF_TURN: f64 = 1e-6;
 
-/// A leg of a path of the flange, from where the leg before ends. The orientation turns evenly about one axis, the short way
-/// (spherical linear interpolation).
+/// Leg of a path of the flange, which starts at the end of the previous leg. The orientation turns evenly about one
+/// axis, the short way (spherical linear interpolation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leg {
-    /// Straight on to a pose.
+    /// A straight line to a pose.
     Line {
-        /// Where it ends, in the base frame.
+        /// End of the leg, in the base frame.
         to: Pose,
     },
-    /// On a circle to a pose.
+    /// An arc of a circle to a pose.
     Arc {
-        /// A point on the way, m in the base frame. It has no orientation of its own.
+        /// A point on the arc, m in the base frame, without an orientation.
         via: [f64; 3],
-        /// Where it ends, in the base frame.
+        /// End of the leg, in the base frame.
         to: Pose,
     },
 }
 
-/// A place of the flange on its path, with derivatives by the path's parameter.
+/// A point of the flange on its path, with derivatives by the path's parameter.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub frame: Frame,
-    /// m per unit.
+    /// Velocity, m per unit.
     pub velocity: Vector3<f64>,
     /// Rotation vector in the base frame, rad per unit.
     pub spin: Vector3<f64>,
-    /// m per squared unit.
+    /// Acceleration, m per squared unit.
     pub acceleration: Vector3<f64>,
-    /// rad per squared unit.
+    /// Rate of the spin, rad per squared unit.
     pub spin_rate: Vector3<f64>,
 }
 
-/// A leg with numbers: a place for each parameter from 0 to its length.
+/// An evaluated leg: a point for each parameter from 0 to its length.
 #[derive(Clone, Debug)]
 pub(crate) struct Drawn {
-    /// Counted from 1, as it was given.
+    /// Number of the leg as given, counted from 1.
     pub number: usize,
-    /// m.
+    /// Length, m.
     pub length: f64,
     from: Frame,
     pub to: Frame,
@@ -66,9 +66,9 @@ pub(crate) struct Drawn {
 
 #[derive(Clone, Debug)]
 enum Way {
-    /// m per m.
+    /// Direction, m per m.
     Line(Vector3<f64>),
-    /// With the angle by which it goes round, rad per m.
+    /// Arc with its angle, rad per m.
     Arc(Circle, f64),
 }
 
@@ -76,13 +76,13 @@ enum Way {
 #[derive(Clone, Debug)]
 struct Circle {
     centre: Vector3<f64>,
-    /// From the centre to the beginning.
+    /// Vector from the centre to the beginning.
     arm: Vector3<f64>,
-    /// Unit vector, about which the arc goes round.
+    /// Unit vector about which the arc turns.
     normal: Vector3<f64>,
-    /// rad.
+    /// Angle of the arc, rad.
     angle: f64,
-    /// Up to the point on the way, rad.
+    /// Angle up to the `via` point, rad.
     via: f64,
 }
 
@@ -112,7 +112,7 @@ impl Drawn {
         Ok(Self { number, length, from: *from, to, spin: turn / unit, way })
     }
 
-    /// How far from the beginning an arc passes its point on the way, m.
+    /// Returns the distance from the beginning at which an arc passes its `via` point, m.
     pub fn via(&self) -> Option<f64> {
         match &self.way {
             Way::Line(_) => None,
@@ -120,7 +120,7 @@ impl Drawn {
         }
     }
 
-    /// The place `u` (m) from the beginning.
+    /// Returns the point at the distance `u` (m) from the beginning.
     pub fn at(&self, u: f64) -> Place {
         let rotation = exponential(&(self.spin * u)) * self.from.rotation;
         let (position, velocity, acceleration) = match &self.way {
@@ -135,7 +135,7 @@ impl Drawn {
     }
 }
 
-/// The arc from one pose through a point to another.
+/// Returns the arc from a pose through a point to another pose.
 fn circle(from: &Frame, via: &[f64; 3], to: &Frame) -> Result<Circle, PoseError> {
     if let Some(&value) = via.iter().find(|v| !v.is_finite()) {
         return Err(PoseError::NotFinite { what: "the point that an arc passes", value });

@@ -1,26 +1,27 @@
-//! Orientations as people write them: quaternions, and roll, pitch and yaw.
+//! Orientations as users write them: quaternions, and roll, pitch and yaw.
 use jtc_dynamics::Pose;
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
 use super::PoseError;
 use super::chain::Frame;
 
-/// By how much the length of a quaternion may miss 1: it is written with a few digits.
+/// Maximum deviation of the length of a quaternion from 1, because it is written with few digits.
 const UNIT: f64 = 1e-3;
-/// By how much the entries of RᵀR may miss those of the unit matrix.
+/// Maximum deviation of the entries of RᵀR from the unit matrix.
 const ROTATION: f64 = 1e-6;
 
-/// An orientation, as a pose of the flange is given with it.
+/// An orientation, as given for a pose of the flange.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
-    /// A unit quaternion, x, y, z, w: the scalar last, as ROS has it. Its length may miss 1 by a thousandth, which a few digits leave.
+    /// A unit quaternion x, y, z, w, scalar last as in ROS. Its length may deviate from 1 by a thousandth, because it
+    /// is written with few digits.
     Quaternion([f64; 4]),
     /// Roll, pitch, yaw, rad: about the fixed axes x, y and z in this order, Rz(yaw)·Ry(pitch)·Rx(roll), as in a URDF.
     Rpy([f64; 3]),
 }
 
 impl Orientation {
-    /// The pose with this orientation at `position` (m, in the base frame).
+    /// Returns the pose with this orientation at `position` (m, in the base frame).
     ///
     /// # Errors
     ///
@@ -47,7 +48,7 @@ impl Orientation {
     }
 }
 
-/// The orientation of a pose as a unit quaternion x, y, z, w, with w not negative.
+/// Returns the orientation of a pose as a unit quaternion x, y, z, w, with w not negative.
 pub fn quaternion_of(pose: &Pose) -> [f64; 4] {
     let rotation = Rotation3::from_matrix_unchecked(Frame::from(pose).rotation);
     let q = UnitQuaternion::from_rotation_matrix(&rotation);
@@ -55,8 +56,8 @@ pub fn quaternion_of(pose: &Pose) -> [f64; 4] {
     [q.i, q.j, q.k, q.w].map(|part| sign * part)
 }
 
-/// The orientation of a pose as roll, pitch and yaw, rad, with the pitch within ±π/2. At a pitch of ±π/2, where only the sum or
-/// the difference of roll and yaw has a meaning, the roll is 0.
+/// Returns the orientation of a pose as roll, pitch and yaw, rad, with the pitch within ±π/2. At a pitch of ±π/2 only
+/// the sum or the difference of roll and yaw is defined; the roll is then 0.
 pub fn rpy_of(pose: &Pose) -> [f64; 3] {
     let r = &pose.rotation;
     let flat = r[2][1].hypot(r[2][2]);
@@ -69,7 +70,7 @@ pub fn rpy_of(pose: &Pose) -> [f64; 3] {
 
 const POSITION: [&str; 3] = ["position x", "position y", "position z"];
 
-/// A pose that somebody gave, with a rotation to the last digit.
+/// Checks a given pose and returns it with an exact rotation.
 ///
 /// # Errors
 ///
@@ -85,7 +86,7 @@ pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     if frame.rotation.determinant() < 0.0 {
         return Err(PoseError::NotRotation { deviation: 2.0 });
     }
-    // A step of Newton's iteration to the nearest rotation squares what it misses.
+    // A step of Newton's iteration to the nearest rotation squares the deviation.
     let rotation =
         frame.rotation * (Matrix3::identity() * 3.0 - frame.rotation.tr_mul(&frame.rotation)) * 0.5;
     Ok(Frame { rotation, ..frame })
@@ -105,7 +106,7 @@ mod tests {
 
     const S: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-    /// Rows of Rz(yaw)·Ry(pitch)·Rx(roll), written out.
+    /// Returns the rows of Rz(yaw)·Ry(pitch)·Rx(roll), written out.
     fn written_out([roll, pitch, yaw]: [f64; 3]) -> [[f64; 3]; 3] {
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         [
@@ -146,7 +147,7 @@ mod tests {
         let long = at(Orientation::Quaternion([0.0, 0.0, 1.0, 1.0])).unwrap_err();
         assert_eq!(long, PoseError::NotUnit { length: 2f64.sqrt() });
         assert_eq!(long.to_string(), "the quaternion has the length 1.414214, that of an orientation has 1");
-        // Three digits do.
+        // Three digits are enough.
         at(Orientation::Quaternion([0.0, 0.0, 0.707, 0.707])).unwrap();
         let nan = at(Orientation::Rpy([0.0, f64::NAN, 0.0])).unwrap_err();
         assert!(matches!(nan, PoseError::NotFinite { what: "pitch", .. }), "{nan}");
@@ -174,7 +175,7 @@ mod tests {
             prop_assert!(rpy_of(&pose).iter().zip(rpy).all(|(a, b)| (a - b).abs() < 1e-9));
         }
 
-        /// Where roll and yaw are one, what is returned is the same orientation.
+        /// If roll and yaw are ambiguous, the returned values give the same orientation.
         #[test]
         fn upright_pitches_return_the_same_orientation(roll in -3.1..3.1f64, yaw in -3.1..3.1f64, up in any::<bool>()) {
             let pitch = if up { std::f64::consts::FRAC_PI_2 } else { -std::f64::consts::FRAC_PI_2 };

@@ -1,4 +1,4 @@
-//! Routes: sections that are straight in joint space, and sections on which the flange keeps to lines and arcs.
+//! Routes: sections that are straight in joint space, and sections on which the flange follows lines and arcs.
 use jtc_dynamics::JointVec;
 
 use super::target::one;
@@ -6,10 +6,10 @@ use super::{FlangePath, Kinematics, Leg, PoseError, Target};
 use crate::path::Waypointed;
 use crate::{BlendedPath, Path, PathPoint, PlanError, furthest_joint};
 
-/// How far from the joint positions of a waypoint the arm may be where a line that leads there ends, rad.
+/// Largest distance between the joint positions of a waypoint and the end of a line that leads there, rad.
 const SAME: f64 = 1e-5;
 
-/// How the arm gets to a waypoint from the one before.
+/// Kind of motion from the previous waypoint to a waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LegKind {
     /// Straight in joint space.
@@ -17,28 +17,29 @@ pub enum LegKind {
     Joint,
     /// With the flange on a straight line.
     Line,
-    /// It is a point that the arc to the next waypoint passes; its orientation does not count.
+    /// A point that the arc to the next waypoint passes; its orientation is ignored.
     Via,
-    /// With the flange on an arc, through the waypoint before, which is [`LegKind::Via`].
+    /// With the flange on an arc, through the previous waypoint, which is [`LegKind::Via`].
     Arc,
 }
 
 /// A waypoint of a route.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoutePoint {
-    /// Where it is.
+    /// Position of the waypoint.
     pub target: Target,
-    /// How the arm gets there. That of the first waypoint does not count.
+    /// Kind of motion to the waypoint; ignored for the first waypoint.
     pub leg: LegKind,
 }
 
-/// A way through waypoints, straight in joint space or with the flange on lines and arcs. Between the two kinds it has a stop.
+/// A path through waypoints, straight in joint space or with the flange on lines and arcs. It stops between the two
+/// kinds.
 ///
-/// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has where the first of them begins. A pose of
-/// the flange at the end of a line is reached in it; joint positions there have to be of it. Otherwise of a pose of the flange
-/// the solution nearest to the waypoint before is taken.
+/// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has at the start of the first
+/// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must belong to
+/// it. Any other flange pose is reached with the solution nearest to the previous waypoint.
 ///
-/// Its parameter is that of the sections one after the other: rad in joint space, m along lines and arcs.
+/// The parameter concatenates those of the sections: rad in joint space, m along lines and arcs.
 #[derive(Clone, Debug)]
 pub struct Route {
     sections: Vec<Section>,
@@ -51,8 +52,8 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Places where the way changes its form, ends included: by the route's parameter and by its own. A sum of parameters is rounded,
-    /// and a place must not get to the other side of one of these by that.
+    /// Places where the path changes its form, ends included: by the route's parameter and by the section's own. A sum
+    /// of parameters is rounded, and this rounding must not move a place to the other side of a mark.
     marks: Vec<(f64, f64)>,
 }
 
@@ -83,7 +84,7 @@ impl Section {
         Self { way, begin, marks }
     }
 
-    /// Its own parameter for one of the route's.
+    /// Returns the section's own parameter for one of the route's.
     fn own(&self, s: f64) -> f64 {
         let behind = self.marks.partition_point(|mark| mark.0 <= s);
         match (behind.checked_sub(1).map(|i| self.marks[i]), self.marks.get(behind)) {
@@ -98,14 +99,14 @@ impl Section {
 }
 
 impl Route {
-    /// Through `points`; of a pose of the flange at the first of them the joint positions nearest to `near` (rad) are taken. Corners between
-    /// two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]), those between lines and arcs within `blend_m` m
-    /// (see [`FlangePath`]); 0: stops.
+    /// Creates the route through `points`. For a flange pose at the first point the joint positions nearest to `near`
+    /// (rad) are used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]),
+    /// corners between lines and arcs within `blend_m` m (see [`FlangePath`]); 0: stops.
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the waypoint, or leg and distance on it, that cannot be:
-    /// see [`PoseError`]; [`PoseError::NoMotion`] if all waypoints are at one place.
+    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the impossible waypoint, or leg and
+    /// distance on it: see [`PoseError`]; [`PoseError::NoMotion`] if all waypoints are at one position.
     pub fn new(
         kinematics: &Kinematics,
         points: &[RoutePoint],
@@ -136,12 +137,12 @@ impl Route {
         if route.sections.is_empty() { Err(PoseError::NoMotion.into()) } else { Ok(route) }
     }
 
-    /// Joint positions at the waypoints, rad; at a corner that is rounded those of the corner.
+    /// Returns the joint positions at the waypoints, rad; at a rounded corner, those of the corner.
     pub fn positions(&self) -> &[JointVec] {
         &self.positions
     }
 
-    /// Whether `s` is on a line or an arc of the flange.
+    /// Returns `true` if `s` is on a line or an arc of the flange.
     pub fn is_on_line(&self, s: f64) -> bool {
         matches!(self.section(s).way, Way::Flange(_))
     }
@@ -155,7 +156,7 @@ impl Route {
         self.positions.last().copied().unwrap_or_default()
     }
 
-    /// Appends a section whose waypoints behind its first are at `waypoints` of its own parameter.
+    /// Appends a section whose waypoints after its first are at `waypoints` of its own parameter.
     fn push(&mut self, way: Way, waypoints: &[f64]) {
         let section = Section::new(way, self.end);
         self.waypoints.extend(waypoints.iter().map(|own| self.end + own));
@@ -163,7 +164,7 @@ impl Route {
         self.sections.push(section);
     }
 
-    /// Appends waypoints to which nothing moves.
+    /// Appends waypoints that are reached without movement.
     fn stay(&mut self, count: usize) {
         self.waypoints.extend(std::iter::repeat_n(self.end, count));
     }
@@ -201,7 +202,7 @@ impl Route {
         let legs = legs(kinematics, points, first)?;
         let start = self.last();
         let path = |blend: f64| FlangePath::new(kinematics, &start, &legs.legs, blend);
-        // Where the waypoints are is known without blends.
+        // The positions of the waypoints are known without blends.
         let sharp = match path(0.0) {
             Err(PoseError::NoMotion) => None,
             other => Some(other.map_err(|e| legs.numbered(e))?),
@@ -222,7 +223,7 @@ impl Route {
                     same(&reached, &wanted).map_err(|e| e.at_waypoint(first + k))?;
                     wanted
                 }
-                // A solution is exact to rounding only.
+                // A solution is exact only to rounding.
                 _ => std::array::from_fn(|j| {
                     let (low, high) = kinematics.limits()[j];
                     reached[j].clamp(low, high)
@@ -241,21 +242,21 @@ impl Route {
     }
 }
 
-/// Legs of the flange, and the numbers (from 1) of the waypoints that they lead to.
+/// Legs of the flange, and the numbers (from 1) of the waypoints at their ends.
 struct Legs {
     legs: Vec<Leg>,
     ends: Vec<usize>,
-    /// Of the waypoint that the first leg leads to, or passes.
+    /// Number of the waypoint that the first leg leads to, or passes.
     first: usize,
 }
 
 impl Legs {
-    /// Number of the leg, from 1, that the point with this index is on.
+    /// Returns the number of the leg, from 1, that contains the point with this index.
     fn of_point(&self, index: usize) -> usize {
         self.ends.partition_point(|end| *end < self.first + index) + 1
     }
 
-    /// An error of these legs, with the numbers of the route.
+    /// Returns an error of these legs with the numbers of the route.
     fn numbered(&self, error: PoseError) -> PoseError {
         let end = |leg: usize| leg.checked_sub(1).and_then(|i| self.ends.get(i)).copied();
         match error {
@@ -272,7 +273,7 @@ impl Legs {
     }
 }
 
-/// The legs to points of which the first has the number `first`.
+/// Returns the legs to points; the first point has the number `first`.
 fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<Legs, PoseError> {
     let (mut legs, mut ends, mut via) = (Vec::new(), Vec::new(), None);
     for (k, point) in points.iter().enumerate() {
@@ -303,7 +304,7 @@ fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<
     Ok(Legs { legs, ends, first })
 }
 
-/// Whether the arm is at the joint positions wanted, and not in another configuration.
+/// Checks that the arm is at the wanted joint positions, and not in another configuration.
 fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
     let (joint, away) = furthest_joint(reached, wanted);
     if away > SAME {
@@ -365,7 +366,7 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// Whatever is asked for on one side of a place where the form changes is on that side of the part, too.
+    /// A parameter on one side of a change of form stays on that side in the section, too.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

@@ -6,29 +6,29 @@ use nalgebra::{Cholesky, Matrix6, Vector6};
 
 use super::chain::{Chain, Frame};
 
-/// Residual of a solution at most, m and rad.
+/// Maximum residual of a solution, m and rad.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Squared residual (over the arm's length, and rad) that is left to rounding.
+/// Squared residual (over the arm's length, and rad) that counts as rounding.
 const ROUNDING: f64 = 1e-29;
-/// Largest step of a joint in an iteration, rad: from far away the linearisation has no meaning beyond.
+/// Largest step of a joint in an iteration, rad: beyond it the linearisation has no meaning.
 const STEP: f64 = 0.7;
-/// Two solutions are the same when no joint differs by more, rad. Nearer ones are next to a singularity, where the flange has moved by
-/// nanometres in between.
+/// Two solutions are the same if no joint differs by more, rad. Closer solutions are next to a singularity, where the
+/// flange moves by nanometres in between.
 pub(crate) const SAME: f64 = 1e-4;
-/// Solutions that an arm of six revolute joints has at most, but in singular poses (Primrose 1986).
+/// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;
-/// Starting values at least, and at most.
+/// Smallest and largest number of starting values.
 const SEEDS: (usize, usize) = (200, 1_500);
 
-/// What came of an iteration: joint positions, and their squared residual.
+/// Result of an iteration: joint positions, and their squared residual.
 pub(crate) struct Reached {
     pub q: JointVec,
     pub squared: f64,
     pub residual: Vector6<f64>,
 }
 
-/// Takes `q` to where the residual weighted by `weights` is the least, in `iterations` at most: Levenberg-Marquardt with a damping in
-/// proportion to the squared residual (Sugihara 2011), which converges quadratically and stays calm in singular poses.
+/// Moves `q` to the least residual weighted by `weights`, in at most `iterations`: Levenberg-Marquardt with a damping
+/// proportional to the squared residual (Sugihara 2011), which converges quadratically and is stable in singular poses.
 pub(crate) fn descend(
     chain: &Chain,
     goal: &Frame,
@@ -74,20 +74,20 @@ pub(crate) fn descend(
     Reached { q, squared, residual }
 }
 
-/// The solution that the iteration from `q` leads to, if it leads to one: principal values, within (−π, π].
+/// Returns the solution to which the iteration from `q` converges, if it does: principal values, within (−π, π].
 pub(crate) fn converge(chain: &Chain, goal: &Frame, q: &JointVec, iterations: usize) -> Option<JointVec> {
     let reached = descend(chain, goal, *q, &Vector6::repeat(1.0), iterations);
     fits(chain, &reached).then(|| reached.q.map(principal))
 }
 
-/// Whether the flange is where it should be.
+/// Returns `true` if the flange is at the goal.
 fn fits(chain: &Chain, reached: &Reached) -> bool {
     let r = &reached.residual;
     let shift = r.fixed_rows::<3>(0).norm() * chain.length;
     shift <= TOLERANCE && r.fixed_rows::<3>(3).norm() <= TOLERANCE
 }
 
-/// The same angle within (−π, π].
+/// Returns the equivalent angle within (−π, π].
 pub(crate) fn principal(angle: f64) -> f64 {
     let turned = angle - TAU * (angle / TAU).round();
     if turned <= -PI { turned + TAU } else { turned }
@@ -103,8 +103,8 @@ pub(crate) fn add(solutions: &mut Vec<JointVec>, q: JointVec) -> bool {
     new
 }
 
-/// Adds the solutions that the iteration finds from many starting values, always the same, until it has long found no new one. As
-/// long as it knows an odd number it goes on: they are roots of a polynomial of even degree.
+/// Adds the solutions that the iteration finds from many fixed starting values, until it has found no new one for a
+/// long time. With an odd number of solutions it continues, because they are roots of a polynomial of even degree.
 pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>) {
     let mut last = 0;
     for n in 1..=SEEDS.1 {
@@ -116,7 +116,7 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
             && add(solutions, q)
         {
             last = n;
-            // What has just come within the tolerance goes on to rounding.
+            // A new solution within the tolerance is refined down to rounding.
             if let (Some(newest), Some(refined)) = (solutions.last_mut(), converge(chain, goal, &q, 40)) {
                 *newest = refined;
             }
@@ -124,13 +124,13 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
     }
 }
 
-/// Whether there is a solution at all, near `near` or anywhere.
+/// Returns `true` if a solution exists, near `near` or anywhere.
 pub(crate) fn is_reachable(chain: &Chain, goal: &Frame, near: &JointVec) -> bool {
     let reached = |q: &JointVec| converge(chain, goal, q, 40).is_some();
     reached(near) || (1..=SEEDS.0).any(|n| reached(&seed(n)))
 }
 
-/// The n-th starting value: Halton's sequence, which fills the space of all joint positions evenly.
+/// Returns the n-th starting value: Halton's sequence, which fills the space of all joint positions evenly.
 pub(crate) fn seed(n: usize) -> JointVec {
     const BASES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];
     BASES.map(|base| {

@@ -1,4 +1,4 @@
-//! Poses in which the flange cannot move in some direction.
+//! Singular poses, in which the flange cannot move in some direction.
 use std::fmt;
 
 use jtc_dynamics::JOINTS;
@@ -9,33 +9,34 @@ use super::chain::{Axes, Chain};
 use super::closed_form::{Geometry, Shoulder};
 use super::subproblems::across;
 
-/// Smallest singular value of the Jacobian on a path of the flange (see [`Singularity::smallest`]):
-/// half a degree from where the wrist's axes are in line, and a few degrees from the stretched arm.
+/// Smallest singular value of the Jacobian on a path of the flange (see [`Singularity::smallest`]): half a degree from
+/// aligned wrist axes, and a few degrees from the stretched arm.
 pub const SINGULAR: f64 = 0.01;
 
-/// Which singular pose of the arm it is.
+/// Kind of singular pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SingularKind {
-    /// The wrist: the axes of joints 4 and 6 are parallel, joint 5 stands at 0 or half a turn from there.
+    /// The wrist: the axes of joints 4 and 6 are parallel; joint 5 is at 0 or half a turn from there.
     Wrist,
     /// The elbow: the arm is stretched, or folded.
     Elbow,
-    /// The shoulder: the wrist is over the axis of joint 1, or where joint 1 cannot move it sideways.
+    /// The shoulder: the wrist is over the axis of joint 1, or joint 1 cannot move it sideways.
     Shoulder,
-    /// None of these, or of an arm whose geometry has no such names.
+    /// Any other singular pose, or that of an arm whose geometry has no such names.
     Other,
 }
 
 /// The singular pose that the arm is in or next to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Singularity {
-    /// Which one.
+    /// Kind.
     pub kind: SingularKind,
-    /// The joints that can move with the flange almost at rest.
+    /// Joints that can move with the flange almost at rest.
     pub joints: Vec<Joint>,
-    /// Smallest singular value of the Jacobian, translations counted in lengths of the stretched arm: how far the flange moves
-    /// at least while the joints move by 1 rad altogether. 0 in the singular pose, NaN for joint positions that are no numbers.
+    /// Smallest singular value of the Jacobian, translations counted in lengths of the stretched arm: the least motion
+    /// of the flange while the joints move by 1 rad altogether. 0 in the singular pose, NaN for joint positions that
+    /// are NaN or infinite.
     pub smallest: f64,
 }
 
@@ -68,13 +69,13 @@ impl fmt::Display for Singularity {
     }
 }
 
-/// Share of the largest entry from which on a joint counts among those that move.
+/// Share of the largest entry above which a joint counts as moving.
 const TAKES_PART: f64 = 0.2;
-/// Sine of the angle of the wrist below which a singular pose of an arm without a planar elbow is the wrist's.
+/// Sine of the wrist angle below which a singular pose of an arm without a planar elbow counts as a wrist singularity.
 const NAMED: f64 = 0.1;
 
-/// The smallest singular value of the Jacobian, and the unit vector of joint motions that goes with it; NaN and 0 where the joint
-/// positions are no numbers.
+/// Returns the smallest singular value of the Jacobian, and the unit vector of its joint motions; NaN and 0 if a joint
+/// position is NaN or infinite.
 pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     let jacobian = chain.scaled_jacobian(axes);
     // The iteration for singular values would not end.
@@ -87,7 +88,7 @@ pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     (parts.singular_values[least], direction)
 }
 
-/// What singular pose is nearest to these joint positions.
+/// Returns the singular pose that is nearest to these joint positions.
 pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -> Singularity {
     let (smallest, direction) = weakest(chain, axes);
     let part = TAKES_PART * direction.amax();
@@ -95,10 +96,10 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
     Singularity { kind: geometry.map_or(SingularKind::Other, |g| kind(chain, g, axes)), joints, smallest }
 }
 
-/// The factor of the Jacobian's determinant that is nearest to 0, by its name.
+/// Returns the name of the factor of the Jacobian's determinant that is nearest to 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // As a share of what it is with joint 5 a quarter turn away.
+    // Share of its value with joint 5 a quarter turn away.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {

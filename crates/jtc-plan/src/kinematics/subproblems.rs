@@ -1,17 +1,18 @@
 //! Rotations that solve one equation of a closed form (the subproblems of Paden and Kahan).
 //!
-//! Each takes a `hint`: the angle to return where the geometry leaves it free, which is so in singular poses. A slightly missed
-//! target (what a nearly ideal arm asks for) is taken for its nearest: what comes out is refined, and dropped where it does not fit.
+//! Each takes a `hint`: the angle to return if the geometry leaves the angle free, as in singular poses. A slightly
+//! missed target (as requested for a nearly ideal arm) is replaced by the nearest reachable one: the result is refined,
+//! and dropped if it does not fit.
 use nalgebra::Vector3;
 
 use super::chain::turn;
 
-/// Below this share of the vectors' lengths a direction is lost in rounding, and the angle is free.
+/// Share of the vectors' lengths below which a direction is lost in rounding, and the angle is free.
 const FREE: f64 = 1e-9;
-/// How far beyond the largest value a target may be, as a share of the vectors' lengths.
+/// Maximum excess of a target over the largest value, as a share of the vectors' lengths.
 const SLACK: f64 = 1e-3;
 
-/// The angle by which a rotation about `axis` takes `from` to the direction of `to`, as seen along the axis.
+/// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, as seen along the axis.
 pub(crate) fn turn_onto(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>, hint: f64) -> f64 {
     let (a, b) = (across(axis, from), across(axis, to));
     if a.norm() <= FREE * from.norm() || b.norm() <= FREE * to.norm() {
@@ -20,12 +21,12 @@ pub(crate) fn turn_onto(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f
     axis.dot(&a.cross(&b)).atan2(a.dot(&b))
 }
 
-/// The part of a vector across an axis.
+/// Returns the part of a vector across an axis.
 pub(crate) fn across(axis: &Vector3<f64>, vector: &Vector3<f64>) -> Vector3<f64> {
     vector - axis * axis.dot(vector)
 }
 
-/// The angles, none to two, with `direction`·R(axis, angle)·`vector` = `value`.
+/// Returns the zero to two angles with `direction`·R(axis, angle)·`vector` = `value`.
 pub(crate) fn turn_to_value(
     direction: &Vector3<f64>,
     axis: &Vector3<f64>,
@@ -51,7 +52,7 @@ pub(crate) fn turn_to_value(
     vec![middle - half, middle + half]
 }
 
-/// The angles, none to two, with which `offset` + R(axis, angle)·`arm` has the length `length`.
+/// Returns the angles, at most two, at which `offset` + R(axis, angle)·`arm` has the length `length`.
 pub(crate) fn turn_to_length(
     offset: &Vector3<f64>,
     axis: &Vector3<f64>,
@@ -63,7 +64,7 @@ pub(crate) fn turn_to_length(
     turn_to_value(offset, axis, arm, value, hint)
 }
 
-/// `vector` after a rotation about `axis` by `angle`.
+/// Returns `vector` after a rotation about `axis` by `angle`.
 pub(crate) fn turned(axis: &Vector3<f64>, angle: f64, vector: &Vector3<f64>) -> Vector3<f64> {
     turn(axis, angle) * vector
 }

@@ -1,9 +1,9 @@
-//! What a file of waypoints gives: joint positions or poses of the flange.
+//! Contents of a waypoint file: joint positions or poses of the flange.
 use jtc_dynamics::{JointVec, Pose};
 
 use super::{Kinematics, PoseError, outside};
 
-/// Where a motion is to lead.
+/// Target of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// Joint positions, rad.
@@ -12,12 +12,13 @@ pub enum Target {
     Flange(Pose),
 }
 
-/// Joint positions for each target: of a pose the solution that is nearest to the target before, and to `start` (rad) for the first.
+/// Returns joint positions for each target: for a pose, the solution that is nearest to the previous target, and to
+/// `start` (rad) for the first.
 ///
 /// # Errors
 ///
-/// [`PoseError::Waypoint`] with the number of the first target that has none, counted from 1, and why: see [`Kinematics::solve`].
-/// Joint positions have to be within the limits too.
+/// [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and the reason: see
+/// [`Kinematics::solve`]. Joint positions must be within the limits too.
 pub fn resolve(
     kinematics: &Kinematics,
     targets: &[Target],
@@ -32,7 +33,7 @@ pub fn resolve(
     Ok(found)
 }
 
-/// Joint positions for one target; of a pose those nearest to `before`.
+/// Returns joint positions for a target; for a pose, those nearest to `before`.
 pub(crate) fn one(
     kinematics: &Kinematics,
     target: &Target,

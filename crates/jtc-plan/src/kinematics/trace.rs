@@ -1,27 +1,28 @@
-//! The way of the flange: legs one after the other, with blended corners.
+//! Path of the flange: consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before the corner and ends at the distance r behind it. In between the parameter of the leg
-//! before runs out as that of the leg behind begins to run: with w rising smoothly from 0 to 1 and W = ∫w, the place is that of the
-//! leg before at τ − W and, on top of it, the displacement of the leg behind by W, τ from −r to r. Position and orientation have
-//! continuous second derivatives, and stay within the triangle of the corner where the legs are straight.
+//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of
+//! the previous leg runs out while that of the next leg starts. With w rising smoothly from 0 to 1 and W = ∫w, the
+//! place is that of the previous leg at τ − W plus the displacement of the next leg by W, τ from −r to r. Position and
+//! orientation have continuous second derivatives. They stay within the triangle of the corner if the legs are
+//! straight.
 use nalgebra::Vector3;
 
 use super::PoseError;
 use super::chain::Frame;
 use super::leg::{Drawn, Leg, Place, RADIUS, SHORTEST};
 
-/// Cosine of the angle between two legs below which a corner is a way back, where no blend keeps a motion going.
+/// Cosine of the angle between two legs below which the path turns back, so that no blend keeps a motion going.
 const WAY_BACK: f64 = -0.98;
 
-/// The way of the flange over a parameter that is the length of its legs, m.
+/// Path of the flange over a parameter that is the length of its legs, m.
 #[derive(Clone, Debug)]
 pub(crate) struct Trace {
     legs: Vec<Drawn>,
-    /// Where each leg begins; one more for the end.
+    /// Start of each leg; plus an entry for the end.
     begins: Vec<f64>,
-    /// Blend radius behind each leg, m; 0 for a stop.
+    /// Blend radius after each leg, m; 0 for a stop.
     blends: Vec<f64>,
-    /// How many legs were given: some may move nothing.
+    /// Number of legs given; some may have no motion.
     given: usize,
 }
 
@@ -51,13 +52,13 @@ impl Trace {
         self.begins[self.legs.len()]
     }
 
-    /// Index of the leg that `s` belongs to; a corner belongs to the leg behind it.
+    /// Returns the index of the leg that `s` belongs to; a corner belongs to the leg after it.
     fn leg(&self, s: f64) -> usize {
         let behind = self.begins.partition_point(|&begin| begin <= s);
         behind.saturating_sub(1).min(self.legs.len() - 1)
     }
 
-    /// Number of the leg that `s` belongs to, counted from 1, and how far along it and how long it is, m.
+    /// Returns the number of the leg at `s`, counted from 1, the distance along it, and its length, m.
     pub fn whereabouts(&self, s: f64) -> (usize, f64, f64) {
         let k = self.leg(s);
         (self.legs[k].number, s - self.begins[k], self.legs[k].length)
@@ -76,13 +77,13 @@ impl Trace {
         }
     }
 
-    /// Where a motion has to come to rest.
+    /// Returns the places of required stops.
     pub fn stops(&self) -> Vec<f64> {
         let inner = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
         inner.filter(|(blend, _)| **blend == 0.0).map(|(_, &s)| s).collect()
     }
 
-    /// Where the path changes its form, ends not included.
+    /// Returns the parameters at which the path changes its form, without the ends.
     pub fn breaks(&self) -> Vec<f64> {
         let corners = self.blends.iter().zip(&self.begins[1..self.legs.len()]);
         let mut all: Vec<f64> = corners.flat_map(|(&r, &s)| [s - r, s, s + r]).collect();
@@ -90,20 +91,20 @@ impl Trace {
         all
     }
 
-    /// Where leg `number`, an arc, passes its point on the way.
+    /// Returns the parameter at which leg `number`, an arc, passes its `via` point.
     pub fn via(&self, number: usize) -> Option<f64> {
         let k = self.legs.iter().position(|leg| leg.number == number)?;
         Some(self.begins[k] + self.legs[k].via()?)
     }
 
-    /// Nearest to each waypoint, ends included: legs that move nothing end where they begin.
+    /// Returns the parameters nearest to each waypoint, ends included: legs without motion have equal ends.
     pub fn waypoints(&self) -> Vec<f64> {
         let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);
         (0..=self.given).map(|n| self.begins[passed(n)]).collect()
     }
 }
 
-/// The blend radius at a corner: at most half of each leg, and none where the way turns back.
+/// Returns the blend radius at a corner: at most half of each leg, and 0 if the path turns back.
 fn radius(before: &Drawn, behind: &Drawn, blend: f64) -> f64 {
     let (a, b) = (before.at(before.length), behind.at(0.0));
     let along = a.velocity.dot(&b.velocity) + RADIUS * RADIUS * a.spin.dot(&b.spin);
@@ -115,7 +116,7 @@ fn radius(before: &Drawn, behind: &Drawn, blend: f64) -> f64 {
     if radius > SHORTEST { radius } else { 0.0 }
 }
 
-/// The place on a blend of radius `r` at `tau`, both m.
+/// Returns the point on a blend of radius `r` at `tau`, both m.
 fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
     let t = (tau + r) / (2.0 * r);
     let w = t * t * (3.0 - 2.0 * t);
@@ -123,7 +124,7 @@ fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
     let sum = 2.0 * r * t * t * t * (1.0 - 0.5 * t);
     let (a, b) = (before.at(before.length + tau - sum), behind.at(sum));
     let corner = &before.to;
-    // How the leg behind has turned the flange since the corner.
+    // Rotation of the flange by the next leg since the corner.
     let since = b.frame.rotation * corner.rotation.transpose();
     let spin: Vector3<f64> = since * a.spin;
     Place {
@@ -159,7 +160,7 @@ mod tests {
         ]
     }
 
-    /// Largest difference of the derivatives that a place has from those of its neighbours.
+    /// Returns the largest difference of a point's derivatives from the differences of its neighbours.
     fn wrong(trace: &Trace, s: f64) -> f64 {
         let step = 1e-5;
         let (before, here, after) = (trace.at(s - step), trace.at(s), trace.at(s + step));
@@ -188,7 +189,7 @@ mod tests {
             let at_ends = trace.breaks();
             for s in at_ends.into_iter().chain([at * trace.end()]) {
                 let s = s.clamp(1e-5, trace.end() - 1e-5);
-                // At the ends of a blend the third derivative jumps; arcs may be tight, and then differences are rough.
+                // At the ends of a blend the third derivative jumps; arcs may be tight, and then differences are imprecise.
                 let tight = trace.at(s).acceleration.norm() + trace.at(s).velocity.norm();
                 prop_assert!(wrong(&trace, s) < 0.03 + 1e-3 * tight.powi(3), "{} at {s}: {trace:?}", wrong(&trace, s));
             }

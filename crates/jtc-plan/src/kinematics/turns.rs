@@ -1,26 +1,26 @@
-//! The same joint positions whole turns apart, within the position limits.
+//! Equivalent joint positions, whole turns apart, within the position limits.
 use std::f64::consts::TAU;
 
 use jtc_dynamics::{JOINTS, JointVec};
 use jtc_wire::Joint;
 
-/// How far beyond a limit a position counts as that limit, rad: a solution is exact to rounding only.
+/// Distance beyond a limit up to which a position counts as at the limit, rad: a solution is exact only to rounding.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
 type Limits = [(f64, f64); JOINTS];
 
-/// `angle` if it is within the limits, up to rounding.
+/// Returns `angle` if it is within the limits, up to rounding.
 fn within(angle: f64, (low, high): (f64, f64)) -> Option<f64> {
     (low <= high && low - ROUNDING <= angle && angle <= high + ROUNDING).then(|| angle.clamp(low, high))
 }
 
-/// Each joint whole turns from `q` to be as near as the limits allow to `near`; `None` if one is outside in any turn.
+/// Turns each joint of `q` by whole turns as near to `near` as the limits permit; returns `None` if a joint is outside in every turn.
 pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<JointVec> {
     let mut found = *q;
     for (j, angle) in found.iter_mut().enumerate() {
         let turned = *angle + TAU * ((near[j] - *angle) / TAU).round();
         let ends = [limits[j].0, limits[j].1].map(|end| *angle + TAU * ((end - *angle) / TAU).round());
-        // The nearest turn may be outside; then one of those next to the limits is the nearest, if any is inside.
+        // The nearest turn may be outside; then one of the turns next to the limits is the nearest, if any is inside.
         let candidates = [turned, ends[0], ends[0] + TAU, ends[1], ends[1] - TAU];
         let inside = candidates.into_iter().filter_map(|angle| within(angle, limits[j]));
         *angle = inside.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))?;
@@ -28,7 +28,8 @@ pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<
     Some(found)
 }
 
-/// `q`, of which every joint is within (−π, π], with each joint there, a turn less and a turn more, as far as the limits allow.
+/// Returns `q`, whose joints are within (−π, π], with each joint unchanged, one turn less and one turn more, if the
+/// limits allow.
 pub(crate) fn variants(q: &JointVec, limits: &Limits) -> Vec<JointVec> {
     let mut all = vec![*q];
     for j in 0..JOINTS {
@@ -45,13 +46,13 @@ pub(crate) fn variants(q: &JointVec, limits: &Limits) -> Vec<JointVec> {
 /// A joint outside its limits.
 pub(crate) struct Outside {
     pub joint: Joint,
-    /// rad.
+    /// Position, rad.
     pub value: f64,
-    /// By how much, rad.
+    /// Distance outside, rad.
     pub beyond: f64,
 }
 
-/// The joint that is farthest outside with each in the turn that is the least outside.
+/// Returns the joint that is farthest outside, each in the turn that is least outside.
 pub(crate) fn outside(q: &JointVec, limits: &Limits) -> Outside {
     let mut worst = Outside { joint: Joint::ALL[0], value: q[0], beyond: f64::NEG_INFINITY };
     for (joint, (&angle, &(low, high))) in Joint::ALL.into_iter().zip(q.iter().zip(limits)) {
@@ -88,7 +89,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Against trying every turn of a wide range.
+        /// Compares with a trial of every turn in a wide range.
         #[test]
         fn the_nearest_turn_is_the_nearest_of_all(
             angle in -3.1..3.1f64, near in -20.0..20.0f64, low in -15.0..10.0f64, width in 0.1..14.0f64

@@ -1,4 +1,4 @@
-//! Random arms and waypoints, and a judge of motions that knows nothing of how they are made: it samples positions and takes
+//! Random arms and waypoints, and a judge of motions that is independent of the planner: it samples positions and takes
 //! differences.
 
 use std::fmt::Write as _;
@@ -9,7 +9,7 @@ use jtc_plan::{ArmDynamics, JOINTS, JointVec, Limits, Motion, Waypoint};
 
 /// Distance of the samples, s.
 const H: f64 = 5e-4;
-/// By what differences may exceed a limit: rounding of positions.
+/// Amount that differences may exceed a limit by: rounding of positions.
 const ROUNDING: f64 = 1e-6;
 
 /// An arm with limits, and waypoints.
@@ -87,8 +87,8 @@ impl Case {
         torque
     }
 
-    /// All that is wrong with a motion through the waypoints, along the legs between them where that was asked for (`on_legs`); the largest share of each limit that is used: velocity, acceleration, jerk,
-    /// torque.
+    /// Returns all errors of a motion through the waypoints, along the legs between them if requested (`on_legs`), and
+    /// the largest share of velocity, acceleration, jerk and torque.
     pub fn judge(&self, motion: &Motion, on_legs: bool) -> (String, [f64; 4]) {
         let mut wrong = String::new();
         self.ends(motion, &mut wrong);
@@ -168,7 +168,7 @@ impl Case {
         used
     }
 
-    /// Largest friction of each joint up to a little more than the speed at which its sign is whole.
+    /// Largest friction of each joint up to a little more than the speed at which its sign reaches ±1.
     fn breakaway(&self) -> JointVec {
         std::array::from_fn(|j| {
             let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
@@ -177,7 +177,8 @@ impl Case {
         })
     }
 
-    /// Torque that a motion may use: the limit without its margin, but no less than standing takes and a small part of what that leaves.
+    /// Torque that a motion may use: the limit without its margin, but at least the holding torque and a small part of
+    /// the torque left.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {
@@ -197,7 +198,7 @@ impl Case {
         }
     }
 
-    /// By differences over so short a time that an acceleration that jumps, and friction, hardly change in it.
+    /// Torque by differences over a time so short that acceleration and friction hardly change in it.
     fn torque_at(&self, dynamics: &Dynamics, motion: &Motion, time: f64) -> JointVec {
         const H: f64 = 1e-5;
         let [a, b, c] = [time - H, time, time + H].map(|t| motion.at(t).position);
@@ -206,7 +207,7 @@ impl Case {
         self.torque(dynamics, &b, &velocity, &acceleration)
     }
 
-    /// Every place is on a leg, or within the blend of a corner and inside the box of its legs.
+    /// Checks that every place is on a leg, or within the blend of a corner and inside the box of its legs.
     fn on_the_legs(&self, motion: &Motion, wrong: &mut String) {
         let count = (motion.duration() / 2e-3).ceil().min(50_000.0) as usize;
         for i in 0..=count {
@@ -234,7 +235,8 @@ impl Case {
         distance(q, &std::array::from_fn(|j| a[j] + u * way[j]))
     }
 
-    /// Within the blend of one of some waypoints that are close to each other around a leg, and in the box of all of them.
+    /// Returns `true` if the place is within the blend of one of several close waypoints around a leg, and in the box
+    /// of all of them.
     fn is_in_row(&self, leg: usize, q: &JointVec) -> bool {
         [leg, leg + 1].into_iter().any(|at| {
             let row = &self.waypoints[row(&self.waypoints, at, self.blend)];
@@ -258,7 +260,7 @@ impl Case {
     }
 }
 
-/// Waypoints closer to each other than the blend, of which some may be left out.
+/// Waypoints closer to each other than the blend: some may be left out.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);
@@ -271,7 +273,7 @@ fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusiv
     from.saturating_sub(1)..=(to + 1).min(waypoints.len() - 1)
 }
 
-/// A walk inside the position limits, some of whose waypoints repeat, go straight on or go back.
+/// A walk inside the position limits with some waypoints that repeat, go straight on or go back.
 fn waypoints(rng: &mut fastrand::Rng, count: usize, limits: &Limits) -> Vec<JointVec> {
     let size = *rng.choice(&[0.002, 0.05, 0.3, 1.0]).unwrap_or(&0.3);
     let inside = |q: JointVec| -> JointVec {

@@ -34,7 +34,7 @@ pub fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
 /// Two turns for each joint.
 pub const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
 
-/// Leg, distance, and what is there.
+/// Returns leg, distance, and error on the leg.
 pub fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
     match error {
         PoseError::Leg { leg, distance, source, .. } => (leg, distance, *source),

@@ -74,7 +74,7 @@ pub fn jaco2() -> ArmModel {
     ])
 }
 
-/// An arm of no particular geometry.
+/// An arm without a particular geometry.
 pub fn crooked() -> ArmModel {
     let joints = [
         ([0.02, 0.01, 0.12], [0.1, 0.2, 0.3]),
@@ -88,8 +88,8 @@ pub fn crooked() -> ArmModel {
     ArmModel { joints: joints.map(|(xyz, rpy)| Origin { xyz, rpy }), ..ArmModel::default() }
 }
 
-/// Arms for the geometries that the others do not have: a spherical wrist behind axes 2 and 3 that meet, or behind axes 1 and 2 that
-/// are parallel; the numbers are our own.
+/// Arms for the geometries that the others do not have: a spherical wrist after axes 2 and 3 that meet, or after axes 1
+/// and 2 that are parallel; the parameters are our own.
 pub fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     let half = FRAC_PI_2;
     let wrist = [[0.4, 0.0, -half], [0.0, 0.0, half], [0.1, 0.0, 0.0]];
@@ -100,7 +100,7 @@ pub fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     ]
 }
 
-/// Each of them with its name.
+/// Returns all arms with their names.
 pub fn named() -> [(&'static str, ArmModel); 6] {
     [
         ("avena", avena()),
@@ -112,7 +112,7 @@ pub fn named() -> [(&'static str, ArmModel); 6] {
     ]
 }
 
-/// Each of them.
+/// Returns all arms.
 pub fn all() -> Vec<ArmModel> {
     named().into_iter().map(|(_, model)| model).collect()
 }
@@ -123,7 +123,7 @@ fn product(a: &Mat3, b: &Mat3) -> Mat3 {
     std::array::from_fn(|i| std::array::from_fn(|k| (0..3).map(|j| a[i][j] * b[j][k]).sum()))
 }
 
-/// How far two poses are apart, m and rad.
+/// Returns the distance of two poses, m and rad.
 pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let shift = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
     // The chord between rotations is 2·√2·sin of half the angle.
@@ -131,7 +131,7 @@ pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     (shift, 2.0 * (chord.sum::<f64>().sqrt() / 8f64.sqrt()).min(1.0).asin())
 }
 
-/// The pose of the flange by forward kinematics as J-40 writes it, without the project's.
+/// Returns the pose of the flange by forward kinematics as J-40 writes it, independent of the project's.
 pub fn pose(model: &ArmModel, q: &JointVec) -> Pose {
     let about = |axis: usize, angle: f64| {
         let (s, c) = angle.sin_cos();

@@ -1,4 +1,4 @@
-//! Whether a controller takes the gains of an arm (J-71), and whether they damp it.
+//! Checks of the gains: acceptance by a controller (J-71), and damping of the arm.
 
 use host_kit::Severity;
 use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
@@ -9,15 +9,15 @@ use super::ArmFinding;
 use crate::arm::Arm;
 use crate::arm::statics::{POSES, pose};
 
-/// Heaviest payload for which the damping is looked at, kg.
+/// Heaviest payload for the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Delay of the position gain beside that of the controller's setting, and the length of a tick, s: half of a tick, for which a torque
-/// is held.
+/// Delay of the position gain in addition to the controller's setting (half a tick, because a torque is held for one tick), and
+/// the length of a tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
 impl Arm {
-    /// Joints that are too light for their gains, which a controller refuses, and joints that their gains do not damp.
+    /// Finds joints that are too light for their gains, which a controller refuses, and joints that their gains do not damp.
     pub(super) fn find_borne(&self, findings: &mut Vec<ArmFinding>) {
         let Some(pid) = &self.pid else { return };
         let (config, delay) = (self.config(), self.config().delay_ticks);
@@ -25,7 +25,7 @@ impl Arm {
         let (payload, moved) = self.heaviest_moved();
         for (joint, gains) in Joint::ALL.into_iter().zip(pid) {
             let j = joint.index();
-            // What is found for stability says more.
+            // A stability finding for the joint is more precise.
             if findings.iter().any(|found| found.code == "gains" && found.joint == Some(joint)) {
                 continue;
             }
@@ -74,7 +74,7 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}: {needed:.1} is needed",
             self.titled(joint)
         );
-        // What the delay of Kp leaves of Kd is for the integral.
+        // The integral can use the part of Kd that the delay of Kp leaves.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(
@@ -89,8 +89,8 @@ impl Arm {
             .measured(*kd, needed, "N·m·s/rad")
     }
 
-    /// The heaviest payload up to [`PAYLOAD_MAX`] that the torque limits hold in every pose, kg, and the greatest inertia that each joint
-    /// moves with it, the others held, kg·m².
+    /// Returns the heaviest payload up to [`PAYLOAD_MAX`] that the torque limits hold in every pose, kg, and for each joint the
+    /// greatest inertia with this payload while the other joints are held, kg·m².
     fn heaviest_moved(&self) -> (f64, JointVec) {
         let ranges = self.ranges();
         let bare = Dynamics::new(&self.model, self.config().gravity);

@@ -1,11 +1,11 @@
-//! Limits of joints that are no limits.
+//! Invalid limits of joints.
 
 use jtc_core::settings::{self, Setting};
 use jtc_wire::Joint;
 
 use crate::arm::Arm;
 
-/// What is wrong with a limit.
+/// Fault of a limit.
 pub(in crate::arm) struct LimitFault {
     pub key: &'static str,
     pub value: f64,
@@ -13,7 +13,7 @@ pub(in crate::arm) struct LimitFault {
 }
 
 impl Arm {
-    /// Limits without meaning, joint by joint.
+    /// Returns the invalid limits of all joints.
     pub(in crate::arm) fn limit_faults(&self) -> Vec<(Joint, LimitFault)> {
         let mut all = Vec::new();
         for (joint, limits) in Joint::ALL.into_iter().zip(&self.joints) {

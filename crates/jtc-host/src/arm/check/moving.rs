@@ -1,4 +1,4 @@
-//! Whether the drives hold an arm in every pose, and whether its gains suit what they move.
+//! Checks that the drives hold an arm in every pose, and that its torque limits are in the right unit.
 
 use host_kit::Severity;
 use jtc_core::JOINTS;
@@ -8,9 +8,9 @@ use super::{ArmFinding, Holding};
 use crate::arm::Arm;
 use crate::arm::statics::{Worst, worst_gravity};
 
-/// Share of the torque limit above which gravity leaves little for motion.
+/// Share of the torque limit above which gravity leaves little torque for motion.
 const LITTLE_LEFT: f64 = 0.8;
-/// Torque limits so many times above what gravity asks of any joint are suspected to be in another unit.
+/// Ratio of the greatest torque limit to the greatest gravity torque above which the unit of the limits is suspected to be wrong.
 const FAR_ABOVE: f64 = 15.0;
 
 impl Arm {
@@ -66,7 +66,7 @@ impl Arm {
         holding
     }
 
-    /// Torque limits far beyond what the arm weighs: kg·cm, say, or a number to fill a field.
+    /// Finds torque limits far above the gravity torques: a limit in kg·cm, for example, or an arbitrary number.
     fn find_unit(&self, holding: &[Holding], findings: &mut Vec<ArmFinding>) {
         let most = |of: fn(&Holding) -> f64| holding.iter().map(of).fold(0.0, f64::max);
         let (torque, limit) = (most(|h| h.torque_nm), most(|h| h.limit_nm));

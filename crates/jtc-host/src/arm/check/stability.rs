@@ -1,4 +1,4 @@
-//! Whether the gains keep the arm stable, and how far its rotor inertias may be from those of the file.
+//! Check of the gains for stability, and the tolerated range of the rotor inertias.
 
 use host_kit::{Finding, Severity};
 use jtc_core::{JOINTS, PidGains};
@@ -11,18 +11,18 @@ use crate::arm::statics::{Inertia, inertia};
 use crate::arm::{Arm, RotorMargin, Source};
 use crate::error::ParametersError;
 
-/// How far the rotor inertias may be from those of the file.
+/// Tolerated factors of the rotor inertias, relative to the file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RotorMargins {
-    /// All of them by the same factor.
+    /// Factors if all rotor inertias change together.
     pub all: RotorMargin,
-    /// Each by itself, base to wrist.
+    /// Factors if the inertia of one rotor changes alone, base to wrist.
     pub joints: [RotorMargin; JOINTS],
 }
 
 impl Arm {
-    /// Refuses gains with which the arm is not stable, and gains that a controller refuses with it (J-71), as [`Arm::check`] does. Where
-    /// gains are not given, there is nothing to compare.
+    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), as [`Arm::check`] does. If the arm has no
+    /// gains, there is nothing to check.
     ///
     /// # Errors
     ///
@@ -42,8 +42,8 @@ impl Arm {
         }
     }
 
-    /// Why the gains are not stable, joint by joint; else how far the rotors may be from those of the file. `None` where gains or
-    /// rotors are not given.
+    /// Finds unstable gains for each joint. If all are stable, returns the tolerated factors of the rotor inertias; `None` if
+    /// gains or rotor inertias are not given.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
         let delay = self.config().delay_ticks;
@@ -117,7 +117,7 @@ impl Arm {
         Some(found.of(joint, "pid"))
     }
 
-    /// Rotors that nobody has measured, and gains that do not tolerate how far such a proposal may be off.
+    /// Finds gains that do not tolerate the uncertainty of rotor inertias that were proposed, not measured.
     fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
         let name = "rotor_inertia_kg_m2";
         let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
@@ -161,9 +161,9 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
     ArmFinding::new(Severity::Good, "gains", what)
 }
 
-/// `0.08..12`, with two digits that are on the safe side.
+/// Formats a range such as `0.08..12`, with two digits, rounded to the safe side.
 fn range(down: f64, up: f64) -> String {
-    // What is a number of two digits stays one.
+    // Keeps a value that already has two digits.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

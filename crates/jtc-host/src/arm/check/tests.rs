@@ -1,4 +1,4 @@
-//! Each finding is made by what it is about, and by nothing else.
+//! Each fault of an arm causes its finding, and no other.
 
 use proptest::prelude::*;
 
@@ -11,7 +11,7 @@ fn of(from: &str, to: &str) -> Arm {
     toml_form::read(&AVENA_TOML.replacen(from, to, 1)).unwrap()
 }
 
-/// Findings that are not good, as code, severity and joint.
+/// Returns the findings that are not good, as code, severity and joint.
 fn found(arm: &Arm) -> Vec<(&'static str, Severity, Option<u8>)> {
     let bad = arm.check().findings.into_iter().filter(|f| f.finding.severity != Severity::Good);
     bad.map(|f| (f.code, f.finding.severity, f.joint.map(Joint::number))).collect()
@@ -74,7 +74,7 @@ fn what_is_missing_is_said_and_only_what_no_controller_starts_without_is_refused
     assert_eq!(lacking("gravity"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("rotor"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("velocity_max"), (vec![("default", Warning, None)], false));
-    // The table is friction as well.
+    // The table is also friction.
     assert_eq!(lacking("friction_polynomial"), (vec![], false));
 }
 
@@ -91,7 +91,7 @@ fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
     assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
     let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
     assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
-    // Where positions are limited, gravity may ask for less.
+    // With narrower position ranges gravity may need less torque.
     let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
     let mut narrow = Arm { ..narrow };
     (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);
@@ -109,7 +109,7 @@ fn torque_limits_in_another_unit_are_suspected() {
     assert!(found(&arm).contains(&("unit", Severity::Warning, None)));
 }
 
-/// Never with the words that a controller takes the arm: each is refused.
+/// Unstable gains are refused, and never reported as accepted.
 #[test]
 fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     use Severity::Problem;
@@ -133,7 +133,7 @@ fn j41_j71_gains_that_are_not_stable_are_refused_joint_by_joint() {
     assert_eq!(with(&|pid| pid.iter_mut().for_each(|g| g.kd *= 1.2)), of(&[]));
 }
 
-/// Rotor inertias with which the same gains are stable still, and a little further are not.
+/// Within the margins of the rotor inertias the gains are stable; slightly outside they are not.
 #[test]
 fn j71_the_rotor_margin_is_where_the_check_changes() {
     let arm = Arm::avena();
@@ -160,7 +160,7 @@ fn j71_the_rotor_margin_is_where_the_check_changes() {
     assert!(words(&arm).contains(" times the rotor inertias; each joint alone "), "{}", words(&arm));
 }
 
-/// As long as nobody has measured them, rotors may be off by more than a measured one.
+/// The tolerance for proposed rotor inertias is wider than for measured ones.
 #[test]
 fn gains_that_do_not_tolerate_a_proposed_rotor_are_refused() {
     let with = |proposed: bool, factor: f64| {
@@ -190,7 +190,7 @@ fn proposals_are_found_with_their_joints() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever a number is: it is found wrong or is none, and no check fails on it.
+    /// The check handles every number without a panic, and refuses an arm with a number that is not finite.
     #[test]
     fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
         let mut arm = Arm::avena();
@@ -216,7 +216,7 @@ proptest! {
     }
 }
 
-/// What a controller would refuse is refused here, with the joint and what it may have.
+/// Gains that a controller would refuse are refused here, with the joint and the allowed inertia.
 #[test]
 fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let mut arm = Arm::avena();
@@ -224,10 +224,10 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let findings = arm.check().findings;
     let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
     assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
-    // It is stable, with little reserve: that much the other check knows.
+    // The gains are stable with little reserve, so the stability check finds no problem.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
-    // Also where the rotors are not given, and nothing is known of stability.
+    // The check also works if the rotor inertias are not given and stability is unknown.
     let mut arm = Arm { rotors_given: [false; JOINTS], ..Arm::avena() };
     arm.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 0.0);
     assert!(arm.check_gains().is_ok());
@@ -235,7 +235,7 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     assert!(arm.check_gains().is_err());
 }
 
-/// An integral that a heavy load makes too strong is warned of, and the advice helps.
+/// An integral gain that is too strong for a heavy load causes a warning, and its advice removes the warning.
 #[test]
 fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warned = |ki: f64| {

@@ -1,4 +1,4 @@
-//! Why a pose cannot be used or saved.
+//! Errors of using and saving poses.
 
 use std::path::PathBuf;
 
@@ -8,11 +8,11 @@ use jtc_wire::Joint;
 use super::NAME_MAX;
 use crate::file::FileError;
 
-/// Why a pose cannot be used or saved.
+/// Reason why a pose cannot be used or saved.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// A name that no waypoint file or option could hold.
+    /// The name does not fit into a waypoint file or an option.
     #[error(
         "\"{name}\" is no name of a pose: it begins with a letter, has letters, digits, _, - and . only, {NAME_MAX} at most, and is no number \
          (nan, inf)"
@@ -21,33 +21,33 @@ pub enum PoseError {
         /// The name.
         name: String,
     },
-    /// No pose of this name.
+    /// The arm does not have a pose of this name.
     #[error("the arm {arm} has no pose \"{name}\"{}", known_words(known))]
     Unknown {
         /// The name.
         name: String,
         /// Name of the arm.
         arm: String,
-        /// The poses that it has.
+        /// Names of the existing poses.
         known: Vec<String>,
-        /// That one of them which looks most like it.
+        /// Most similar name of an existing pose.
         like: Option<String>,
     },
-    /// The arm cannot be there.
+    /// The pose is outside the arm's limits.
     #[error("pose \"{name}\", {joint}: {value} rad is outside {min}..{max} rad")]
     Outside {
         /// Name of the pose.
         name: String,
-        /// Of this joint.
+        /// Joint outside its limits.
         joint: Joint,
-        /// rad.
+        /// Position of the joint in the pose, rad.
         value: f64,
-        /// rad.
+        /// Lower limit, rad.
         min: f64,
-        /// rad.
+        /// Upper limit, rad.
         max: f64,
     },
-    /// A pose of this name is there already.
+    /// A pose of this name exists already.
     #[error("{}: pose \"{name}\" is there already", path.display())]
     Exists {
         /// The arm file.

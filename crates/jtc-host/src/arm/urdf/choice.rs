@@ -1,4 +1,4 @@
-//! Which joints of a robot description are the arm's six.
+//! Selection of the arm's six joints in a robot description.
 //!
 //! Terms: a *rotary* joint is a revolute or a continuous one; a joint that is not fixed and not among the six is *held* at
 //! zero, as if it were fixed: the finger of a gripper, the wheel of a cart, the seventh joint of a redundant arm.
@@ -11,7 +11,7 @@ use urdf_rs::{Joint, JointType, Robot};
 use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
 
-/// The six, base to wrist, each carried by the one before it.
+/// Returns the six joints, base to wrist, each carried by the one before it.
 pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {
     no_loops(robot)?;
     let candidates: Vec<&Joint> = match (&choice.joints, &choice.tip) {
@@ -37,12 +37,12 @@ pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Jo
     Ok(six)
 }
 
-/// An error about a joint.
+/// Returns an error about a joint.
 pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
     FileError::at(Place::name(format!("joint {}", joint.name)), problem)
 }
 
-/// An error about what the user named.
+/// Returns an error about the joints or links that the user named.
 fn unfit(problem: impl Into<String>) -> FileError {
     FileError::choice(Place::default(), problem)
 }
@@ -59,12 +59,12 @@ fn above<'a>(robot: &'a Robot, link: &str) -> Option<&'a Joint> {
     robot.joints.iter().find(|j| j.child.link == link)
 }
 
-/// Joints between `link` and the root, the nearest to `link` first. No loops are in their way.
+/// Returns the joints between `link` and the root, the nearest to `link` first. The description must have no loops.
 fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
     std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
 }
 
-/// Every way up ends.
+/// Checks that each chain of parents ends.
 fn no_loops(robot: &Robot) -> Result<(), FileError> {
     for joint in &robot.joints {
         let mut at = joint;
@@ -79,7 +79,7 @@ fn no_loops(robot: &Robot) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Joints from the root to `link`, in this order.
+/// Returns the joints from the root to `link`, in this order.
 fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError> {
     if !robot.links.iter().any(|l| l.name == link) {
         let links: Vec<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
@@ -90,7 +90,7 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
     Ok(way)
 }
 
-/// Those that are not fixed and follow no other joint, the ones nearer to the root first.
+/// Returns the joints that are not fixed and do not follow another joint, those nearer to the root first.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
     let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();
@@ -98,7 +98,7 @@ fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     joints
 }
 
-/// Those that the user named.
+/// Returns the joints that the user named.
 fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, FileError> {
     let find = |name: &String| -> Result<&'a Joint, FileError> {
         let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
@@ -120,7 +120,7 @@ fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, File
     Ok(joints)
 }
 
-/// The first that is not carried by the one before it.
+/// Returns the first joint that is not carried by the joint before it.
 fn first_branch<'a>(robot: &'a Robot, joints: &[&'a Joint]) -> Option<&'a Joint> {
     joints.windows(2).map(|pair| (pair[0], pair[1])).find_map(|(below, joint)| {
         (!way_down(robot, &joint.parent.link).any(|j| j.name == below.name)).then_some(joint)
@@ -135,9 +135,9 @@ fn kind(joint: &Joint) -> String {
     format!("{:?}", joint.joint_type).to_lowercase()
 }
 
-/// Why these are no six-axis arm, and how to select the joints.
+/// Returns the error that says why the joints are not a six-axis arm, and how to select the joints.
 fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
-    // The longest chain of rotary joints.
+    // Finds the longest chain of rotary joints.
     let chain_to = |end: &Joint| -> Vec<&Joint> {
         let way = way_to(robot, &end.child.link).unwrap_or_default();
         way.into_iter().filter(|j| rotary(j) && candidates.iter().any(|c| c.name == j.name)).collect()

@@ -1,4 +1,4 @@
-//! Rigid frames and bodies, for putting links together.
+//! Rigid frames and bodies, for merging links.
 
 use jtc_dynamics::{Link, Origin};
 
@@ -6,7 +6,7 @@ type Matrix = [[f64; 3]; 3];
 
 const UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// A frame in its parent.
+/// Frame relative to its parent.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Frame {
     rotation: Matrix,
@@ -28,7 +28,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
 impl Frame {
     pub const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
 
-    /// Rz(yaw)·Ry(pitch)·Rx(roll), as URDF defines.
+    /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll), as URDF defines.
     pub fn of(origin: &Origin) -> Self {
         let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(f64::sin_cos);
         Self {
@@ -41,7 +41,7 @@ impl Frame {
         }
     }
 
-    /// Back to xyz and rpy; where roll and yaw turn about one axis, yaw is 0.
+    /// Returns xyz and rpy; if roll and yaw turn about the same axis, yaw is 0.
     pub fn origin(&self) -> Origin {
         let r = &self.rotation;
         let cos_pitch = r[0][0].hypot(r[1][0]);
@@ -58,7 +58,7 @@ impl Frame {
         *self == Self::IDENTITY
     }
 
-    /// `next` placed in this frame, seen from this frame's parent.
+    /// Transforms the frame `next` from this frame into this frame's parent.
     pub fn then(&self, next: &Self) -> Self {
         let moved = applied(&self.rotation, &next.position);
         Self {
@@ -73,12 +73,12 @@ impl Frame {
         Self { rotation, position }
     }
 
-    /// A direction of this frame, seen from its parent.
+    /// Transforms a direction of this frame into its parent.
     pub fn direction(&self, direction: &[f64; 3]) -> [f64; 3] {
         applied(&self.rotation, direction)
     }
 
-    /// A rotation that takes z to `axis`; `None` when the axis has no direction.
+    /// Returns a rotation that takes z to `axis`; `None` if the axis has no direction.
     pub fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
         let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !(norm > 1e-9 && norm.is_finite()) {
@@ -98,7 +98,7 @@ impl Frame {
     }
 }
 
-/// Mass, centre and inertia about the centre, in some frame.
+/// Mass, centre and inertia about the centre, relative to a frame.
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     mass: f64,
@@ -109,7 +109,7 @@ pub(super) struct Body {
 impl Body {
     pub const NONE: Self = Self { mass: 0.0, centre: [0.0; 3], inertia: [[0.0; 3]; 3] };
 
-    /// In the link's frame.
+    /// Creates the body of a link in the link's frame.
     pub fn of(link: &Link) -> Self {
         let [xx, xy, xz, yy, yz, zz] = link.inertia;
         let own = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
@@ -118,7 +118,7 @@ impl Body {
         Self { mass: link.mass, centre: link.origin.xyz, inertia }
     }
 
-    /// The same body from outside of `frame`.
+    /// Transforms the body from `frame` into its parent.
     pub fn seen_from(&self, frame: &Frame) -> Self {
         let turned = applied(&frame.rotation, &self.centre);
         Self {
@@ -128,7 +128,7 @@ impl Body {
         }
     }
 
-    /// Inertia about `point` (Steiner).
+    /// Returns the inertia about `point` (Steiner).
     fn about(&self, point: &[f64; 3]) -> Matrix {
         let d: [f64; 3] = std::array::from_fn(|i| self.centre[i] - point[i]);
         let square: f64 = d.iter().map(|v| v * v).sum();
@@ -156,7 +156,7 @@ impl Body {
         };
     }
 
-    /// As a link whose inertia frame is parallel to the link's.
+    /// Returns a link whose inertia frame is parallel to the link's frame.
     pub fn link(&self) -> Link {
         let i = &self.inertia;
         Link {

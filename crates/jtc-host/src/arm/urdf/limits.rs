@@ -1,4 +1,4 @@
-//! Limits of a robot description's joints, and what the drives can do of them.
+//! Joint limits of a robot description, narrowed to the range of the drives.
 
 use std::f64::consts::PI;
 
@@ -11,14 +11,15 @@ use super::choice::about;
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
-/// Most that a multi-turn joint has to either side, rad. Greater numbers are degrees.
+/// Largest position limit of a multi-turn joint to either side, rad. Larger numbers are taken for degrees.
 const TWO_TURNS: f64 = 4.0 * PI;
-/// A turn, with the digits that descriptions round it to, rad.
+/// A full turn, as descriptions round it, rad.
 const TURN: f64 = 6.3;
-/// No arm turns a joint faster, rad/s: 900 °/s are the fastest wrists. Greater numbers are degrees per second, or fill the field.
+/// Largest credible velocity limit of a joint, rad/s: the fastest wrists reach 900 °/s. Larger numbers are degrees per second, or
+/// placeholders.
 const BELIEVABLE_SPEED: f64 = 16.0;
 
-/// As many digits as a person reads.
+/// Rounds to four decimals.
 pub(super) fn short(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
@@ -27,14 +28,14 @@ fn is_limit(value: f64) -> bool {
     value > 0.0 && value.is_finite()
 }
 
-/// The highest velocity limit that the drives take, rad/s.
+/// Returns the highest velocity limit that the drives accept, rad/s.
 fn fastest() -> f64 {
     let drives = Config::avena();
     drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor
 }
 
-/// Refuses position limits that are no range in rad: another number is not guessed, because the widest range that the drives have
-/// would take the arm into its stops. Whether both limits are beyond a turn, as those of some wrists are.
+/// Rejects position limits that are not a valid range in rad. The reader does not replace them, because the widest range of the
+/// drives would take the arm into its stops. Returns `true` if both limits are beyond one turn, as for some wrists.
 fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
@@ -74,7 +75,8 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
 }
 
 impl Chain<'_> {
-    /// The limits of all six. What is not given is as for the default arm, or as far as the drives go, and known as such.
+    /// Returns the limits of all six joints. Missing limits are those of the default arm or of the drives, and are marked as
+    /// such.
     pub(super) fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
         let mut all = Arm::avena().joints;
         for (number, joint) in Number::ALL.into_iter().zip(self.rotary) {
@@ -105,7 +107,7 @@ impl Chain<'_> {
                 self.sources.fill_in((Some(number), key));
             }
         }
-        // As far as the drives go where there is no limit; whether the mechanism has a stop is not given.
+        // Without a limit, uses the range of the drives; the description does not say if the mechanism has a stop.
         let mut assumed = Vec::new();
         for (key, limit, end) in [
             ("position_min_rad", &mut to.position_min, -WORKING_AREA),
@@ -137,7 +139,7 @@ impl Chain<'_> {
         if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
         } else if is_limit(limit.velocity) {
-            // The slower of what it can mean: the drives' own end is no limit that anybody gave.
+            // Uses the slower of the two meanings; a limit that only the drives impose is marked as not given.
             let in_degrees = limit.velocity.to_radians();
             to.velocity_max = in_degrees.min(fastest());
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));
@@ -167,8 +169,8 @@ impl Chain<'_> {
         }
     }
 
-    /// A description gives the limits of the mechanism. Its drives may do less, and the controller refuses limits beyond that
-    /// (J-35, J-43).
+    /// Narrows the limits to those of the drives. A description gives the limits of the mechanism, and the controller refuses
+    /// limits beyond those of the drives (J-35, J-43).
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) -> Result<(), FileError> {
         let drives = Config::avena();
         let fastest = fastest();

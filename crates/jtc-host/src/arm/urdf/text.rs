@@ -1,14 +1,14 @@
-//! The text of a robot description before it is understood: how deep it nests, where its elements are, and what its reader would
-//! refuse without saying where.
+//! Text of a robot description before it is parsed: nesting depth, places of its elements, and faults for which the XML reader
+//! gives no place.
 
 use std::borrow::Cow;
 
 use crate::file::{FileError, Place, short};
 
-/// Deeper nesting than any description of an arm has.
+/// Maximum nesting depth; no description of an arm nests deeper.
 const DEPTH_MAX: usize = 32;
 
-/// A tag of the text: where it begins and ends, and how deep its element is (that of the whole description is 0).
+/// Tag of the text: begin, end, and depth of its element (the element of the whole description has depth 0).
 struct Tag<'a> {
     text: &'a str,
     begin: usize,
@@ -18,7 +18,7 @@ struct Tag<'a> {
     empty: bool,
 }
 
-/// The tags of a text, comments and declarations left out.
+/// Returns the tags of a text, without comments and declarations.
 fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
     let (mut at, mut depth) = (0, 0usize);
     std::iter::from_fn(move || {
@@ -49,7 +49,8 @@ fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
     })
 }
 
-/// Where a tag at the front of `rest` ends: a `>` in the value of an attribute does not end it. One that closes an element has none.
+/// Returns the end of a tag at the front of `rest`. A `>` in the value of an attribute does not end the tag; a closing tag has no
+/// attributes.
 fn end_of_tag(rest: &str) -> Option<usize> {
     if rest.starts_with("</") {
         return rest.find('>');
@@ -65,7 +66,7 @@ fn end_of_tag(rest: &str) -> Option<usize> {
     })
 }
 
-/// Refuses what nests too deep: the reader descends by recursion.
+/// Rejects a text that nests too deep, because the reader is recursive.
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
@@ -74,7 +75,7 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// The text with a velocity limit of 0, which is none, in each limit that has none: the reader insists on one.
+/// Adds a velocity limit of 0, which means no limit, to each limit without a velocity, because the reader requires one.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
     let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();
@@ -91,7 +92,7 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
-/// Names of the joints whose limits give neither a lower nor an upper position: the reader makes 0 of both.
+/// Returns the names of the joints whose limits give neither a lower nor an upper position; the reader sets both to 0.
 pub(super) fn without_ranges(text: &str) -> Vec<String> {
     let mut joints: Vec<(String, bool)> = Vec::new();
     for tag in tags(text).filter(|tag| !tag.closes) {
@@ -108,12 +109,12 @@ pub(super) fn without_ranges(text: &str) -> Vec<String> {
     lacking.filter_map(|(name, _)| name.strip_prefix("joint ").map(str::to_owned)).collect()
 }
 
-/// Whether a tag has one of these attributes.
+/// Returns `true` if a tag has one of these attributes.
 fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
     tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
 }
 
-/// The error of the reader about a text, at the element that it is about: the reader names what is wrong, not where.
+/// Returns the reader's error with the element that causes it, because the reader gives no place.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");
     let mut open = None;
@@ -135,7 +136,7 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
     FileError::form(format!("no URDF: {whole}"))
 }
 
-/// The first attribute of an element that should be a number and is none.
+/// Returns the first attribute of an element that must be a number and is not a valid number.
 fn no_number(element: &str) -> Option<String> {
     const NUMBERS: [&str; 16] = [
         "value",
@@ -168,7 +169,7 @@ fn no_number(element: &str) -> Option<String> {
     })
 }
 
-/// What an element is called: its kind and its name.
+/// Returns kind and name of an element.
 fn name(tag: &Tag) -> String {
     let kind = tag.text.trim_start_matches('<').split([' ', '\n', '\t', '\r', '>', '/']).next().unwrap_or("");
     let name = tag.text.split("name=").nth(1).and_then(|rest| rest.split(['"', '\'']).nth(1));

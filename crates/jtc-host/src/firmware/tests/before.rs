@@ -1,4 +1,4 @@
-//! Whether a board may be flashed: by what its controller reports, over which line, and for which image.
+//! Decision to flash a board, by the report of its controller, the line, and the image.
 
 use jtc_wire::{ControllerState, NodeState, can_flag};
 
@@ -24,7 +24,7 @@ fn an_arm_with_torque_is_not_dropped() {
             asked => assert!(asked.is_ok() && idle, "{state}: {asked:?}"),
         }
     }
-    // One drive is enough that may hold, be it on its way to that, in the reaction to a fault, or calibrating.
+    // A single drive that may hold is sufficient, also in a transition, in the reaction to a fault, or during calibration.
     board.set_status(|status| status.state = ControllerState::Error.into());
     for code in 0..=255 {
         board.set_status(|status| status.joints[5].state = NodeState::new(code));
@@ -42,7 +42,7 @@ fn who_cannot_be_asked_has_to_be_answered_for() {
     for before in [asked(&board, Some(false)), asked(&board, None), Before::default()] {
         assert!(before.to_confirm(&new).unwrap().contains("supported"), "{before:?}");
     }
-    // A line of another board is no answer of this one, whatever is on it; beside its own it does no harm.
+    // The report on another board's line is not a report of this board; in addition to its own line it does no harm.
     board.hold(true);
     let silent = asked(&board, Some(true));
     assert_eq!(silent.lines[0].answers, Answers::Nothing { bytes: 0 });
@@ -69,7 +69,7 @@ fn what_a_status_leaves_open_has_to_be_answered_for() {
     board.set_status(|status| status.can_current = can_flag::no_answer(2));
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
-    // It has not answered since the controller started.
+    // The joint has not answered since the controller started.
     board.set_status(|status| status.joints[2].state = NodeState::START);
     assert!(question().unwrap().contains("no answer from joint 3"));
     reset();
@@ -94,7 +94,7 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     super::super::fake::catalogue(folder.path(), &["nucleo-h743zi2"]);
     let listed = Image::read(&folder.path().join("nucleo-h743zi2.bin")).unwrap();
     assert!(!question(&listed).contains("cut short"));
-    // Bytes that are no status.
+    // Received bytes that do not form a status.
     let noise = crate::port::test::ScriptedPort::new(None, |_, _| vec![0x55; 3]);
     let answers = look(&mut Session::new(noise)).unwrap();
     assert!(matches!(answers, Answers::Nothing { bytes: 1.. }), "{answers:?}");
@@ -103,13 +103,13 @@ fn the_question_names_what_no_file_and_no_line_shows() {
     assert!(said.contains("--baud"), "{said}");
 }
 
-/// What a system kept while a person thought about the answer is no report of what the arm does now.
+/// Statuses that the system buffered while the operator considered the answer do not count as the present state of the arm.
 #[test]
 fn a_second_look_sees_what_is_then() {
     let board = Board::running(H745, None);
     let mut session = Session::new(Keeps { port: board.port(), kept: Vec::new() });
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: false, .. }));
-    // Minutes of statuses without torque, and then one is enabled.
+    // Minutes of statuses without torque are buffered, then a drive is enabled.
     session.port_mut().keep(Duration::from_secs(120));
     board.set_status(|status| status.joints[0].state = NodeState::ENABLED);
     assert!(matches!(look(&mut session).unwrap(), Answers::Controller { torque: true, .. }));
@@ -118,14 +118,14 @@ fn a_second_look_sees_what_is_then() {
     assert!(matches!(look(&mut session).unwrap(), Answers::Nothing { .. }));
 }
 
-/// A port of a system that keeps what nobody reads, and hands over a few bytes at a time.
+/// Port of a system that buffers unread data, and returns only a few bytes per read.
 struct Keeps {
     port: Box<dyn Port>,
     kept: Vec<u8>,
 }
 
 impl Keeps {
-    /// So long nobody reads.
+    /// Buffers data for `time`, as if the program did not read.
     fn keep(&mut self, time: Duration) {
         let (end, mut buffer) = (self.port.now() + time, [0; 4096]);
         while self.port.now() < end {
@@ -181,7 +181,7 @@ fn an_image_goes_onto_its_own_board_only() {
     let all = Permissions { assume_board: true, accept_supply: true };
     assert_eq!(ask(H745, &h745, Some(H745), none), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &h745, None, all), Err("other-board"));
-    // A label that is cut: the controller that runs there names the board, or a person.
+    // The label is cut: the running controller names the board, or the operator does.
     assert_eq!(ask("nucleo-h743zi2", &cut, None, none), Err("unnamed-board"));
     assert_eq!(ask("nucleo-h743zi2", &cut, None, Permissions { assume_board: true, ..none }), Ok(()));
     assert_eq!(ask("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), none), Ok(()));
@@ -189,9 +189,9 @@ fn an_image_goes_onto_its_own_board_only() {
         ask_over("nucleo-h743zi2", &cut, Some("nucleo-h743zi2"), Some(false), none),
         Err("unnamed-board")
     );
-    // Something else at the line is no board of this image, whatever a person says.
+    // A device on the line that is not a board for this image is always refused, even if the operator confirms.
     assert_eq!(ask(H745, &h745, Some("simulator"), all), Err("other-controller"));
-    // The supply of the core cannot be seen from outside: what runs on this very board has the right one.
+    // The supply of the core is not visible from outside: the program that runs on this board has the right one.
     let ldo = "nucleo-h745zi-q-ldo";
     for (board, other) in [(ldo, H745), (H745, ldo)] {
         assert_eq!(ask(board, &h745, None, none), Err("other-supply"));
@@ -205,7 +205,7 @@ fn an_image_goes_onto_its_own_board_only() {
     }
 }
 
-/// Not understood, which may be any board, is not a device of which it is known that it reports nothing.
+/// A report that is not understood may come from any board; it does not count as a device known to report nothing.
 #[test]
 fn a_controller_that_does_not_report_its_board_has_an_unknown_supply() {
     let link = StLink::new("NOD_H745ZIQ", &Board::running(H745, None), Behaviour::Ignores);

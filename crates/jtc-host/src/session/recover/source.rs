@@ -13,7 +13,7 @@ pub enum ParameterSource<'a> {
     /// No source: a controller that lacks parameters is rejected.
     #[default]
     None,
-    /// Defaults that are built into the controller.
+    /// Defaults of the controller: built into it, or stored there.
     ControllerDefaults,
     /// All parameters of an arm: a controller without torque always gets them.
     Arm {

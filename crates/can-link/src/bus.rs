@@ -8,20 +8,20 @@ use crate::{CanError, CanFrame, ControllerState};
 ///
 /// Implementations deliver frames of every other member in the order of the bus, and none of their own.
 pub trait CanBus {
-    /// Puts a frame on the bus. A full transmit queue is waited for; it is no error unless it stays full for seconds, as on a
-    /// bus where nobody acknowledges.
+    /// Sends a frame. Waits while the transmit queue is full; this is an error only if the queue stays full for seconds, for
+    /// example because no other member acknowledges.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
     /// The next frame of another member; `None` when none came within `timeout`. Zero does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
-    /// How this member's controller gets on with the bus, as far as is known from what was received so far.
+    /// Returns the state of this member's controller, as far as it is known from the frames received so far.
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
     }
 
-    /// How often this member's controller has left the bus, as far as is known from what was received so far. It may be back by
-    /// now: what was sent meanwhile is lost all the same. Nothing is asked of the adapter; 0 where it does not report.
+    /// Returns how often this member's controller has been bus-off, as far as it is known from the frames received so far. The
+    /// controller may be active again, but frames sent in between are lost. Does not ask the adapter; 0 if the adapter does not report it.
     fn times_bus_off(&self) -> u64 {
         0
     }

@@ -26,7 +26,7 @@ struct Sent<'a> {
     error_state_indicator: bool,
 }
 
-/// What matters of a received map; other keys are passed over.
+/// Relevant keys of a received map; other keys are ignored.
 #[derive(Deserialize)]
 struct Received {
     arbitration_id: u32,
@@ -67,7 +67,7 @@ pub(crate) fn encode(frame: &CanFrame) -> Vec<u8> {
     rmp_serde::to_vec_named(&sent).expect("numbers, flags and bytes can always be written")
 }
 
-/// The frame in a datagram; `None` for error frames and for all that is no valid frame.
+/// Returns the frame in a datagram; `None` for error frames and invalid frames.
 pub(crate) fn decode(datagram: &[u8]) -> Option<CanFrame> {
     let mut rest = datagram;
     let map: Received = rmp_serde::from_read(&mut rest).ok()?;

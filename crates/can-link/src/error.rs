@@ -1,4 +1,4 @@
-//! What can go wrong on a bus: while it is opened, and while it is used.
+//! Errors of a bus: while it is opened, and while it is used.
 
 use std::io;
 use std::net::IpAddr;
@@ -6,10 +6,10 @@ use std::net::IpAddr;
 use crate::CanFrame;
 use crate::url::UrlError;
 
-/// Why a bus could not be opened.
+/// Reasons why a bus could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The URL is none.
+    /// The URL is not valid.
     #[error(transparent)]
     Url(#[from] UrlError),
     /// A URL of a kind that this system cannot open.
@@ -17,7 +17,7 @@ pub enum OpenError {
     Unsupported {
         /// The URL.
         url: String,
-        /// Its scheme.
+        /// Scheme.
         kind: &'static str,
     },
     /// A rate that the adapter's protocol does not have.
@@ -25,22 +25,22 @@ pub enum OpenError {
     Rate {
         /// The bus.
         url: String,
-        /// Which rate.
+        /// Kind of rate.
         what: &'static str,
-        /// What was asked for, bit/s.
+        /// Requested rate, bit/s.
         rate: u32,
         /// All that there are, bit/s.
         possible: String,
     },
-    /// There is no way to the bus.
+    /// The bus cannot be reached.
     #[error(transparent)]
     Attach(#[from] AttachError),
-    /// The way is there, and the bus failed while it was set up.
+    /// The bus was reached, but failed while it was set up.
     #[error(transparent)]
     SetUp(#[from] CanError),
 }
 
-/// Why the way to a bus is closed: its network, server, serial port or interface.
+/// Reasons why the bus cannot be reached: its network, server, serial port or interface.
 #[derive(Debug, thiserror::Error)]
 pub enum AttachError {
     /// A multicast group could not be joined.
@@ -53,7 +53,7 @@ pub enum AttachError {
         group: IpAddr,
         /// The UDP port.
         port: u16,
-        /// What was tried.
+        /// Failed step.
         step: &'static str,
         /// The system's error.
         source: io::Error,
@@ -82,7 +82,7 @@ pub enum AttachError {
     Interface(#[from] InterfaceError),
 }
 
-/// Why a network interface cannot be used.
+/// Reasons why a network interface cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{url}: {source}: {hint}")]
 pub struct InterfaceError {
@@ -94,7 +94,7 @@ pub struct InterfaceError {
     pub source: io::Error,
 }
 
-/// Why an open bus failed.
+/// Reasons why an open bus failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CanError {
     /// Sending or receiving failed.
@@ -102,7 +102,7 @@ pub enum CanError {
     Io {
         /// The bus.
         url: String,
-        /// What was tried.
+        /// Failed step.
         step: &'static str,
         /// The system's error.
         source: io::Error,
@@ -113,7 +113,7 @@ pub enum CanError {
         /// The bus.
         url: String,
     },
-    /// The network interface has gone.
+    /// The network interface has disappeared.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
     /// A frame that this bus cannot carry.
@@ -123,46 +123,46 @@ pub enum CanError {
         url: String,
         /// The frame.
         frame: CanFrame,
-        /// What is missing.
+        /// Missing capability.
         why: &'static str,
     },
-    /// The server or adapter did not do what was asked.
+    /// The server or adapter did not carry out the request.
     #[error(transparent)]
     Answer(#[from] AnswerError),
 }
 
-/// Why a server or an adapter did not do what was asked.
+/// Reasons why a server or an adapter did not carry out a request.
 #[derive(Debug, thiserror::Error)]
 pub enum AnswerError {
-    /// It refused.
+    /// The server or adapter refused the request.
     #[error("{url}: {step} was refused: {answer}")]
     Refused {
         /// The bus.
         url: String,
-        /// What was asked for.
+        /// Refused step.
         step: &'static str,
-        /// Its answer.
+        /// Answer.
         answer: String,
     },
-    /// It speaks something else, or nothing.
+    /// The other side speaks another protocol, or does not answer.
     #[error("{url}: no answer to {step} within {seconds} s; {hint}")]
     NoAnswer {
         /// The bus.
         url: String,
-        /// What was asked for.
+        /// Unanswered step.
         step: &'static str,
-        /// How long was waited.
+        /// Time waited, s.
         seconds: u64,
-        /// What to look at.
+        /// Likely causes.
         hint: &'static str,
     },
 }
 
-/// Why a server could not listen.
+/// Reason why a server could not listen.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot listen at {address}: {source}; is another server running there? Port 0 takes a free one")]
 pub struct ListenError {
-    /// The address asked for.
+    /// Requested address.
     pub address: String,
     /// The system's error.
     pub source: io::Error,

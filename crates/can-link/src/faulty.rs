@@ -18,7 +18,7 @@ pub struct FaultConfig {
     pub duplication: f64,
     /// Probability that a frame is held back while others go past it.
     pub reordering: f64,
-    /// How long such a frame is held back, s.
+    /// Time for which such a frame is held back, s.
     pub reordering_hold_s: f64,
     /// Shortest delay of every frame, s; the order is kept.
     pub delay_min_s: f64,
@@ -30,15 +30,15 @@ pub struct FaultConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSchedule {
-    /// The same seed gives the same faults for the same frames.
+    /// Seed: equal seeds give equal faults for equal frames.
     pub seed: u64,
-    /// What the member sends.
+    /// Faults of frames that the member sends.
     pub send: FaultConfig,
-    /// What the member receives.
+    /// Faults of frames that the member receives.
     pub receive: FaultConfig,
 }
 
-/// How often each fault happened.
+/// Number of times that each fault happened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultStats {
     /// Frames that came in.
@@ -53,7 +53,7 @@ pub struct FaultStats {
     pub reordered: u64,
 }
 
-/// One direction: frames that are under way.
+/// Frames in transit in one direction.
 pub(crate) struct Line {
     faults: FaultConfig,
     random: fastrand::Rng,
@@ -64,7 +64,7 @@ pub(crate) struct Line {
     stats: FaultStats,
 }
 
-/// Seconds from a setting; an invalid one is no delay.
+/// Converts a setting in seconds; an invalid one means no delay.
 fn seconds(value: f64) -> Duration {
     Duration::try_from_secs_f64(value).unwrap_or_default()
 }
@@ -75,7 +75,7 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
-    /// Draws in the same number and order whatever happens: one setting does not change the others' faults.
+    /// Always draws the same number of random values in the same order: one setting does not change the others' faults.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -124,7 +124,7 @@ impl Line {
         self.under_way.first().map(|(due, _)| *due)
     }
 
-    /// Frames under way.
+    /// Returns the number of frames in transit.
     pub(crate) fn len(&self) -> usize {
         self.under_way.len()
     }
@@ -134,7 +134,7 @@ impl Line {
     }
 }
 
-/// A bus whose frames suffer faults on their way from and to this member.
+/// A bus whose frames from and to this member suffer faults.
 ///
 /// ```
 /// use can_link::{FaultConfig, Faulty, FaultSchedule, VirtualBus};
@@ -142,7 +142,7 @@ impl Line {
 /// let bus = Faulty::new(VirtualBus::join("lossy"), schedule);
 /// ```
 ///
-/// Frames under way to others leave while this member sends or receives.
+/// Frames in transit to others leave while this member sends or receives.
 pub struct Faulty<B> {
     bus: B,
     out: Line,
@@ -169,12 +169,12 @@ impl<B: CanBus> Faulty<B> {
         Self { bus, out, received, clock: Box::new(clock) }
     }
 
-    /// What happened so far to frames received.
+    /// Returns the counters of received frames.
     pub fn received_stats(&self) -> FaultStats {
         self.received.stats
     }
 
-    /// The bus without faults; frames under way are gone.
+    /// Returns the bus without faults; frames in transit are lost.
     pub fn into_inner(self) -> B {
         self.bus
     }
@@ -196,7 +196,7 @@ impl<B: CanBus> CanBus for Faulty<B> {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let start = (self.clock)();
-        // Waiting is counted as well as measured: a clock of virtual time may stand still meanwhile.
+        // Waiting is counted as well as measured, because a clock of virtual time may stand still during the wait.
         let mut waited = Duration::ZERO;
         loop {
             let now = (self.clock)();
@@ -307,7 +307,7 @@ mod tests {
             bench.faulty.send(&frame(number)).unwrap();
             assert_eq!((numbers(&mut bench.peer)[0] ^ number).count_ones(), 1);
         }
-        // Nothing to corrupt in an empty frame.
+        // An empty frame has no bit to corrupt.
         let empty = CanFrame::classic(Id::standard(1).unwrap(), &[]).unwrap();
         bench.faulty.send(&empty).unwrap();
         assert_eq!(bench.peer.receive(Duration::ZERO).unwrap(), Some(empty));

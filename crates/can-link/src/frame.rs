@@ -94,7 +94,7 @@ impl CanFrame {
         Ok(Self { len: len as u8, ..Self::made(id, Kind::Remote, &[]) })
     }
 
-    /// The same CAN FD frame with or without bit rate switch; other frames have none and stay as they are.
+    /// Returns a CAN FD frame with or without bit rate switch; other frames stay as they are.
     pub fn with_brs(mut self, brs: bool) -> Self {
         if let Kind::Fd { .. } = self.kind {
             self.kind = Kind::Fd { brs };
@@ -166,7 +166,7 @@ impl CanFrame {
     }
 }
 
-/// As `candump` writes: `123 # 11 22`, CAN FD with `##`, remote frames with `# R2`.
+/// Prints a frame as `candump` does: `123 # 11 22`, CAN FD with `##`, remote frames with `# R2`.
 impl fmt::Display for CanFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.id, if self.is_fd() { "##" } else { "#" })?;
@@ -183,7 +183,7 @@ impl fmt::Debug for CanFrame {
     }
 }
 
-/// Why there is no such frame.
+/// Reasons why a frame is not valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidFrame {
     /// More than 11 bits.

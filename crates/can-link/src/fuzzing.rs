@@ -7,8 +7,8 @@ use crate::socketcand::splitter::{LONGEST, Splitter};
 use crate::socketcand::text::{Reply, Request, push_frame, push_send};
 use crate::{CanFrame, SlcanAdapter};
 
-/// A stream of the socketcand protocol in any pieces: the messages are those that a look at the whole finds; memory is bounded;
-/// what is understood as a frame is understood again when it is written.
+/// A stream of the socketcand protocol in any pieces: the messages are those of the whole stream; memory is bounded; a frame
+/// that was parsed is parsed again when it is written.
 pub fn socketcand_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let mut splitter = Splitter::new();
@@ -57,8 +57,8 @@ fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     found
 }
 
-/// A stream of SLCAN lines in any pieces: the same as in one piece, for the reader of lines and for the adapter; what is
-/// understood as a frame is understood again when it is written.
+/// A stream of SLCAN lines in any pieces: the result is the same as in one piece, for the reader of lines and for the
+/// adapter; a frame that was parsed is parsed again when it is written.
 pub fn slcan_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let lines = |pieces: &mut dyn Iterator<Item = &[u8]>| {

@@ -12,7 +12,7 @@ use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 /// Bytes that may wait in the system for this member: some 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
-/// How long sending waits for the system to have room again.
+/// Longest wait for room in the system when sending.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
@@ -25,7 +25,7 @@ pub struct MulticastBus {
     /// Sends from a port of its own, so that its datagrams can be distinguished from those of others.
     sender: UdpSocket,
     own: SocketAddr,
-    /// What the listener is set to: `None` does not wait.
+    /// Timeout of the listener: `None` does not wait.
     timeout: Option<Duration>,
     ignored: u64,
 }
@@ -34,7 +34,7 @@ impl MulticastBus {
     /// Joins a group. With `ttl` 0 frames stay on this host; 1 lets them into the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
         let failed = |(step, source)| AttachError::Join { group, port, step, source };
-        // A host without a network has no default interface, but may still talk to itself by IPv4.
+        // A host without a network has no default interface, but may still communicate with itself by IPv4.
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
@@ -43,7 +43,7 @@ impl MulticastBus {
         Ok(Self { url, listener, sender, own, timeout: None, ignored: 0 })
     }
 
-    /// Datagrams so far that were no frames.
+    /// Returns the number of datagrams so far that were not frames.
     pub fn ignored(&self) -> u64 {
         self.ignored
     }
@@ -171,7 +171,7 @@ impl CanBus for MulticastBus {
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let mut buffer = [0; MAX_DATAGRAM];
         let deadline = Instant::now().checked_add(timeout);
-        // What is there already costs no change of the socket's settings.
+        // A datagram that has already arrived costs no change of the socket's settings.
         let mut wait = None;
         loop {
             self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;

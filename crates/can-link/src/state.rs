@@ -1,4 +1,4 @@
-//! How well a member's CAN controller gets on with its bus.
+//! State of a member's CAN controller on its bus.
 
 use std::fmt;
 
@@ -46,7 +46,7 @@ impl fmt::Display for ErrorState {
 /// Error state and error counters of a CAN controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ControllerState {
-    /// Where the counters put it.
+    /// State by the counters.
     pub errors: ErrorState,
     /// Transmit error counter, if the adapter reports it.
     pub tec: Option<u16>,

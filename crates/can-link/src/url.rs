@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use crate::{SOCKETCAND_PORT, SlcanOptions};
 
-/// What every system opens, for error messages.
+/// URL forms that every system opens, for error messages.
 pub(crate) const OPENABLE: &str =
     "slcan:DEVICE@RATE, socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
 
@@ -25,7 +25,7 @@ pub enum CanUrl {
     Slcan {
         /// Serial port, or `tcp:HOST:PORT`.
         device: String,
-        /// Bit rate of the bus behind the `@`, bit/s; none leaves the adapter's own.
+        /// Bit rate of the bus after the `@`, bit/s; `None` leaves the adapter's own.
         rate: Option<u32>,
         /// Bit rate of the data phase, bit/s; none leaves the adapter's own.
         data_rate: Option<u32>,
@@ -70,7 +70,7 @@ impl CanUrl {
     }
 }
 
-/// Why a text is no CAN URL.
+/// Reasons why a text is not a valid CAN URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UrlError {
     /// No scheme, or none of ours.
@@ -82,14 +82,14 @@ pub enum UrlError {
         /// The text.
         url: String,
     },
-    /// A part is missing or is not what it must be.
+    /// A part is missing or not valid.
     #[error("`{url}`: {what}; the form is {form}")]
     Part {
         /// The text.
         url: String,
-        /// What is wrong.
+        /// Error.
         what: &'static str,
-        /// How it must look.
+        /// Required form.
         form: &'static str,
     },
 }

@@ -9,10 +9,10 @@ use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 /// Frames that wait for a member at most.
 const QUEUE: usize = 4096;
 
-/// How long a sender waits for a member whose queue is full, if nothing else is asked for.
+/// Default time for which a sender waits for a member whose queue is full.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// A bus without a name, to be joined by whoever holds it.
+/// Bus without a name, joined through its handle.
 ///
 /// ```
 /// use std::time::Duration;
@@ -47,12 +47,12 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
-/// What waits for a member, in the order of arrival.
+/// Entries that wait for a member, in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Received {
     /// A frame of another member.
     Frame(CanFrame),
-    /// Its own controller is in this state now.
+    /// State of its own controller.
     State(ErrorState),
 }
 
@@ -60,11 +60,11 @@ struct Member {
     waiting: VecDeque<Received>,
     /// Frames that wait at most.
     limit: usize,
-    /// Nobody waits for it: it let a sender wait in vain and has taken nothing since, or is a guest.
+    /// No sender waits for the member: it let a sender wait in vain and has taken nothing since, or is a guest.
     stalled: bool,
     /// No sender ever waits for it.
     guest: bool,
-    /// It receives nothing at present.
+    /// The member receives nothing at present.
     deaf: bool,
     missed: u64,
 }
@@ -114,19 +114,19 @@ impl VirtualHub {
         Self::default()
     }
 
-    /// A bus where a sender waits so long for a member whose queue of 4096 frames is full (else 100 ms). A
-    /// member that takes nothing for so long misses frames from then on until it takes one: it must not stop
+    /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames is
+    /// full. A member that takes nothing for that long misses frames from then on until it takes one: it must not stop
     /// the bus for the others.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// A new member; it receives what is sent from now on.
+    /// Adds a member; it receives frames that are sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
 
-    /// A new member that nobody ever waits for: beyond `limit` frames it misses what is sent. It is deaf at first.
+    /// Adds a member for which no sender ever waits: beyond `limit` frames it misses frames. It is deaf at first.
     pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
         self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
     }
@@ -207,12 +207,12 @@ impl VirtualBus {
         self.membership.number
     }
 
-    /// The same member for another thread.
+    /// Returns a handle of this member for another thread.
     pub(crate) fn second_handle(&self) -> Self {
         Self { membership: Arc::clone(&self.membership) }
     }
 
-    /// Stops or starts receiving; what waits is forgotten when it stops.
+    /// Stops or starts receiving; waiting frames are dropped when it stops.
     pub(crate) fn set_deaf(&self, deaf: bool) {
         if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
             member.deaf = deaf;
@@ -301,7 +301,7 @@ impl CanBus for VirtualBus {
         }
     }
 
-    /// There are no errors inside a process.
+    /// A bus inside a process has no errors.
     fn state(&mut self) -> ControllerState {
         ControllerState::of_counters(0, 0)
     }

@@ -12,11 +12,11 @@ use ucom::{
 pub struct Described {
     /// Function, or why it is foreign.
     pub name: String,
-    /// `PC`, `board 3`, or both where the identifier does not show it.
+    /// `PC`, `board 3`, or both if the identifier does not show it.
     pub who: String,
-    /// Its contents.
+    /// Contents.
     pub text: String,
-    /// The same for programs.
+    /// Contents for programs.
     pub value: Value,
 }
 
@@ -226,7 +226,7 @@ pub fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// A flash date as text, `2026-05-04`; the bare number where the profile's form does not fit.
+/// Returns a flash date as text, `2026-05-04`; the bare number if it does not fit the profile's form.
 pub fn date_text(profile: &Profile, date: u16) -> String {
     match profile.prog_date.decode(date) {
         Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),

@@ -1,21 +1,21 @@
-//! What a word means that a screen shows, and what to do: status bits, states, heartbeats, events, outcomes, errors.
+//! Meaning of displayed words, and the next step: status bits, states, heartbeats, events, outcomes, errors.
 
 use ucom::ErrorCode;
 
 /// A word of a screen.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
-    /// What it is a word of.
+    /// Family of the word.
     pub family: &'static str,
     /// As it is shown; the first is its name.
     pub shown: Vec<String>,
-    /// What it means.
+    /// Meaning.
     pub meaning: String,
     /// The next command or act.
     pub next: String,
 }
 
-/// Family, words as they are shown, meaning, what to do.
+/// Family, displayed words, meaning, next step.
 type Fixed = (&'static str, &'static [&'static str], &'static str, &'static str);
 
 const BIT: &str = "status bit";

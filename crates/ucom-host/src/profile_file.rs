@@ -5,7 +5,7 @@ use std::fmt::Write;
 use ucom::Profile;
 use ucom::profile::{KEYS, Kind, ProfileError};
 
-/// Why a profile file is refused.
+/// Reasons why a profile file is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProfileFileError {
     /// Not TOML.
@@ -26,7 +26,7 @@ pub enum ProfileFileError {
         key: &'static str,
         /// The value in the file.
         value: String,
-        /// What is allowed.
+        /// Allowed values.
         range: &'static str,
     },
     /// Values that contradict each other.
@@ -70,7 +70,7 @@ pub trait ProfileFile: Sized {
     ///
     /// # Errors
     ///
-    /// Text that is no TOML, keys that no profile has, and values that do not fit: each with what would.
+    /// Text that is not TOML, unknown keys, and values that do not fit: each error names what would fit.
     fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
 
     /// All keys as TOML, each with its meaning in a comment.
@@ -128,7 +128,7 @@ fn capital(text: &str) -> String {
     characters.next().map(|first| first.to_uppercase().chain(characters).collect()).unwrap_or_default()
 }
 
-/// What `ucom help profile` prints: every key with default, range, rule and meaning.
+/// Returns the text of `ucom help profile`: every key with default, range, rule and meaning.
 pub fn profile_help() -> String {
     let mut text = String::from(
         "A profile defines how the boards on a bus read what the published description leaves open. It is a TOML\n\

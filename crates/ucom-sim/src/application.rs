@@ -1,4 +1,4 @@
-//! The application of a simulated board behind the words of the protocol.
+//! Application of a simulated board, connected to the words of the protocol.
 use super::file::BoardConfig;
 use super::model::Model;
 use super::texts::{Texts, latin1};
@@ -10,7 +10,7 @@ const UP_US: u64 = 60_000;
 /// Longest stretch of time that axes are moved in one go, s.
 const MOST_S: f64 = 5.0;
 
-/// The program of a board: its model behind the words of the protocol.
+/// Program of a board: its model, connected to the words of the protocol.
 #[derive(Clone, Debug)]
 pub(super) struct SimApplication {
     model: Model,
@@ -48,7 +48,7 @@ impl SimApplication {
 
     /// The axes move whether a program runs or not.
     pub fn pass(&mut self, now_us: u64) {
-        // What nothing drives has come to rest after that.
+        // After that time an axis without drive has come to rest.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;
@@ -57,14 +57,14 @@ impl SimApplication {
         }
     }
 
-    /// The power is gone: nothing drives the axes, and the program has forgotten everything.
+    /// Handles a power loss: the axes have no drive, and the program loses its state.
     pub fn power_lost(&mut self, now_us: u64) {
         self.pass(now_us);
         self.stop();
         self.debug.clear();
     }
 
-    /// Whether anything drives the axes.
+    /// Returns `true` if the axes are driven.
     pub fn is_driven(&self) -> bool {
         self.running && self.active
     }

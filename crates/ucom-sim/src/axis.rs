@@ -1,16 +1,16 @@
-//! One motor axis: what a board's application moves in a simulated chain.
+//! Motor axis that a board's application moves in a simulated chain.
 use serde::Deserialize;
 
 /// Step of the integration, s. Small against the fastest gains that the words of the protocol can hold.
 const STEP_S: f64 = 0.000_5;
-/// Motion slower than this stops where friction holds it, °/s.
+/// Speed below which friction stops the axis, °/s.
 const STANDS_DEG_S: f64 = 0.5;
 /// Ambient temperature, °C.
 pub(super) const AMBIENT_C: f64 = 24.0;
 /// Above this the axis limits its current, °C.
 const HOT_C: f64 = 80.0;
 
-/// What an axis is made of.
+/// Properties of an axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisConfig {
@@ -20,7 +20,7 @@ pub struct AxisConfig {
     pub min_deg: f64,
     /// Stops, degrees.
     pub max_deg: f64,
-    /// Where it is at power-up, degrees.
+    /// Position at power-up, degrees.
     pub start_deg: f64,
     /// Acceleration by current, °/s² for each mA.
     pub acceleration_per_ma: f64,
@@ -28,7 +28,7 @@ pub struct AxisConfig {
     pub damping_per_s: f64,
     /// Dry friction, °/s².
     pub friction_deg_s2: f64,
-    /// Acceleration by gravity at 90°, °/s²; negative where it rights itself.
+    /// Acceleration by gravity at 90°, °/s²; negative if the axis rights itself.
     pub gravity_deg_s2: f64,
 }
 
@@ -78,7 +78,7 @@ pub(super) struct Axis {
     pub current: f64,
     /// °C.
     pub temperature: f64,
-    /// The set point on its way, degrees.
+    /// Moving set point, degrees.
     pub reference: f64,
 }
 
@@ -98,7 +98,7 @@ impl Axis {
         &self.config
     }
 
-    /// Moves on; without a command the outputs are safe: no current, and the set point is where the axis is.
+    /// Advances the axis; without a command the outputs are safe: no current, and the set point is the position of the axis.
     pub fn advance(&mut self, seconds: f64, command: Option<&Command>) {
         let mut rest = seconds;
         while rest > 0.0 {
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!((axis.velocity, axis.reference), (0.0, axis.position));
     }
 
-    /// No gains that fit into the words of the protocol make figures that are none.
+    /// Gains that fit into the words of the protocol never lead to values that are not finite.
     #[test]
     fn wild_gains_stay_finite_and_within_the_stops() {
         let mut axis = Axis::new(&AxisConfig { gravity_deg_s2: 5000.0, ..Default::default() });

@@ -13,8 +13,8 @@ use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard
 
 /// While a frame waits for the bus, time passes inside the board in steps of this, µs.
 const WAIT_US: u64 = 500;
-/// So much later than the other one a board with a number that is not its own reacts, µs: no two boards answer in the same
-/// bit time for long, and frames that do destroy each other.
+/// Delay of a board with the number of another one relative to that board, µs: no two boards answer in the same bit time
+/// for long, because such frames destroy each other.
 const BEHIND_US: u64 = 5_000;
 
 pub(super) struct Board {
@@ -26,16 +26,16 @@ pub(super) struct Board {
     pub silent: bool,
     pub deaf: bool,
     pub ack_held: bool,
-    /// What it receives reaches it so much later, µs.
+    /// Delay of received frames, µs.
     behind_us: u64,
-    /// What it has still to receive, and when.
+    /// Delayed frames, with the time of their reception.
     coming: VecDeque<(u64, u32, Format, Payload)>,
     /// The frame that waits for the bus.
     waiting: Option<Frame>,
     /// An acknowledgement that does not leave.
     held: Option<Frame>,
     next_us: u64,
-    /// A state that cannot be, if there ever was one.
+    /// A state that no board can have, if it occurred.
     pub violation: Option<&'static str>,
 }
 
@@ -75,12 +75,12 @@ impl Board {
         }
     }
 
-    /// When it wants to be looked at next, µs.
+    /// Returns the time of its next action, µs.
     pub fn next_us(&self) -> u64 {
         if self.unpowered { u64::MAX } else { self.next_us }
     }
 
-    /// Time has come to `now_us`; a frame is what it puts into its controller.
+    /// Advances the time to `now_us`; returns the frame that the board puts into its controller.
     pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
         if self.unpowered {
             return None;
@@ -101,10 +101,10 @@ impl Board {
         out
     }
 
-    /// What faults leave of a frame that the board sends.
+    /// Applies the faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // Its controller believes that somebody acknowledged.
+            // Its controller takes the frame as acknowledged.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -130,7 +130,7 @@ impl Board {
         }
     }
 
-    /// Its frame was on the bus.
+    /// Reports that its frame was on the bus.
     pub fn sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -141,7 +141,7 @@ impl Board {
         }
     }
 
-    /// Its controller gave the frame up.
+    /// Reports that its controller gave the frame up.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -196,7 +196,7 @@ impl Board {
         }
     }
 
-    /// Its application crashes, the watchdog reboots it (D-26).
+    /// Crashes its application; the watchdog reboots the board (D-26).
     pub fn crash(&mut self, now_us: u64) {
         if !self.unpowered {
             self.waiting = None;
@@ -206,7 +206,7 @@ impl Board {
         }
     }
 
-    /// It takes this number, as by a PC_INIT that another board has taken already.
+    /// Takes this number, as by a PC_INIT that another board has taken already.
     pub fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -240,10 +240,10 @@ impl Board {
     }
 }
 
-/// What a board of the chain is doing; for tests and displays, nothing of it goes over the bus.
+/// State of a board of the chain; for tests and displays, nothing of it goes over the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardState {
-    /// It has power.
+    /// `true` if the board has power.
     pub powered: bool,
     /// S1 to S6.
     pub phase: Phase,
@@ -263,7 +263,7 @@ fn image(config: &BoardConfig) -> Vec<u8> {
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
     image.extend([0, 0]);
     let Some(wanted) = config.program_id else { return image };
-    // The last word makes the checksum what the file asks for.
+    // The last word adjusts the checksum to the one that the file requires.
     for word in 0..=u16::MAX {
         image.truncate(254);
         image.extend(word.to_le_bytes());

@@ -1,21 +1,21 @@
-//! Faults of a simulated chain: what, when, for how long.
+//! Faults of a simulated chain: kind, trigger, duration.
 use serde::Deserialize;
 
-/// What `ucom help faults` prints.
+/// Text of `ucom help faults`.
 pub const FAULT_HELP: &str = include_str!("fault.txt");
 
-/// What goes wrong.
+/// Kinds of faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FaultKind {
     /// A board has no power.
     PowerLoss,
-    /// Nothing that a board sends reaches the bus.
+    /// No frame of a board reaches the bus.
     Silent,
     /// A board receives nothing.
     Deaf,
     /// A board's application crashes; it reboots by its watchdog (D-26).
     Crash,
-    /// The init wire behind a board is broken.
+    /// The init wire after a board is broken.
     WireBroken,
     /// A board takes the number of the one before it, as when a PC_INIT was repeated blindly (D-24).
     SameNumber,
@@ -37,12 +37,12 @@ pub enum FaultKind {
     Disturbed(f64),
 }
 
-/// When a fault begins.
+/// Trigger of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// So many µs after the start.
+    /// Time after the start, µs.
     At(u64),
-    /// When the n-th frame with this identifier was on the bus.
+    /// The n-th frame with this identifier on the bus.
     Frame {
         /// Identifier.
         id: u16,
@@ -51,31 +51,31 @@ pub enum Trigger {
     },
 }
 
-/// One fault.
+/// Fault of the chain or of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What.
+    /// Kind.
     pub kind: FaultKind,
     /// Position of the board in the chain, from 1; 0 for faults of the bus.
     pub board: usize,
-    /// When.
+    /// Trigger.
     pub trigger: Trigger,
-    /// How long, µs; `None` for ever.
+    /// Duration, µs; `None` for ever.
     pub duration_us: Option<u64>,
 }
 
-/// Why a fault file cannot be used.
+/// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// Not TOML of this form; the text shows where and why.
+    /// Not TOML of this form; the text shows the place and the reason.
     #[error("{0}")]
     Form(String),
-    /// There is no such kind.
+    /// The kind does not exist.
     #[error("fault {fault}: there is no kind `{kind}`; kinds are {}", kinds().join(", "))]
     Kind {
         /// Number in the file, from 1.
         fault: usize,
-        /// As written.
+        /// Kind in the file.
         kind: String,
     },
     /// A key that this kind needs is missing.
@@ -105,7 +105,7 @@ pub enum FaultError {
         fault: usize,
         /// The key.
         key: &'static str,
-        /// What is allowed.
+        /// Allowed values.
         range: &'static str,
     },
 }
@@ -122,7 +122,7 @@ const OF_A_BOARD: [(&str, FaultKind); 8] = [
     ("flash-broken", FaultKind::FlashBroken),
 ];
 
-/// Those of the bus.
+/// Kinds that concern the bus.
 const OF_THE_BUS: [(&str, FaultKind); 2] =
     [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
 
@@ -228,7 +228,7 @@ impl Entry {
 }
 
 impl FaultKind {
-    /// Whether it concerns one board.
+    /// Returns `true` if the kind concerns one board.
     pub fn of_a_board(self) -> bool {
         OF_A_BOARD.iter().any(|(_, kind)| *kind == self)
     }

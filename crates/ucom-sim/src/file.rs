@@ -8,17 +8,17 @@ use ucom::profile::{Profile, ProfileError};
 
 /// The built-in chain: a humanoid head of ten boards.
 pub const HEAD: &str = include_str!("head.toml");
-/// What `ucom help sim` prints before the built-in chain.
+/// Text of `ucom help sim` before the built-in chain.
 const FORM: &str = include_str!("file.txt");
 /// Boards that a bus can number.
 const MOST_BOARDS: usize = 31;
 /// Axes whose words a DSP of that time could serve.
 const MOST_AXES: usize = 8;
 
-/// One board.
+/// Board of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Number of its bootloader; the low byte is what DSP_REPORT carries.
+    /// Number of its bootloader; DSP_REPORT carries the low byte.
     pub flash_id: u16,
     /// The description in DSP_INFO.
     pub description: String,
@@ -26,13 +26,13 @@ pub struct BoardConfig {
     pub program_id: Option<u16>,
     /// Flash date as a number.
     pub date: u16,
-    /// It has an application.
+    /// `true` if the board has an application.
     pub application: bool,
     /// Autostart is enabled.
     pub autostart: bool,
-    /// What its application moves.
+    /// Axes that its application moves.
     pub axes: Vec<AxisConfig>,
-    /// How it reads the protocol.
+    /// Profile of the board.
     pub profile: Profile,
 }
 
@@ -43,10 +43,10 @@ pub struct ChainConfig {
     pub boards: Vec<BoardConfig>,
 }
 
-/// Why a chain file cannot be used.
+/// Reasons why a chain file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum ChainFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
@@ -54,13 +54,13 @@ pub enum ChainFileError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// Not TOML of this form; the text shows where and why.
+    /// Not TOML of this form; the text shows the place and the reason.
     #[error("{0}")]
     Form(String),
     /// More boards than have numbers.
     #[error("{count} boards; a bus numbers at most {MOST_BOARDS}")]
     Boards {
-        /// So many.
+        /// Number of boards.
         count: usize,
     },
     /// More axes than a board has words for.
@@ -68,7 +68,7 @@ pub enum ChainFileError {
     Axes {
         /// Position in the file, from 1.
         board: usize,
-        /// So many.
+        /// Number of axes.
         count: usize,
     },
     /// The figures of an axis cannot be.
@@ -78,7 +78,7 @@ pub enum ChainFileError {
         board: usize,
         /// Position among the board's axes, from 1.
         axis: usize,
-        /// What is wrong.
+        /// Error.
         what: &'static str,
     },
     /// A text that the wire cannot carry.
@@ -98,7 +98,7 @@ pub enum ChainFileError {
         board: usize,
         /// The key.
         key: String,
-        /// Why not.
+        /// Reason.
         source: ProfileError,
     },
 }
@@ -146,7 +146,7 @@ fn one_axis() -> Vec<AxisConfig> {
     vec![AxisConfig::default()]
 }
 
-/// What `ucom help sim` prints.
+/// Returns the text of `ucom help sim`.
 pub fn help() -> String {
     format!("{FORM}\nThe built-in chain:\n\n{HEAD}")
 }
@@ -180,7 +180,7 @@ impl ChainConfig {
         Self::from_toml(HEAD, profile).unwrap_or_default()
     }
 
-    /// The same with so many boards: the last ones left out, or more of one axis each.
+    /// Returns the chain with `count` boards: the last ones left out, or more boards of one axis each.
     #[must_use]
     pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
         self.boards.truncate(count);
@@ -201,7 +201,7 @@ impl ChainConfig {
         self
     }
 
-    /// The same with these flash ids along the wire; boards beyond the list keep theirs.
+    /// Returns the chain with these flash ids along the wire; boards beyond the list keep theirs.
     #[must_use]
     pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
         for (board, id) in self.boards.iter_mut().zip(ids) {
@@ -263,7 +263,7 @@ fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, String)>) {
     }
 }
 
-/// Whether an axis can be simulated.
+/// Checks that an axis can be simulated.
 fn sound(axis: &AxisConfig) -> Result<(), &'static str> {
     let figures = [
         axis.min_deg,

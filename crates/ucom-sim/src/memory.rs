@@ -25,11 +25,11 @@ pub struct MemoryFlash {
     pub erase_us: u64,
     /// Duration of a write of one block, µs.
     pub write_us: u64,
-    /// The operation, counted from 0, that fails; later ones, too.
+    /// First operation, counted from 0, that fails; later ones fail, too.
     pub fail_after: Option<u64>,
     /// The operation, counted from 0, in which the power goes.
     pub cut_after: Option<u64>,
-    /// A byte of the program flash that stays erased whatever is written: only reading back finds it.
+    /// A byte of the program flash that stays erased after any write: only reading back finds it.
     pub stuck_byte: Option<usize>,
     /// Operations started so far.
     pub operations: u64,
@@ -70,12 +70,12 @@ impl MemoryFlash {
         }
     }
 
-    /// Whether the power went in an operation.
+    /// Returns `true` if the power was lost in an operation.
     pub const fn is_dark(&self) -> bool {
         self.dark
     }
 
-    /// The power is back; what the flash held stays.
+    /// Restores the power; the flash keeps its contents.
     pub fn power_up(&mut self) {
         self.dark = false;
         self.failed = false;
@@ -248,12 +248,12 @@ impl Store for MemoryStore {
     }
 }
 
-/// An application without a process behind it: buffers, texts, and what was done to it.
+/// Application without a process: buffers, texts, and a record of the calls.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryApplication {
     /// From start to up, µs.
     pub start_us: u64,
-    /// Its description, and the names of its inputs, outputs and parameters.
+    /// Description, and the names of the inputs, outputs and parameters.
     pub texts: Texts,
     /// Initial inputs.
     pub initial_ci: Vec<u16>,
@@ -267,20 +267,20 @@ pub struct MemoryApplication {
     pub sampled_so: Vec<u16>,
     /// Parameters.
     pub par: Vec<u16>,
-    /// Texts for people that wait.
+    /// Waiting debug texts.
     pub debug: Vec<Vec<u8>>,
-    /// Whether the control loop runs.
+    /// `true` if the control loop runs.
     pub running: bool,
-    /// Whether the outputs are enabled.
+    /// `true` if the outputs are enabled.
     pub active: bool,
     /// Control cycles so far.
     pub steps: u64,
-    /// When the program was started, if it is.
+    /// Time at which the program was started; `None`: not started.
     pub started_us: Option<u64>,
 }
 
 impl MemoryApplication {
-    /// As many inputs, outputs and parameters as there are texts; all 0.
+    /// Creates an application with one input, output or parameter for each text; all 0.
     pub fn new(text: &str, ci: &[&str], so: &[&str], par: &[&str]) -> Self {
         Self {
             start_us: 10_000,

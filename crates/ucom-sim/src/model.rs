@@ -1,4 +1,4 @@
-//! The application of a simulated board: some axes behind the words of CI, SO and PAR.
+//! Application of a simulated board: some axes, controlled by the words of CI, SO and PAR.
 use super::axis::{Axis, AxisConfig, Command};
 
 /// Words of an axis among the inputs: name, unit, initial value.
@@ -82,7 +82,7 @@ impl Model {
         &self.initial_par
     }
 
-    /// Moves on by so many seconds; outputs are enabled when `active`. A text is something to be reported.
+    /// Advances by `seconds`; outputs are enabled when `active`. Returns a text to be reported, if any.
     pub fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! A simulated chain behind a server of the socketcand protocol, in real time.
+//! Simulated chain with a socketcand server, in real time.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, Instant};
@@ -24,25 +24,25 @@ pub struct ChainServer<'a> {
     /// The chain's members on the bus, in its order.
     inside: Vec<MemberId>,
     clients: BTreeMap<ClientId, MemberId>,
-    /// Clients that have gone while frames of them still wait for the bus.
+    /// Disconnected clients whose frames still wait for the bus.
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// What clients receive of the last frame on the wire, and when it ended, ns.
+    /// Frames for clients, made of the last frame on the wire, and the time when it ended, ns.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
     /// Clients to which bus-off of their controller was reported.
     off: BTreeSet<ClientId>,
-    /// When it was last reported that a controller has left the bus, ns.
+    /// Time of the last report that a controller has left the bus, ns.
     off_reported_ns: Option<u64>,
     note: Box<dyn FnMut(String) + 'a>,
 }
 
 impl<'a> ChainServer<'a> {
-    /// Listens for clients at an address; port 0 takes a free one. The bus has `bitrate` bit/s and draws by `seed`; `note` takes what
-    /// people are to know while it serves.
+    /// Listens for clients at an address; port 0 takes a free one. The bus has `bitrate` bit/s and draws by `seed`; `note` takes
+    /// messages for the operator while it serves.
     ///
     /// # Errors
-    /// Nobody can listen there.
+    /// The address cannot be used for listening.
     pub fn bind(
         address: &str,
         chain: ChainSim,
@@ -75,7 +75,7 @@ impl<'a> ChainServer<'a> {
         self.gateway.url(CHANNEL)
     }
 
-    /// What the bus has carried.
+    /// Returns the counters of the bus.
     pub fn stats(&self) -> BusStats {
         self.bus.stats()
     }
@@ -95,7 +95,7 @@ impl<'a> ChainServer<'a> {
         let due_us = self.due_us().saturating_sub(self.now_us());
         let mut patience = Duration::from_micros(due_us).min(patience);
         while let Some(event) = self.gateway.next(patience) {
-            // What comes now is on the bus now, not when the clock was last looked at.
+            // A frame that comes now is on the bus now, not at the time of the last clock reading.
             let now_us = self.now_us();
             self.advance(now_us);
             self.received(event.client, event.event);
@@ -114,7 +114,7 @@ impl<'a> ChainServer<'a> {
         now
     }
 
-    /// When something happens next without the clients, µs.
+    /// Returns the time of the next event without the clients, µs.
     fn due_us(&self) -> u64 {
         let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
         bus.min(self.chain.next_due_us())
@@ -176,7 +176,7 @@ impl<'a> ChainServer<'a> {
                 }
                 // Frames of several members that are alike bit for bit are one on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // Frames of clients have met these faults on their way to the bus.
+                    // Frames of clients have already passed these faults before they reached the bus.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }
@@ -215,7 +215,8 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// A controller has left the bus; it comes back by itself. Reported once a second at most: on a bad wire it happens all the time.
+    /// Reports that a controller has left the bus; it recovers by itself. At most one report per second: on a bad wire this happens
+    /// all the time.
     fn report_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
@@ -251,7 +252,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Injects the fault of a line, as `kill 3`, and notes that, or what is wrong with it.
+    /// Injects the fault of a line, as `kill 3`, and notes it, or the error in the line.
     pub fn fault(&mut self, line: &str) {
         if line.is_empty() {
             return;
@@ -266,7 +267,7 @@ impl<'a> ChainServer<'a> {
     }
 }
 
-/// What the faults between chain and clients make of a frame.
+/// Applies the faults between chain and clients to a frame.
 fn through(chain: &mut ChainSim, frame: &CanFrame) -> Vec<CanFrame> {
     let id = frame.id();
     chain.through(frame.data()).iter().filter_map(|data| CanFrame::classic(id, data).ok()).collect()

@@ -1,4 +1,4 @@
-//! The whole: boards, init wires and faults.
+//! The simulation of the chain: boards, init wires and faults.
 
 use super::board::{Board, BoardState};
 use super::fault::{Fault, FaultKind, Trigger};
@@ -7,15 +7,15 @@ use std::collections::BTreeMap;
 use ucom::profile::Profile;
 use ucom::{Format, Frame, Sequence, ToBoard};
 
-/// How often another PC talks, µs.
+/// Period of frames from another PC, µs.
 const MASTER_US: u64 = 250_000;
-/// How often another protocol's frames come, µs.
+/// Period of frames of another protocol, µs.
 const FOREIGN_US: u64 = 40_000;
 
-/// The boards of a chain and what else talks on their bus, as members of a bus that the caller runs.
+/// Boards of a chain and the other senders on their bus, as members of a bus that the caller runs.
 ///
-/// Member 0 is the first board; the last member is no board but everything that faults bring onto the bus. Call
-/// [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and report what came of it with
+/// Member 0 is the first board; the last member is not a board but the source of all frames that faults bring onto the bus.
+/// Call [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and report the result with
 /// [`sent`](Self::sent) or [`not_sent`](Self::not_sent) and to the others with [`receive`](Self::receive).
 pub struct ChainSim {
     boards: Vec<Board>,
@@ -26,11 +26,11 @@ pub struct ChainSim {
     waiting: Vec<Fault>,
     /// Faults that hold, and when they end.
     holding: Vec<(u64, Fault)>,
-    /// How often each identifier was on the bus; for faults that wait for one.
+    /// Number of times that each identifier was on the bus; for faults triggered by one.
     seen: BTreeMap<u16, u64>,
-    /// Init wire broken behind a board.
+    /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
-    /// Members whose frames under way are void: their controller was reset.
+    /// Members whose frames in transmission are void: their controller was reset.
     void: Vec<usize>,
     lost: f64,
     corrupted: f64,
@@ -72,7 +72,7 @@ impl ChainSim {
         self.boards.len() + 1
     }
 
-    /// What each board is doing.
+    /// Returns the states of the boards.
     pub fn boards(&self) -> impl Iterator<Item = BoardState> {
         self.boards.iter().map(Board::state)
     }
@@ -82,7 +82,7 @@ impl ChainSim {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
 
-    /// When something happens next by itself, µs; a time in the past means at once.
+    /// Returns the time of the next event, µs; a time in the past means at once.
     pub fn next_due_us(&self) -> u64 {
         let boards = self.boards.iter().map(Board::next_us);
         let begin = self.waiting.iter().filter_map(|fault| match fault.trigger {
@@ -138,7 +138,7 @@ impl ChainSim {
         }
     }
 
-    /// Whether a member takes part in the bus: without power it does not even acknowledge.
+    /// Returns `true` if a member takes part in the bus: without power it does not even acknowledge.
     pub fn is_powered(&self, member: usize) -> bool {
         self.boards.get(member).is_none_or(|board| !board.unpowered)
     }
@@ -152,9 +152,9 @@ impl ChainSim {
         self.waiting.push(fault);
     }
 
-    /// What the faults `lost`, `corrupted` and `doubled` make of data between chain and clients: none, one, or two of it.
+    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients: returns them not at all, once or twice.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // Drawn in the same number whatever happens: one setting does not change the others' faults.
+        // Always draws the same number of random values: one setting does not change the others' faults.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();
@@ -207,7 +207,7 @@ impl ChainSim {
         (self.random >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// What others on the bus send.
+    /// Returns the next frame of other senders on the bus.
     fn others(&mut self) -> Option<Frame> {
         if self.master_at.is_some_and(|at| at <= self.now_us) {
             self.master_at = Some(self.now_us + MASTER_US);
@@ -221,7 +221,7 @@ impl ChainSim {
         if self.foreign_at.is_some_and(|at| at <= self.now_us) {
             self.foreign_at = Some(self.now_us + FOREIGN_US);
             let beat = (self.now_us / FOREIGN_US) as u32;
-            // One identifier with bit 5, one with function 31.
+            // Alternates an identifier with bit 5 and one with function 31.
             return Frame::new(if beat.is_multiple_of(2) { 0x3A5 } else { 0x7C3 }, &beat.to_le_bytes());
         }
         None

@@ -3,7 +3,7 @@ use super::*;
 use ucom::node::Phase;
 use ucom::{Format, Frame, Profile};
 
-/// A chain and what was on its bus.
+/// A chain and the frames on its bus.
 struct Bench {
     sim: ChainSim,
     now_us: u64,
@@ -51,7 +51,7 @@ impl Bench {
         }
     }
 
-    /// The PC sends a frame; what the boards send within a time.
+    /// Sends a frame of the PC; returns the frames of the boards within a time.
     fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
         let frame: Frame = text.parse().unwrap();
         self.sim.advance(self.now_us);
@@ -69,7 +69,7 @@ impl Bench {
     }
 }
 
-/// The same seed and the same frames at the same times are the same bus, fault by fault.
+/// Equal seeds and equal frames at equal times give the same bus, fault by fault.
 #[test]
 fn the_same_seed_gives_the_same_frames() {
     let run = |seed| {
@@ -89,7 +89,7 @@ fn the_same_seed_gives_the_same_frames() {
     assert_ne!(first, run(2));
 }
 
-/// D-26: a board that crashes reports unasked and has no number; the wire behind it goes dark.
+/// D-26: a board that crashes reports unasked and has no number; the wire after it goes dark.
 #[test]
 fn d26_a_crash_is_one_report_and_a_lost_number() {
     let mut bench = Bench::new(3, "", 1);
@@ -110,7 +110,7 @@ fn d26_a_crash_is_one_report_and_a_lost_number() {
     );
 }
 
-/// Power loss: silence, then a board as new; what its flash held stays.
+/// Power loss: silence, then a board in its initial state with its flash unchanged.
 #[test]
 fn power_loss_leaves_the_flash() {
     let mut bench = Bench::new(1, "[[fault]]\nkind = 'power-loss'\nboard = 1\nat_s = 0.4\nfor_s = 0.3", 1);
@@ -159,7 +159,7 @@ fn faults_between_chain_and_clients_follow_their_shares() {
     assert!(line("lost share=0").iter().all(|f| *f == [vec![0x55; 8]]));
 }
 
-/// D-24: a board that takes the number of the one before it answers to it as well, until the chain is numbered anew.
+/// D-24: a board that takes the number of the one before it answers to it as well, until the chain is renumbered.
 #[test]
 fn d24_two_boards_with_one_number() {
     let mut bench = Bench::new(3, "", 1);

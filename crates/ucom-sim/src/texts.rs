@@ -22,7 +22,7 @@ impl Texts {
         Self { application: latin1(application), ci: list(ci), so: list(so), par: list(par) }
     }
 
-    /// One text; empty where there is none.
+    /// Returns a text; empty if it does not exist.
     pub fn get(&self, text: Text) -> &[u8] {
         let (list, index) = match text {
             Text::Application => return &self.application,

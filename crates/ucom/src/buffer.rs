@@ -3,12 +3,12 @@
 use crate::frame::Payload;
 use crate::profile::Endian;
 
-/// One package: up to three words from a place on.
+/// Package of up to three words from a place on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BufferPackage {
     /// Index of the first word, counted in words.
     pub offset: u16,
-    /// How many of `words` are meant, 1..3.
+    /// Number of valid `words`, 1..3.
     pub count: u8,
     /// The words; those from `count` on are 0.
     pub words: [u16; 3],
@@ -83,7 +83,7 @@ impl BufferPackage {
         Ok(places.iter_mut().zip(words).map(|(place, word)| *place = *word).count())
     }
 
-    /// Whether the package reaches the last word of a buffer.
+    /// Returns `true` if the package reaches the last word of a buffer.
     pub const fn covers_last(&self, dimension: usize) -> bool {
         let end = self.offset as usize + self.count as usize;
         (self.offset as usize) < dimension && end >= dimension
@@ -175,7 +175,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: what is sent arrives, and no word outside the buffer is ever touched.
+        /// D-15: a package that is sent arrives, and no word outside the buffer is ever touched.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {
             words[usize::from(count)..].fill(0);

@@ -1,4 +1,4 @@
-//! Frames of a HAL's CAN driver: whatever implements the trait of `embedded-can`.
+//! Frames of a HAL's CAN driver: any type that implements the trait of `embedded-can`.
 
 use embedded_can::{Id, StandardId};
 
@@ -6,10 +6,10 @@ use crate::foreign::Foreign;
 use crate::frame::{Format, Frame};
 
 impl Frame {
-    /// A frame as a driver received it.
+    /// Creates a frame from a driver's frame.
     ///
     /// # Errors
-    /// What makes it a frame of others (D-02).
+    /// Reason why the frame is not of this protocol (D-02).
     pub fn from_can(frame: &impl embedded_can::Frame) -> Result<Self, Foreign> {
         let (id, extended) = match frame.id() {
             Id::Standard(id) => (u32::from(id.as_raw()), false),
@@ -18,7 +18,7 @@ impl Frame {
         Self::received(id, Format { extended, remote: frame.is_remote_frame(), ..Format::BUS }, frame.data())
     }
 
-    /// The frame for a driver to send; `None` where the driver's type refuses it.
+    /// Returns the frame for a driver to send; `None` if the driver's type refuses it.
     pub fn to_can<F: embedded_can::Frame>(&self) -> Option<F> {
         F::new(StandardId::new(self.id())?, self.data())
     }

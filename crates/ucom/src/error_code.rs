@@ -1,8 +1,8 @@
-//! Error codes of DSP_ERROR: what a board means and what a PC does about it.
+//! Error codes of DSP_ERROR: meaning for the board and reaction of the PC.
 
 use core::fmt;
 
-/// Declares the published codes: number and name, then what the board means and what to do, a sentence each.
+/// Declares the published codes: number and name, then meaning and reaction, a sentence each.
 macro_rules! error_codes {
     ($($(#[$doc:meta])* $code:ident = $number:literal, $name:literal: $meaning:literal, $reaction:literal;)+) => {
         /// Code in DSP_ERROR.
@@ -41,7 +41,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// What the board means, one sentence.
+            /// Returns the meaning, one sentence.
             pub const fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$code => $meaning,)+
@@ -49,7 +49,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// What to do, one sentence.
+            /// Returns the advised reaction, one sentence.
             pub const fn reaction(self) -> &'static str {
                 match self {
                     $(Self::$code => $reaction,)+

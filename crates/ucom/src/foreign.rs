@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why a frame is not of this protocol: it is counted and shown, never acted on (D-02).
+/// Reasons why a frame is not of this protocol: such a frame is counted and shown, never acted on (D-02).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// 29-bit identifier.
@@ -13,7 +13,7 @@ pub enum Foreign {
     Fd,
     /// Bit 5 of the identifier is set; no identifier of the formula has it (D-01).
     Bit5,
-    /// Function 28..31: they fit into the identifier, and nobody has given them a meaning.
+    /// Function 28..31: these fit into the identifier, but have no meaning.
     NoFunction(u8),
     /// More than 11 bits of identifier or more than 8 bytes of data.
     Malformed,

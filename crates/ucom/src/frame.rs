@@ -58,7 +58,7 @@ impl Payload {
         self.len
     }
 
-    /// Whether the DLC is 0.
+    /// Returns `true` if the DLC is 0.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -77,7 +77,7 @@ pub struct Frame {
     payload: Payload,
 }
 
-/// How a frame arrived, for drivers that receive everything on a bus.
+/// Format of a received frame, for drivers that receive all frames of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
     /// 29-bit identifier.
@@ -111,7 +111,7 @@ impl Frame {
         Self { id: function.id(sequence), payload }
     }
 
-    /// A frame as received on a bus where others may talk, too (D-02).
+    /// Returns a frame as received on a bus that may have other members, too (D-02).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, Foreign> {
         match format {
             Format { extended: true, .. } => return Err(Foreign::Extended),
@@ -150,7 +150,7 @@ impl Frame {
     }
 }
 
-/// As candump prints frames: `1C1#0202`.
+/// Prints a frame as candump does: `1C1#0202`.
 impl fmt::Display for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:03X}#", self.id)?;
@@ -158,7 +158,7 @@ impl fmt::Display for Frame {
     }
 }
 
-/// A text that is no frame of the form `1C1#0202`.
+/// Error of a text that is not a frame of the form `1C1#0202`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotAFrame;
 

@@ -4,8 +4,8 @@ use core::fmt;
 
 use crate::foreign::Foreign;
 
-/// The node address, which the manual calls sequence number and this project number for short: the position of a board in
-/// the chain, 0..31. What 0 means depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
+/// Node address of a board, called sequence number in the manual and number for short in this project: the position of the board
+/// in the chain, 0..31. The meaning of 0 depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
@@ -42,7 +42,7 @@ impl fmt::Display for Sequence {
     }
 }
 
-/// Who sends a function.
+/// Sender of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sender {
     /// The PC only.
@@ -69,12 +69,12 @@ macro_rules! functions {
                 match self { $(Self::$variant => $name),+ }
             }
 
-            /// Who sends it.
+            /// Returns the sender.
             pub const fn sender(self) -> Sender {
                 match self { $(Self::$variant => Sender::$sender),+ }
             }
 
-            /// What it is for, one sentence.
+            /// Returns the purpose, one sentence.
             pub const fn doc(self) -> &'static str {
                 match self { $(Self::$variant => concat!($($doc),+).trim_ascii()),+ }
             }
@@ -177,17 +177,17 @@ impl Function {
         }
     }
 
-    /// Whether the PC may send it: a board acts on these only.
+    /// Returns `true` if the PC may send it: a board acts on these only.
     pub const fn from_pc(self) -> bool {
         !matches!(self.sender(), Sender::Board)
     }
 
-    /// Whether a board may send it: the PC acts on these only.
+    /// Returns `true` if a board may send it: the PC acts on these only.
     pub const fn from_board(self) -> bool {
         !matches!(self.sender(), Sender::Pc)
     }
 
-    /// Whether a board takes it when it is broadcast (D-04).
+    /// Returns `true` if a board takes it when it is broadcast (D-04).
     pub const fn broadcast(self) -> bool {
         use Function::*;
         matches!(
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(Function::split(0x800), Err(Foreign::Malformed));
     }
 
-    /// D-00: the published list of names and numbers stands as it is.
+    /// D-00: names and numbers are equal to the published list.
     #[test]
     fn d00_names_are_those_of_the_list() {
         assert_eq!(Function::from_number(22).unwrap().name(), "MCA_DUMP_IO_DESCRIPTION");

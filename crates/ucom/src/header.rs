@@ -10,7 +10,7 @@ pub const BLOCK_LEN: usize = 64;
 const MAGIC: u16 = 0x5543;
 const VERSION: u16 = 1;
 
-/// Where an image goes.
+/// Target memory of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Memory {
     /// Program flash.
@@ -61,7 +61,7 @@ pub struct Header {
     pub target: u16,
 }
 
-/// Why a block is no header (DSP_ERROR 5).
+/// Reasons why a block is not a valid header (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
     /// Word 0 is not 0x5543 but this.
@@ -203,7 +203,7 @@ mod tests {
             let endian = if big { Endian::Big } else { Endian::Little };
             let mut block = header.build(endian);
             prop_assert_eq!(Header::parse(&block, endian), Ok(header));
-            // One byte changed is always seen: a sum of words finds it.
+            // A change of a single byte is always detected by a sum of words.
             block[at] ^= flip;
             prop_assert!(Header::parse(&block, endian).is_err());
         }

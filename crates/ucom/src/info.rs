@@ -1,4 +1,4 @@
-//! What a board reports about itself: the first frame of DSP_INFO and of the IO description.
+//! Report of a board about itself: the first frame of DSP_INFO and of the IO description.
 
 use crate::frame::Payload;
 use crate::profile::Endian;
@@ -20,7 +20,7 @@ pub struct BoardInfo {
 }
 
 impl BoardInfo {
-    /// Whether the board reports that it has an application.
+    /// Returns `true` if the board reports that it has an application.
     pub const fn has_application(&self) -> bool {
         !(self.program_id == 0xFFFF && self.date == 0xFFFF)
     }

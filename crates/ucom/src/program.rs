@@ -6,7 +6,7 @@ use crate::header::BLOCK_LEN;
 use crate::profile::{Endian, words};
 
 words! {
-    /// How the Program ID of an image is computed (D-44), key `prog.checksum`.
+    /// Computation of the Program ID of an image (D-44), key `prog.checksum`.
     pub enum Checksum {
         /// CRC-16/CCITT-FALSE over the bytes in wire order: polynomial 0x1021, start value 0xFFFF.
         Crc16 = "crc16",
@@ -20,7 +20,7 @@ words! {
 }
 
 words! {
-    /// How the flash date becomes 16 bits (D-45), key `prog.date`.
+    /// Encoding of the flash date in 16 bits (D-45), key `prog.date`.
     pub enum DateForm {
         /// `(year − 1980) << 9 | month << 5 | day`, 1980 to 2107.
         Fat = "fat",
@@ -36,7 +36,7 @@ words! {
 const CCITT_FALSE: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 static CCITT_FALSE_TABLE: Crc<u16> = CCITT_FALSE;
 
-/// A Program ID under way: fed with the image in any pieces.
+/// Computation of a Program ID in progress: takes the image in any pieces.
 #[derive(Clone)]
 pub struct Digest {
     checksum: Checksum,
@@ -80,7 +80,7 @@ impl Digest {
         if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
     }
 
-    /// The Program ID of what came so far; 0 for [`Checksum::None`]. An odd last byte counts with 0xFF, the
+    /// Returns the Program ID of the data so far; 0 for [`Checksum::None`]. An odd last byte counts with 0xFF, the
     /// padding of the last block.
     pub fn finish(&self) -> u16 {
         match self.checksum {
@@ -94,7 +94,7 @@ impl Digest {
     }
 }
 
-/// The Program ID of a whole image (D-44).
+/// Returns the Program ID of a whole image (D-44).
 pub fn checksum(checksum: Checksum, endian: Endian, image: &[u8]) -> u16 {
     let mut digest = Digest::new(checksum, endian);
     digest.update(image);
@@ -133,7 +133,7 @@ const fn month_days(year: u16, month: u8) -> u8 {
 }
 
 impl DateForm {
-    /// The 16 bits of a date; `None` when there is no such day, or the form cannot hold it. `raw` holds none.
+    /// Returns the 16 bits of a date; `None` if the day does not exist, or the form cannot hold it. `raw` holds no date.
     pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
         if day == 0 || day > month_days(year, month) {
             return None;
@@ -157,11 +157,11 @@ impl DateForm {
             }
             Self::Raw => return None,
         };
-        // 0xFFFF is what a board without an application shows.
+        // 0xFFFF is the date of a board without an application.
         (date != 0xFFFF).then_some(date)
     }
 
-    /// Year, month, day; `None` when the 16 bits are no date of this form.
+    /// Returns year, month, day; `None` if the 16 bits are not a date of this form.
     pub fn decode(self, date: u16) -> Option<(u16, u8, u8)> {
         let (year, month, day) = match self {
             Self::Fat => (1980 + (date >> 9), (date >> 5 & 15) as u8, (date & 31) as u8),
@@ -179,7 +179,7 @@ impl DateForm {
                 (year, month, days as u8 + 1)
             }
             Self::Bcd => {
-                // What are no decimal digits does not come back below.
+                // Digits above 9 do not encode to the same 16 bits below.
                 let number = |byte: u16| 10 * (byte >> 4) + (byte & 15);
                 (2000 + number(date >> 8), number(date & 0xFF) as u8, 1)
             }
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(block_count(1000), 16);
     }
 
-    /// Why crc16 is the default: two frames of a block swapped.
+    /// Reason for crc16 as the default: two frames of a block swapped.
     #[test]
     fn d44_sum_is_blind_to_swapped_frames() {
         let image = image();

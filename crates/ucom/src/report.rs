@@ -1,16 +1,16 @@
-//! DSP_REPORT0..3: a board is there (D-07).
+//! DSP_REPORT0..3: presence reports of boards (D-07).
 
 use crate::function::{Function, Sequence};
 use crate::profile::ReportMode;
 
-/// One DSP_REPORT frame.
+/// DSP_REPORT frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Report {
     /// 0..3, which of the four functions it came with.
     pub k: u8,
     /// The sequence field of the identifier.
     pub id_field: Sequence,
-    /// The data byte: the low byte of the flash number. This is what distinguishes boards.
+    /// Data byte: the low byte of the flash number, which distinguishes boards.
     pub ucom_id: u8,
 }
 
@@ -24,9 +24,9 @@ impl Report {
         }
     }
 
-    /// The `i`-th frame, from 0, that a board sends for one request in a mode; `None` after the last.
+    /// Returns the `i`-th frame, from 0, that a board sends for one request in a mode; `None` after the last.
     ///
-    /// `sequence` is the board's number, or what it uses without one.
+    /// `sequence` is the board's number, or the number that it uses without one.
     pub const fn nth(mode: ReportMode, i: u8, flash_number: u16, sequence: Sequence) -> Option<Self> {
         let report = Self::flash7(flash_number);
         match mode {
@@ -37,7 +37,7 @@ impl Report {
         }
     }
 
-    /// Whether identifier and data carry the same flash id, as they must in mode `flash7`.
+    /// Returns `true` if identifier and data carry the same flash id, as they must in mode `flash7`.
     pub const fn agrees(&self) -> bool {
         let by_data = Self::flash7(self.ucom_id as u16);
         by_data.k == self.k && by_data.id_field.number() == self.id_field.number()

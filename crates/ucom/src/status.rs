@@ -24,7 +24,7 @@ impl Status {
     pub const OPINIT: Self = Self(0x02);
     /// Level of the incoming init pin. Mirrors reality: cannot be written.
     pub const IPINIT: Self = Self(0x01);
-    /// The bits that nobody can write.
+    /// Bits that cannot be written.
     pub const MIRRORS: Self = Self(0x31);
 
     /// Names of the bits, bit 7 first.
@@ -44,7 +44,7 @@ impl Status {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, bit)| *bit)
     }
 
-    /// Whether all of `bits` are set.
+    /// Returns `true` if all of `bits` are set.
     pub const fn has(self, bits: Self) -> bool {
         self.0 & bits.0 == bits.0
     }
@@ -62,7 +62,7 @@ impl Status {
         Self((self.0 & !mask) | value)
     }
 
-    /// What contradicts itself in this status, if anything: no board can be in such a state.
+    /// Returns the contradiction in this status, if any: no board can be in such a state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")

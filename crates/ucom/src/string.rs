@@ -62,22 +62,22 @@ impl Iterator for StringPackages<'_> {
     }
 }
 
-/// What a package did to the string under way.
+/// Effect of a package on the string in progress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Assembled<'a> {
-    /// More packages are to come.
+    /// More packages follow.
     Partial,
     /// The whole string, trailing NULs stripped.
     Complete(Latin1<'a>),
-    /// A first package that is no header (not 2 bytes), a header that counts more than `string.max` characters
-    /// can fill, or a data package without bytes. The string is dropped.
+    /// A first package that is not a header (not 2 bytes), a header that counts more than `string.max` characters can
+    /// fill, or a data package without bytes. The string is dropped.
     Refused,
 }
 
 /// Puts one string together: one assembler for each function and board (D-14).
 ///
-/// Loss cannot be seen inside a string: a lost package makes it wait for more. [`StringAssembler::expired`]
-/// shows when 100 ms (`string.gap`) passed in silence; the next package then starts anew.
+/// Loss cannot be seen inside a string: a lost package makes it wait for more. [`StringAssembler::expired`] shows when
+/// 100 ms (`string.gap`) passed in silence; the next package then starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
@@ -99,23 +99,23 @@ impl<const N: usize> StringAssembler<N> {
         Self { text: [0; N], len: 0, open: None, last_us: 0 }
     }
 
-    /// Forgets what came so far.
+    /// Forgets the packages so far.
     pub const fn reset(&mut self) {
         self.open = None;
         self.len = 0;
     }
 
-    /// Whether a string is under way.
+    /// Returns `true` if a string is in progress.
     pub const fn is_open(&self) -> bool {
         self.open.is_some()
     }
 
-    /// Whether a string is under way and `string.gap` passed since its last package.
+    /// Returns `true` if a string is in progress and `string.gap` passed since its last package.
     pub const fn expired(&self, now_us: u64, profile: &Profile) -> bool {
         self.open.is_some() && now_us.saturating_sub(self.last_us) >= profile.string_gap_us()
     }
 
-    /// Packages that the string under way still lacks.
+    /// Returns the number of packages that the string in progress still lacks.
     pub const fn missing(&self) -> u16 {
         match self.open {
             Some(missing) => missing,
@@ -298,7 +298,7 @@ mod tests {
             prop_assert_eq!(through(&text, &profiles()[i]), text);
         }
 
-        /// D-14: whatever comes, the assembler stays within its buffer and its counts.
+        /// D-14: for any packages, the assembler stays within its buffer and its counts.
         #[test]
         fn d14_any_packages(packages in proptest::collection::vec((any::<[u8; 8]>(), 0..9usize), 0..200)) {
             let [profile, ..] = profiles();

@@ -71,12 +71,12 @@ impl SlcanAdapter {
         self.output.extend_from_slice(line.as_bytes());
     }
 
-    /// What it answers when it is asked for its flags.
+    /// Sets the state that the adapter reports in its flags.
     pub fn set_state(&mut self, state: ControllerState) {
         self.state = state;
     }
 
-    /// Bytes for the host; they are gone from here.
+    /// Takes the bytes for the host.
     pub fn take_output(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.output)
     }
@@ -96,7 +96,7 @@ impl SlcanAdapter {
         self.lost
     }
 
-    /// One turn between a host and a bus: what the host has written is carried out, what is on the bus is reported. The port's reads and
+    /// Exchanges once between a host and a bus: carries out the host's commands and reports the frames of the bus. The port's reads and
     /// writes must not wait for long.
     pub fn turn(
         &mut self,
@@ -131,7 +131,7 @@ impl SlcanAdapter {
 
     fn execute(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
         let Some((command, rest)) = line.split_at_checked(1) else {
-            // An empty line, as hosts send them to clear what was typed before.
+            // An empty line, as hosts send them to clear earlier input.
             return self.reply("\r");
         };
         let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
@@ -184,7 +184,7 @@ impl SlcanAdapter {
     }
 }
 
-/// Why a turn of an adapter failed.
+/// Reasons why a turn of an adapter failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AdapterError {
     /// The host's side.
@@ -195,7 +195,7 @@ pub enum AdapterError {
     Bus(CanError),
 }
 
-/// Nothing is no error.
+/// Converts a read or write without data to 0; it is not an error.
 fn waited(result: io::Result<usize>) -> io::Result<usize> {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     result.or_else(|error| match error.kind() {

@@ -10,21 +10,21 @@ use super::port::Port;
 
 use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, OpenError};
 
-/// How long an adapter may take to answer its first question; it may still be starting.
+/// Longest time for an adapter to answer its first question; it may still be starting.
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
-/// How often it is asked.
+/// Number of these questions.
 const VERSION_QUESTIONS: u32 = 3;
-/// How long an adapter may take for other answers.
+/// Longest time for other answers of an adapter.
 const ANSWER: Duration = Duration::from_millis(500);
-/// What an earlier user left on the line has come by then.
+/// Time after which data of an earlier user have arrived.
 const QUIET: Duration = Duration::from_millis(30);
-/// How long an adapter may refuse a frame because its queue is full, or keep its answer.
+/// Longest time for which an adapter may refuse a frame because its queue is full, or keep its answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
 /// Pause before a refused frame is tried again.
 const RETRY: Duration = Duration::from_millis(1);
 /// Slices of waiting in which both directions get their turn.
 const SLICE: Duration = Duration::from_millis(20);
-/// Received frames that are kept while something else is waited for.
+/// Received frames that are kept during a wait for an answer.
 const RECEIVE_QUEUE: usize = 100_000;
 
 /// An adapter's answer to a command.
@@ -38,13 +38,13 @@ enum Answer {
 struct Outstanding {
     line: String,
     since: Instant,
-    /// When it was last written.
+    /// Time at which it was last written.
     written: Instant,
-    /// It was refused since.
+    /// `true` if the adapter has refused the frame since.
     refused: bool,
 }
 
-/// A bus behind an SLCAN adapter.
+/// Bus of an SLCAN adapter.
 ///
 /// Adapters that confirm frames get the next one after the confirmation, and a refused one again: their queue is full. Some
 /// adapters never answer; to those frames are written as fast as the line takes them.
@@ -63,7 +63,7 @@ pub struct SlcanBus {
     /// The adapter answers `F`; unknown until it was asked.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// A line came that is none of the others.
+    /// A line of no other kind was received.
     got_text: bool,
     closed: bool,
 }
@@ -126,9 +126,9 @@ impl SlcanBus {
         Ok(bus)
     }
 
-    /// Closes what an earlier user left open, and checks that an adapter answers.
+    /// Closes a channel that an earlier user left open, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
-        // The first end of line is for what was typed before.
+        // The first end of line ends earlier input.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
@@ -139,12 +139,12 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // The version is a text: what was answered before belongs to earlier lines.
+                // The version is a text: earlier answers belong to earlier lines.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // It does not know the question, but it is there.
+            // The adapter does not know the question, but it is present.
             if somebody {
                 return Ok(());
             }
@@ -155,7 +155,7 @@ impl SlcanBus {
             .into())
     }
 
-    /// Sends a command. Of an adapter that never answers it is taken for carried out.
+    /// Sends a command. If the adapter never answers, the command counts as carried out.
     fn set(&mut self, step: &'static str, line: &str) -> Result<(), CanError> {
         self.last_answer = None;
         self.write(line.as_bytes())?;
@@ -185,7 +185,7 @@ impl SlcanBus {
         }
     }
 
-    /// Takes in what comes within `timeout`; true if something came.
+    /// Reads bytes that come within `timeout`; returns `true` if any came.
     fn take_in(&mut self, timeout: Duration) -> Result<bool, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -244,7 +244,7 @@ impl SlcanBus {
                 Ok(0) if Instant::now() >= give_up => {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
-                // It may be waiting for us.
+                // The adapter may be waiting for us.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
@@ -259,7 +259,7 @@ impl SlcanBus {
         Ok(())
     }
 
-    /// Sees to the frame that is not confirmed yet: a refused one is written again. True when there is none.
+    /// Handles the unconfirmed frame: writes a refused one again. Returns `true` if no frame is unconfirmed.
     fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
         let Some(frame) = &mut self.outstanding else { return Ok(true) };
         let late = now.saturating_duration_since(frame.since) >= SEND_TIMEOUT;
@@ -278,7 +278,7 @@ impl SlcanBus {
                 self.write(line.as_bytes())?;
             }
         } else if !self.confirms && now.saturating_duration_since(frame.since) >= ANSWER {
-            // It answers when it is set up, but not frames.
+            // The adapter answers during set-up, but does not confirm frames.
             self.answers = false;
             self.outstanding = None;
             return Ok(true);
@@ -322,7 +322,7 @@ impl CanBus for SlcanBus {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let deadline = Instant::now().checked_add(timeout);
-        // What is there already is taken in even if nothing is waited for.
+        // Bytes that have already arrived are read even with a timeout of zero.
         let mut wait = Duration::ZERO;
         loop {
             if let Some(frame) = self.receive_queue.pop_front() {
@@ -365,7 +365,7 @@ impl CanBus for SlcanBus {
 impl Drop for SlcanBus {
     fn drop(&mut self) {
         if !self.closed {
-            // The last frame is to leave the adapter before its channel is closed.
+            // The last frame must leave the adapter before its channel is closed.
             let _ = self.wait_for_confirmation();
             let _ = self.write(b"C\r");
         }

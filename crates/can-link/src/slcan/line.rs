@@ -34,7 +34,7 @@ impl Lines {
         Self { line: Vec::with_capacity(LONGEST), complete: false, too_long: false }
     }
 
-    /// The next line; what it takes of `bytes` is gone from there.
+    /// Returns the next line and removes its bytes from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<Piece<'a>> {
         if self.complete {
             self.complete = false;
@@ -51,7 +51,7 @@ impl Lines {
                 CR if self.too_long || !self.line.is_ascii() => {
                     self.line.clear();
                     self.too_long = false;
-                    // It must not pass for the empty line that means yes.
+                    // The line must not pass for the empty line that means yes.
                     return Some(Piece::Line("?"));
                 }
                 CR => {
@@ -71,7 +71,7 @@ impl Lines {
 /// Lengths of CAN FD by their codes.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// The frame of a line without its end; `None` if it is none.
+/// Returns the frame of a line without its end; `None` if the line is not a frame.
 pub(crate) fn parse_frame(line: &str) -> Option<CanFrame> {
     let kind = line.chars().next()?;
     let (digits, make): (usize, fn(u32) -> _) = match kind {

@@ -1,4 +1,4 @@
-//! What an adapter is opened with, and the rates that the protocol has codes for.
+//! Options of an adapter, and the rates that have codes in the protocol.
 
 /// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is LAWICEL's; some firmware of CANable adapters takes it for 750,000.
 pub(crate) const BIT_RATES: [u32; 9] =
@@ -8,7 +8,7 @@ pub(crate) const BIT_RATES: [u32; 9] =
 pub(crate) const DATA_RATES: [(u32, u8); 4] =
     [(1_000_000, 1), (2_000_000, 2), (4_000_000, 4), (5_000_000, 5)];
 
-/// How to talk to an adapter.
+/// Options of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlcanOptions {
     /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
@@ -22,6 +22,6 @@ pub struct SlcanOptions {
 }
 
 impl SlcanOptions {
-    /// Rate of the serial line if nothing else is asked for, bit/s.
+    /// Default rate of the serial line, bit/s.
     pub const BAUD: u32 = 115_200;
 }

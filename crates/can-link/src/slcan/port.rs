@@ -1,10 +1,10 @@
-//! What carries the lines: a serial port or a TCP connection.
+//! Transport of the lines: a serial port or a TCP connection.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// How long connecting over TCP may take.
+/// Longest time for a connection over TCP.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Shortest timeout: less would not wait at all.
 const SHORTEST: Duration = Duration::from_millis(1);
@@ -34,7 +34,7 @@ impl Port {
         Err(last)
     }
 
-    /// Bytes that came within `timeout`; `None` if there were none. The end of a stream is an error.
+    /// Reads bytes that came within `timeout`; `None` if no byte came. The end of a stream is an error.
     pub(super) fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let timeout = timeout.max(SHORTEST);
         let read = match self {

@@ -9,7 +9,7 @@ use socketcan::{
 
 use crate::{CanFrame, ControllerState, ErrorState, Id};
 
-/// What came from the kernel.
+/// Data from the kernel.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Received {
     Frame(CanFrame),
@@ -55,7 +55,7 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// What an error frame makes of the state: a new state, new counters, both or neither.
+/// Returns the state after an error frame: a new state, new counters, both or neither.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);

@@ -7,7 +7,7 @@ use std::time::Duration;
 const ENOBUFS: i32 = 105;
 /// Pause between two tries: a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// A queue that has had no room for so long is that of a dead bus.
+/// Time without room in the queue after which the bus counts as dead.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Writes, and tries again while the queue is full. After 10 s without room it returns an error with the likely causes.
@@ -64,7 +64,7 @@ mod tests {
         let (result, waited, tries) = run(full);
         assert!(result.is_ok());
         assert_eq!((waited, tries), (PAUSE * 999, 1000));
-        // A signal is no reason to wait.
+        // A signal does not cause a wait.
         let (result, waited, _) = run(vec![Some(4), None]);
         assert!(result.is_ok() && waited.is_zero());
     }

@@ -11,23 +11,22 @@ use crate::{
     AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, OpenError,
 };
 
-/// How long connecting and each answer while opening may take.
+/// Longest time for the connection and for each answer while opening.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// How long sending waits for a server that takes nothing.
+/// Longest time for which sending waits for a server that takes no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// After so long a wait for room to send, what the server has sent is read: it may wait for us.
+/// Wait for room to send after which received bytes are read, because the server may be waiting for that.
 const SEND_SLICE: Duration = Duration::from_millis(20);
-/// How long the end waits for the server to take the last frames.
+/// Longest time at the end for the server to take the last frames.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
 /// Bytes of one read.
 const READ: usize = 16 * 1024;
 /// Received frames that are kept while sending waits.
 const RECEIVE_QUEUE: usize = 100_000;
 
-/// A bus behind a server of the socketcand protocol: classic data frames only.
+/// Bus of a socketcand server: classic data frames only.
 ///
-/// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] return [`CanError::Closed`]; there is no
-/// connecting again.
+/// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] return [`CanError::Closed`]; the bus does not reconnect.
 pub struct SocketcandBus {
     url: String,
     stream: TcpStream,
@@ -35,7 +34,7 @@ pub struct SocketcandBus {
     /// Bytes that came together with an answer while opening.
     glued: Vec<u8>,
     receive_queue: VecDeque<CanFrame>,
-    /// What the socket is set to: `None` does not wait.
+    /// Timeout of the socket: `None` does not wait.
     timeout: Option<Duration>,
     closed: bool,
     errors: ErrorState,
@@ -70,7 +69,7 @@ impl SocketcandBus {
         Ok(bus)
     }
 
-    /// Messages of the server so far that were none of the protocol's raw mode.
+    /// Returns the number of messages so far that do not belong to the protocol's raw mode.
     pub fn ignored(&self) -> u64 {
         self.ignored + self.splitter.noise()
     }
@@ -92,7 +91,7 @@ impl SocketcandBus {
         self.expect(step, &Reply::Ok)
     }
 
-    /// Waits for an answer; what follows it is kept.
+    /// Waits for an answer; keeps the bytes after it.
     fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
         let end = Instant::now() + TIMEOUT;
         let mut buffer = [0; READ];
@@ -124,7 +123,7 @@ impl SocketcandBus {
         }
     }
 
-    /// Waits so long (`None` not at all) for bytes; `None` if none came. The end of the stream is an error.
+    /// Waits up to `wait` (`None`: not at all) for bytes; `None` if no byte came. The end of the stream is an error.
     fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -172,7 +171,7 @@ impl SocketcandBus {
         }
     }
 
-    /// Takes in what is there; true if something was.
+    /// Reads the available bytes; returns `true` if any came.
     fn take_in(&mut self, wait: Option<Duration>) -> Result<bool, CanError> {
         let mut buffer = [0; READ];
         let Some(count) = self.read(&mut buffer, wait)? else { return Ok(false) };
@@ -192,7 +191,7 @@ impl SocketcandBus {
         Ok(true)
     }
 
-    /// Writes all; while the server takes nothing, what it has sent is read.
+    /// Writes all bytes; while the server takes no data, reads the bytes that it has sent.
     fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });

@@ -8,28 +8,28 @@ use super::shared::{Channel, ClientAction, ClientId, Route};
 use super::{ServerStats, SocketcandServer};
 use crate::{CanFrame, ErrorState, ListenError, VirtualHub};
 
-/// What clients did and the host has not taken yet; beyond that their connections wait.
+/// Most events that wait for the host; beyond that the connections wait.
 const WAITING: usize = 1024;
 
-/// What a client did.
+/// Action of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClientEvent {
-    /// It opened the bus.
+    /// The client opened the bus.
     Joined,
-    /// It wants this frame on the bus.
+    /// The client sends this frame.
     Frame(CanFrame),
-    /// It is gone.
+    /// The client has disconnected.
     Left,
 }
 
-/// What happened at a [`SocketcandGateway`].
+/// Event at a [`SocketcandGateway`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FromClient {
     /// Index of the channel among the names given.
     pub channel: usize,
-    /// Which client.
+    /// Client.
     pub client: ClientId,
-    /// What it did.
+    /// Action.
     pub event: ClientEvent,
 }
 
@@ -72,7 +72,7 @@ impl SocketcandGateway {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Only this client receives a frame: for hosts where each client is a member of its own, such as of a
+    /// Delivers a frame to this client only: for hosts that make each client a member of its own, for example of a
     /// [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);
@@ -85,7 +85,7 @@ impl SocketcandGateway {
         self.server.report_state(client, state);
     }
 
-    /// Where it listens, with the port that was taken.
+    /// Returns the address on which it listens, with the port that was taken.
     pub fn local_addr(&self) -> SocketAddr {
         self.server.local_addr()
     }
@@ -95,7 +95,7 @@ impl SocketcandGateway {
         self.server.url(channel)
     }
 
-    /// What happened so far.
+    /// Returns the counters.
     pub fn stats(&self) -> ServerStats {
         self.server.stats()
     }

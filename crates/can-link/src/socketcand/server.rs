@@ -13,10 +13,10 @@ use crate::{CanFrame, CanUrl, ErrorState, ListenError, VirtualHub};
 
 /// Clients at a time.
 const MOST_CLIENTS: usize = 64;
-/// How long the end waits for the clients' threads.
+/// Longest time at the end for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What happened at a server so far.
+/// Counters of a server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServerStats {
     /// Clients at present.
@@ -33,14 +33,14 @@ pub struct ServerStats {
     pub missed: u64,
     /// Frames that the protocol cannot carry (remote, CAN FD), counted for each client.
     pub not_carried: u64,
-    /// Commands that were none.
+    /// Unknown commands.
     pub not_understood: u64,
 }
 
 /// A server of the socketcand protocol, as python-can's `socketcand` interface and SavvyCAN know it.
 ///
-/// A client's frames reach all others and do not come back to it. A client that does not read misses what is beyond some
-/// 65,000 frames, and is let go after 30 s; it never holds up the bus. Dropping the server ends all connections.
+/// A client's frames reach all others and do not come back to it. A client that does not read misses frames beyond some
+/// 65,000, and is disconnected after 30 s; it never blocks the bus. Dropping the server ends all connections.
 ///
 /// ```
 /// use std::time::Duration;
@@ -84,7 +84,7 @@ impl SocketcandServer {
         Ok(Self { address, inner, acceptor: Some(acceptor) })
     }
 
-    /// Where it listens, with the port that was taken.
+    /// Returns the address on which it listens, with the port that was taken.
     pub fn local_addr(&self) -> SocketAddr {
         self.address
     }
@@ -95,7 +95,7 @@ impl SocketcandServer {
         CanUrl::Socketcand { host, port, channel: channel.to_owned() }.to_string()
     }
 
-    /// What happened so far.
+    /// Returns the counters.
     pub fn stats(&self) -> ServerStats {
         let inner = &self.inner;
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! One client of the server: a thread that reads and, from raw mode on, one that writes.
+//! Session of a client of the server: a thread that reads and, from raw mode on, another that writes.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -16,13 +16,13 @@ use crate::{CanBus, VirtualBus};
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Frames that wait for a client: some seconds of a full bus.
 const WAITING: usize = 65_536;
-/// Bytes that wait in the system for a client; more would only delay what it receives.
+/// Bytes that wait in the system for a client; more would only delay its frames.
 const SEND_BUFFER: usize = 128 * 1024;
 /// Frames in one write.
 const BATCH: usize = 64;
-/// A client that takes nothing for so long is gone.
+/// Time after which a client that takes no data counts as disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
-/// A client that asks for nothing and has not opened a bus is gone.
+/// Time after which a client without requests and without an open bus is disconnected.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// The socket as both threads write to it.
@@ -45,7 +45,7 @@ impl Out {
 /// Serves a client until it goes.
 pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
     let mut session = Session { inner, client, opened: None, writer: None };
-    // What went wrong with one client's connection ends this client only.
+    // An error of a client's connection ends this client only.
     let _ = session.run(stream);
     session.end();
 }
@@ -64,7 +64,7 @@ impl Session<'_> {
         stream.set_nodelay(true)?;
         // A client whose computer was switched off is noticed.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // A wish: the system may have limits of its own.
+        // Only a request: the system may have limits of its own.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
@@ -104,7 +104,7 @@ impl Session<'_> {
             (Request::Echo, _) => reply(out, "< echo >")?,
             (Request::Open(name), None) => return self.open(name, out),
             (Request::RawMode, Some((_, member))) => {
-                // From here on it receives what is on the bus, which waits.
+                // From here on the client receives the frames on the bus, which wait.
                 let member = member.second_handle();
                 let mut output = out.lock();
                 member.set_deaf(false);
@@ -205,7 +205,7 @@ fn count(counter: &AtomicU64, number: usize) {
     counter.fetch_add(number as u64, Ordering::Relaxed);
 }
 
-/// The lines of the frames and states that have a form; how many frames are there and how many are left out.
+/// Writes the lines of the frames and states that have a form; returns the numbers of written and omitted frames.
 fn write_batch(received: &[Received], text: &mut String) -> (usize, usize) {
     text.clear();
     #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]

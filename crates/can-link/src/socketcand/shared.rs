@@ -1,4 +1,4 @@
-//! What the threads of a server share: its channels, its clients and its counters.
+//! State shared by the threads of a server: its channels, its clients and its counters.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -25,7 +25,7 @@ pub(super) enum ClientAction {
     Left,
 }
 
-/// Where the frames of a channel's clients go.
+/// Route of the frames of a channel's clients.
 pub(super) enum Route {
     /// Straight to the other members of the hub.
     Hub,
@@ -40,7 +40,7 @@ pub(super) struct Channel {
     pub(super) route: Route,
 }
 
-/// What the threads share.
+/// State shared by the threads.
 #[derive(Default)]
 pub(super) struct Inner {
     pub(super) channels: Vec<Channel>,

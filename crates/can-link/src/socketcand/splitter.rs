@@ -5,7 +5,7 @@ pub(crate) const LONGEST: usize = 512;
 
 /// Finds messages in a stream that may be cut anywhere, in bounded memory.
 pub(crate) struct Splitter {
-    /// What followed the last `<`.
+    /// Bytes after the last `<`.
     message: Vec<u8>,
     inside: bool,
     /// The message in `message` was handed out.
@@ -18,7 +18,7 @@ impl Splitter {
         Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, noise: 0 }
     }
 
-    /// Messages that were too long, not ASCII or never ended, so far.
+    /// Returns the number of messages so far that were too long, not ASCII or never ended.
     pub(crate) fn noise(&self) -> u64 {
         self.noise
     }
@@ -29,7 +29,7 @@ impl Splitter {
         self.message.capacity()
     }
 
-    /// The text between `<` and `>` of the next message; what it takes of `bytes` is gone from there.
+    /// Returns the text between `<` and `>` of the next message and removes its bytes from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<&'a str> {
         if self.complete {
             self.complete = false;

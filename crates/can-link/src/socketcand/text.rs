@@ -9,7 +9,7 @@ use crate::{CanFrame, ErrorState, Id};
 pub(crate) const CLASS_BUS_OFF: u32 = 0x40;
 pub(crate) const CLASS_RESTARTED: u32 = 0x100;
 
-/// What a client asks for.
+/// Request of a client.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Request<'a> {
     Open(&'a str),
@@ -17,7 +17,7 @@ pub(crate) enum Request<'a> {
     BcmMode,
     Echo,
     Send(CanFrame),
-    /// A `send` that is no frame.
+    /// A `send` that is not a valid frame.
     BadSend,
     Other,
 }
@@ -40,7 +40,7 @@ impl<'a> Request<'a> {
     }
 }
 
-/// `ID LENGTH BYTE …`: what stands behind `send`.
+/// Parses `ID LENGTH BYTE …`, the part after `send`.
 fn send<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     let len = words.next().filter(|word| word.len() == 1 && is_hex(word))?;
@@ -79,14 +79,14 @@ impl<'a> Reply<'a> {
     }
 }
 
-/// `ID TIME DATA`: what stands behind `frame`.
+/// Parses `ID TIME DATA`, the part after `frame`.
 fn classic_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     words.next().filter(|word| is_time(word))?;
     CanFrame::classic(id, &bytes::<8>(words)?).ok()
 }
 
-/// `ID FLAGS TIME DATA`: what stands behind `fdframe` of servers that know CAN FD.
+/// Parses `ID FLAGS TIME DATA`, the part after `fdframe` of servers that know CAN FD.
 fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     let flags = words.next().filter(|word| word.len() <= 2 && is_hex(word))?;
@@ -96,7 +96,7 @@ fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
 }
 
-/// `CLASS TIME`, or `CLASS` alone; anything else is a text for people.
+/// Parses `CLASS TIME`, or `CLASS` alone; anything else is a text for display.
 fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
     if let Some(time) = words.next() {
@@ -133,7 +133,7 @@ fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<
     Some(found)
 }
 
-/// Nothing but digits: Rust's own conversion would take a sign, too.
+/// Returns `true` if the word has only digits: Rust's own conversion would take a sign, too.
 fn is_hex(word: &str) -> bool {
     !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
@@ -197,7 +197,7 @@ mod tests {
         CanFrame::classic(Id::extended(id).unwrap(), data).unwrap()
     }
 
-    /// As python-can 4.6.1 writes them: no leading zeros, two blanks without data.
+    /// Requests as python-can 4.6.1 writes them: no leading zeros, two blanks without data.
     #[test]
     fn requests_of_python_can_are_understood() {
         for (text, request) in [
@@ -292,7 +292,7 @@ mod tests {
         }
     }
 
-    /// As socketcand writes error frames and python-can 4.6.1 reads them: three digits of the class, then the time.
+    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits of the class, then the time.
     #[test]
     fn bus_off_and_the_way_back_are_error_frames() {
         let time = Duration::from_micros(12_000_345);

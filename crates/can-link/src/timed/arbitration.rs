@@ -15,15 +15,15 @@ pub(super) struct Starter {
 
 /// Outcome of the arbitration at the start of a frame.
 pub(super) struct Arbitration {
-    /// They send the same bits to the end; none when the frame is destroyed.
+    /// Members that send the same bits to the end; none when the frame is destroyed.
     pub(super) senders: Vec<MemberId>,
-    /// What is on the wire.
+    /// Frame on the wire.
     pub(super) frame: CanFrame,
-    /// Its bits from start to CRC; up to the error when it is destroyed.
+    /// Number of bits from start to CRC; up to the error if the frame is destroyed.
     pub(super) bits: u32,
     /// All who sent the winning identifier, when their frames differ.
     pub(super) collision: Vec<MemberId>,
-    /// Those of a collision whose send failed.
+    /// Members of a collision whose send failed.
     pub(super) failed: Vec<MemberId>,
 }
 
@@ -46,7 +46,7 @@ impl Arbitration {
         let all = members(&sending);
         let mut failed = Vec::new();
         while let Some(at) = first_difference(&sending) {
-            // Whoever sends a recessive bit sees a dominant one: a bit error.
+            // A member that sends a recessive bit and sees a dominant one has a bit error.
             let (lost, on): (Vec<_>, Vec<_>) =
                 sending.iter().partition(|(_, wire)| wire.bits().get(at) != Some(&DOMINANT));
             if lost.iter().any(|(starter, _)| !starter.counters.passive()) {

@@ -14,7 +14,7 @@ impl Counters {
         ControllerState::of_counters(self.tec, self.rec)
     }
 
-    /// Its error flags no longer destroy frames.
+    /// Returns `true` if its error flags no longer destroy frames.
     pub(crate) fn passive(self) -> bool {
         self.state().errors >= ErrorState::Passive
     }
@@ -31,7 +31,7 @@ impl Counters {
         self.tec = self.tec.saturating_add(8);
     }
 
-    /// A passive sender that nobody acknowledges does not count on: a member that is alone never leaves the bus for it.
+    /// Counts a missing acknowledgement. A passive sender does not count further: a member that is alone never leaves the bus for it.
     pub(crate) fn not_acknowledged(&mut self) {
         if !self.passive() {
             self.send_failed();
@@ -47,10 +47,10 @@ impl Counters {
     }
 }
 
-/// What a member that is bus-off still has to see: 11 recessive bits, so often.
+/// Sequences of 11 recessive bits that a member in bus-off still has to wait for.
 ///
-/// They come one after the other on an idle bus, and one at the end of each frame: the delimiter of its acknowledgement or of its
-/// error frame, the end, and the intermission. A busy bus lets nobody back sooner than after 128 frames.
+/// These sequences come one after the other on an idle bus, and once at the end of each frame: the delimiter of its
+/// acknowledgement or of its error frame, the end, and the intermission. On a busy bus a member is back after 128 frames at the earliest.
 pub(crate) struct Recovery {
     pub left: u32,
     /// Recessive since then, ns; `None` while a frame is on the wire.

@@ -28,48 +28,48 @@ pub enum BusEvent {
     },
     /// A member's frame was on the bus and was acknowledged.
     Sent {
-        /// Who sent it.
+        /// Sender.
         member: MemberId,
         /// The frame.
         frame: CanFrame,
     },
-    /// A member's frame is given up: its sender sends once only, or is bus-off.
+    /// A member's frame is dropped: its sender sends once only, or is bus-off.
     Failed {
-        /// Who wanted to send it.
+        /// Sender.
         member: MemberId,
         /// The frame.
         frame: CanFrame,
     },
     /// Something went wrong with a frame. Its senders try again unless they send once only.
     Error {
-        /// What went wrong.
+        /// Error.
         error: BusError,
         /// The frame (of a collision: of its first sender).
         frame: CanFrame,
-        /// Its senders.
+        /// Senders.
         senders: Vec<MemberId>,
     },
     /// A member's error state has changed.
     State {
-        /// Whose.
+        /// Member with the new state.
         member: MemberId,
         /// The new state.
         state: ControllerState,
     },
 }
 
-/// What can go wrong with a frame.
+/// Errors of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusError {
     /// Several members sent one identifier with different data at the same time, which CAN forbids.
     Collision,
-    /// Nobody acknowledged.
+    /// No member acknowledged.
     NotAcknowledged,
     /// A bit was disturbed on the wire.
     Disturbed,
 }
 
-/// Why a frame cannot be queued.
+/// Reasons why a frame cannot be queued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum QueueError {
     /// This bus is a classic one.
@@ -86,7 +86,7 @@ pub enum QueueError {
     Left,
 }
 
-/// What a bus has carried since its beginning.
+/// Counters of a bus since its beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusStats {
     /// Virtual time, ns.
@@ -99,7 +99,7 @@ pub struct BusStats {
     pub shared: u64,
     /// Collisions.
     pub collisions: u64,
-    /// Frames that nobody acknowledged.
+    /// Frames that no member acknowledged.
     pub not_acknowledged: u64,
     /// Disturbed frames.
     pub disturbed: u64,

@@ -24,8 +24,8 @@ const QUEUE: usize = 65_536;
 ///
 /// Frames take as long as they do on a wire of the bit rate, stuffing counted bit by bit. Among the first frames of all
 /// queues the identifier arbitrates as on the wire. Members acknowledge, count errors, become passive and leave the bus as
-/// ISO 11898-1 has it; two members that send one identifier with different data at once collide. The same calls and the same
-/// seed give the same events.
+/// ISO 11898-1 has it; two members that send one identifier with different data at once collide. Equal calls and equal seeds
+/// give equal events.
 ///
 /// ```
 /// use can_link::{CanFrame, BusEvent, Id, TimedBus};
@@ -47,7 +47,7 @@ pub struct TimedBus {
     members: Vec<Member>,
     random: fastrand::Rng,
     disturbance: f64,
-    /// What is on the wire.
+    /// Transfer on the wire.
     transfer: Option<Transfer>,
     /// End of the intermission.
     free_from: u64,
@@ -64,10 +64,10 @@ struct Member {
     counters: Counters,
     /// A passive member lets others go first.
     may_start: u64,
-    /// Its way back from bus-off.
+    /// Recovery from bus-off.
     recovery: Option<Recovery>,
     one_shot: bool,
-    /// What it is sending was forgotten meanwhile: there is no second try.
+    /// `true` if the frame on the wire has been removed from the queue: it is not sent again.
     last_try: bool,
     acknowledges: bool,
     left: bool,
@@ -82,7 +82,7 @@ impl Member {
 struct Transfer {
     end: u64,
     arbitration: Arbitration,
-    /// What is wrong with it, if not a collision.
+    /// Error of the frame, if not a collision.
     error: Option<BusError>,
 }
 
@@ -90,7 +90,7 @@ fn time(ns: u64) -> Duration {
     Duration::from_nanos(ns)
 }
 
-/// What is due after the end of all time is never due.
+/// Converts to ns; a time after the end of virtual time is never due.
 fn ns(time: Duration) -> Option<u64> {
     u64::try_from(time.as_nanos()).ok()
 }
@@ -115,13 +115,13 @@ impl TimedBus {
         }
     }
 
-    /// Whether controllers begin their way back as soon as they are bus-off, as `restart-ms` of Linux and the automatic recovery of
-    /// many controllers do. What is queued meanwhile waits. Else [`recover`](Self::recover) begins it.
+    /// Lets controllers begin to recover as soon as they are bus-off, or not, as `restart-ms` of Linux and the automatic recovery
+    /// of many controllers do. Frames queued in between wait. Otherwise [`recover`](Self::recover) begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
         self.recovers_by_itself = recovers;
     }
 
-    /// A new member. It acknowledges, receives what ends from now on, and tries again when sending fails.
+    /// Adds a member. It acknowledges, receives frames that end from now on, and tries again when sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -137,7 +137,7 @@ impl TimedBus {
         MemberId(self.members.len() - 1)
     }
 
-    /// The member is gone for good, and what it had queued; a frame that it is sending is cut off.
+    /// Removes the member for good, with its queued frames; a frame that it is sending is cut off.
     pub fn leave(&mut self, member: MemberId) {
         let member = &mut self.members[member.0];
         member.queue.clear();
@@ -146,8 +146,8 @@ impl TimedBus {
         member.left = true;
     }
 
-    /// Forgets what the member has queued and its error counters, as a reset does: it is on the bus again. A frame on the wire ends
-    /// as it would have, but is not tried again.
+    /// Forgets the queued frames of the member and its error counters, as a reset does: the member is on the bus again. A frame on
+    /// the wire ends unchanged, but is not sent again.
     pub fn clear(&mut self, member: MemberId) {
         let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.arbitration.involves(member));
         let number = member;
@@ -173,12 +173,12 @@ impl TimedBus {
         self.members[member.0].one_shot = one_shot;
     }
 
-    /// A member that acknowledges what it receives, or does not.
+    /// Lets a member acknowledge received frames, or not.
     pub fn set_acknowledges(&mut self, member: MemberId, acknowledges: bool) {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Faults between a member and the bus, as behind a gateway: the bus itself does not notice them.
+    /// Sets the faults between a member and the bus, as of a gateway: the bus itself does not notice them.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -186,7 +186,7 @@ impl TimedBus {
         self.members[member.0].lines = Some(Box::new((send, receive)));
     }
 
-    /// What these faults did so far to frames sent and received by the member.
+    /// Returns the counters of these faults for frames sent and received by the member.
     pub fn fault_stats(&self, member: MemberId) -> (FaultStats, FaultStats) {
         let lines = self.members[member.0].lines.as_deref();
         lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
@@ -226,7 +226,7 @@ impl TimedBus {
         self.members[member.0].queue.len()
     }
 
-    /// How the member's controller gets on.
+    /// Returns the state of the member's controller.
     pub fn state(&self, member: MemberId) -> ControllerState {
         self.members[member.0].counters.state()
     }
@@ -246,12 +246,12 @@ impl TimedBus {
         self.now
     }
 
-    /// What the bus has carried.
+    /// Returns the counters of the bus.
     pub fn stats(&self) -> BusStats {
         BusStats { now_ns: self.now, ..self.stats }
     }
 
-    /// When the next thing happens if nobody does anything, ns; it may have no event.
+    /// Returns the time of the next action if no further call is made, ns; the action may have no event.
     pub fn next_ns(&self) -> Option<u64> {
         if !self.events.is_empty() {
             return Some(self.now);
@@ -268,8 +268,8 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Goes on to the next event, or to `at_ns` when none comes before. Call it until it gives none: while it gives events,
-    /// it is the time of the event, and what is queued competes from then on.
+    /// Advances to the next event, or to `at_ns` if none comes before. Call it until it returns none: while it returns
+    /// events, the present time is the time of the event, and frames that are queued then compete from that time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -293,14 +293,14 @@ impl TimedBus {
         (u64::from(bits) * 1_000_000_000).div_ceil(u64::from(self.bitrate))
     }
 
-    /// When the bus and a member with a frame are ready.
+    /// Returns the time at which the bus and a member with a frame are ready.
     fn next_start(&self) -> Option<u64> {
         let ready = |member: &Member| member.on_bus() && !member.queue.is_empty();
         let start = |member: &Member| member.may_start.max(self.free_from);
         self.members.iter().filter(|member| ready(member)).map(start).min()
     }
 
-    /// What is due now.
+    /// Handles the events that are due now.
     fn step(&mut self) {
         let now = time(self.now);
         if self.transfer.as_ref().is_some_and(|transfer| transfer.end <= self.now)
@@ -342,7 +342,7 @@ impl TimedBus {
         }
     }
 
-    /// A frame begins: what was not yet 11 recessive bits counts for nothing.
+    /// A frame begins: fewer than 11 recessive bits before it do not count.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -360,7 +360,7 @@ impl TimedBus {
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
         let Some(arbitration) = Arbitration::of(&starters) else { return };
-        // Drawn for every frame: what happens to one does not change the luck of the others.
+        // Drawn for every frame: the fault of one frame does not change the faults of others.
         let (luck, place) = (self.random.f64(), self.random.f64());
         let (bits, error) = if arbitration.senders.is_empty() {
             (arbitration.bits + ERROR_FRAME, None)

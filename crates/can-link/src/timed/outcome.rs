@@ -1,4 +1,4 @@
-//! How a frame on the wire ends, and what it does to the counters.
+//! End of a frame on the wire, and its effect on the counters.
 
 use super::confinement::Counters;
 use super::wire::SUSPENDED;
@@ -18,7 +18,7 @@ impl TimedBus {
         let frame = arbitration.frame;
         let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
-        // Whoever left cut its frame off.
+        // A sender that left has cut its frame off.
         senders.retain(|member| !self.members[member.0].left);
         if senders.is_empty() && !destroyed && error.is_none() {
             error = Some(BusError::Disturbed);
@@ -54,7 +54,7 @@ impl TimedBus {
             if senders.contains(&number) || !self.members[number.0].on_bus() {
                 continue;
             }
-            // Who fell out of a collision goes on as a listener, and so it does on the wire.
+            // A member that dropped out of a collision goes on as a listener, as on the wire.
             self.count(number, Counters::received);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),

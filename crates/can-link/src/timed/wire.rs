@@ -1,4 +1,4 @@
-//! Classic frames as bits on the wire (ISO 11898-1): what arbitrates, stuffing, length.
+//! Classic frames as bits on the wire (ISO 11898-1): arbitration, stuffing, length.
 
 use crate::CanFrame;
 
@@ -14,9 +14,10 @@ pub(crate) const TO_ACKNOWLEDGE: u32 = 2;
 pub(crate) const INTERMISSION: u32 = 3;
 /// An error flag, the echo of the others, and the delimiter: an error frame at its longest.
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
-/// How long an error passive member waits after the intermission that follows its own frame.
+/// Wait of an error passive member after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
-/// Recessive bits in a row that a controller on its way back from bus-off counts as one, and how many of those it needs.
+/// Recessive bits in a row that a controller in its recovery from bus-off counts as one sequence, and the number of
+/// sequences that it needs.
 pub(crate) const RECESSIVE_RUN: u32 = 11;
 pub(crate) const RECOVERIES: u32 = 128;
 
@@ -69,7 +70,7 @@ impl WireBits {
 struct Writer {
     out: WireBits,
     crc: u16,
-    /// So many bits alike so far.
+    /// Equal bits in a row so far.
     same: u32,
     last: bool,
 }
@@ -101,7 +102,7 @@ fn crc15(crc: u16, bit: bool) -> u16 {
 
 /// The frame that wins arbitration has the lowest of these; equal ones do not arbitrate.
 ///
-/// Base identifier; then the remote bit of an 11-bit frame stands where a 29-bit one has its recessive substitute.
+/// Base identifier; then the remote bit of an 11-bit frame, at the place of the recessive substitute bit of a 29-bit one.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     let (value, remote) = (frame.id().value(), u32::from(frame.is_remote()));
     if frame.is_extended() {
@@ -144,7 +145,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Checked against a CRC of other hands and by reading the fields where the standard has them.
+        /// Checked against an independent CRC and by reading the fields at the places that the standard defines.
         #[test]
         fn fields_stand_where_the_standard_has_them(frame in any_classic()) {
             let wire = WireBits::of(&frame).unwrap();
@@ -153,7 +154,7 @@ mod tests {
                 run = if pair[0] == pair[1] { run + 1 } else { 0 };
                 prop_assert!(run < 5, "never six alike");
             }
-            // The stuff bit of the last run may lie behind the CRC.
+            // The stuff bit of the last run may come after the CRC.
             let mut logical = destuff(wire.bits());
             let crc = logical.split_off(logical.len() - 15);
             // Leading zeros do not change a CRC that starts at 0.
@@ -211,7 +212,7 @@ mod tests {
         }
     }
 
-    /// As a receiver does it: the bit after five alike is thrown away.
+    /// Removes stuff bits as a receiver does: drops the bit after five equal ones.
     fn destuff(bits: &[bool]) -> Vec<bool> {
         let (mut found, mut run, mut last, mut skip) = (Vec::new(), 0, None, false);
         for bit in bits {

@@ -1,4 +1,4 @@
-//! Flash records: which image this tool wrote to a board and read back, as the inventory keeps it.
+//! Flash records in the inventory: the image that this tool wrote to a board and read back.
 //!
 //! A board answers with Program ID and flash date only. The record adds what that answer does not cover: the hash of the
 //! image and its load address.
@@ -52,7 +52,7 @@ impl FlashRecord {
     }
 }
 
-/// The hash by which records compare images.
+/// Returns the hash by which records compare images.
 fn hash_of(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }

@@ -1,4 +1,4 @@
-//! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
+//! Body of the fuzz targets: every file reader on any bytes. A panic, or a broken promise, is a finding.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -30,9 +30,9 @@ pub fn image(data: &[u8]) {
     }
 }
 
-/// Recordings in every form; what is read is written in the same form and gives the same.
+/// Recordings in every form; a recording that was read and written again in the same form is unchanged.
 pub fn recording(data: &[u8]) {
-    // Text forms count microseconds, and what is written is whole.
+    // Text forms count microseconds, and a written recording is complete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;
@@ -62,7 +62,7 @@ pub fn recording(data: &[u8]) {
     }
 }
 
-/// Inventories; what is read is written as a text that gives the same.
+/// Inventories; an inventory that was read and written again as text is unchanged.
 pub fn inventory(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     if let Ok(inventory) = Inventory::parse(text) {
@@ -70,7 +70,7 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Signal tables: for every signal of one, what is shown of a word gives that word again, unless a limit forbids it.
+/// Signal tables: for every signal, the displayed text of a word gives that word again, unless a limit forbids it.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -102,7 +102,7 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Parameter files: what is read is checked against a board, and what fits is written as a text that gives the same words.
+/// Parameter files: a file that was read is checked against a board, and the valid values are written as a text that gives the same words.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };

@@ -1,4 +1,4 @@
-//! Inventory files: which board stands where. Written after an init, read before updates of several boards.
+//! Inventory files: positions of the boards. Written after an init, read before updates of several boards.
 //!
 //! ```toml
 //! [[board]]
@@ -24,7 +24,7 @@ use crate::master::InitReport;
 /// Longest file that is read, bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// One board of an inventory.
+/// Board of an inventory.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InventoryBoard {
@@ -32,19 +32,19 @@ pub struct InventoryBoard {
     pub number: u8,
     /// Flash number.
     pub flash_number: u16,
-    /// What the board reports about itself.
+    /// Description that the board reports.
     #[serde(default)]
     pub description: String,
-    /// What people call it.
+    /// Name given by the user.
     #[serde(default)]
     pub name: String,
-    /// What updates wrote to it.
+    /// Record of the last update.
     #[serde(default)]
     pub program: Option<FlashRecord>,
 }
 
 impl InventoryBoard {
-    /// What updates wrote to this board; a record of another board is none.
+    /// Returns the record of the last update of this board; `None` for a record of another board.
     pub fn record(&self) -> Option<FlashRecord> {
         self.program.filter(|record| record.flash_number == self.flash_number)
     }
@@ -63,7 +63,7 @@ struct File {
     board: Vec<InventoryBoard>,
 }
 
-/// Why a file is no inventory.
+/// Reasons why a file is not a valid inventory.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InventoryError {
@@ -72,7 +72,7 @@ pub enum InventoryError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// System error.
         source: std::io::Error,
     },
     /// Larger than any inventory.
@@ -95,7 +95,7 @@ pub enum InventoryError {
     /// Two boards at one place.
     #[error("board {number} is given twice")]
     Twice {
-        /// Its number.
+        /// Board number.
         number: u8,
     },
     /// Two places for one board.
@@ -110,10 +110,10 @@ pub enum InventoryError {
     },
 }
 
-/// Why nobody knows which board stands at a number.
+/// Reasons why the board at a number is not known.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
-    /// There is no inventory.
+    /// The inventory does not exist.
     #[error("which board stands at number {board}? there is no inventory {}", path.display())]
     NoInventory {
         /// The number.
@@ -165,7 +165,7 @@ impl Diagnose for IdentifyError {
 /// The flash number of a board by an inventory file.
 ///
 /// # Errors
-/// There is no such file, it cannot be read, or it does not have the board.
+/// The file does not exist, cannot be read, or does not list the board.
 pub fn flash_number_of(path: &Path, board: u8) -> Result<u16, IdentifyError> {
     if !path.exists() {
         return Err(IdentifyError::NoInventory { board, path: path.into() });
@@ -265,7 +265,7 @@ impl Inventory {
         }
     }
 
-    /// The boards without their flash records: those of a file that is not there any more prove nothing.
+    /// Returns the boards without their flash records: records of a deleted file prove nothing.
     #[must_use]
     pub fn without_records(mut self) -> Self {
         self.boards.values_mut().for_each(|board| board.program = None);
@@ -275,7 +275,7 @@ impl Inventory {
     /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
     ///
     /// # Errors
-    /// The file cannot be read or written. A board that the file does not list is no error: nothing is kept of it.
+    /// The file cannot be read or written. A board that the file does not list is not an error: no record of it is kept.
     pub fn set_record(
         path: &Path,
         flash_number: u16,

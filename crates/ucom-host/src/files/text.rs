@@ -1,4 +1,4 @@
-//! Small text files: reading with a limit, writing whole or not at all, quoting.
+//! Small text files: reading with a limit, atomic writing, quoting.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub enum TextError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// System error.
         source: std::io::Error,
     },
     /// Larger than any file of its kind.
@@ -28,7 +28,7 @@ pub enum TextError {
     },
 }
 
-/// Reads a text; also from what has no length beforehand, as a pipe.
+/// Reads a text; also from a source without a known length, as a pipe.
 pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     let io = |source| TextError::Io { path: path.into(), source };
     let mut text = String::new();
@@ -40,7 +40,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     Ok(text)
 }
 
-/// Writes a file whole or not at all. Behind a link the file it leads to is written, and a file keeps its mode.
+/// Writes a file atomically. If the path is a link, its target is written; an existing file keeps its mode.
 ///
 /// # Errors
 ///

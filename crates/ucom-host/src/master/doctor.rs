@@ -1,4 +1,4 @@
-//! What is wrong with bus, chain and boards, in words with the next command.
+//! Findings about bus, chain and boards, with the next command.
 use crate::master::engine::{Boards, Life, Statistics};
 use crate::master::error::SHARED_CAUSE;
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
@@ -8,37 +8,37 @@ pub use host_kit::{Finding, Severity};
 use crate::master::counted::counted;
 use ucom::{Function, Profile};
 
-/// What the CAN controller reports about itself.
+/// State that the CAN controller reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Controller {
-    /// It has left the bus.
+    /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// How often it has left the bus while it was looked at; it may be back.
+    /// Number of times it was bus-off during the observation; it may be active again.
     pub times_bus_off: u64,
-    /// It is error passive.
+    /// `true` if the controller is error passive.
     pub passive: bool,
     /// Transmit error counter.
     pub tec: Option<u16>,
     /// Receive error counter.
     pub rec: Option<u16>,
-    /// Frames that nobody acknowledged.
+    /// Frames without an acknowledgement.
     pub no_acknowledge: u64,
-    /// Stuff, form and check errors: what a wrong bit rate or reflections make.
+    /// Stuff, form and check errors, as caused by a wrong bit rate or reflections.
     pub protocol_errors: u64,
 }
 
-/// What was observed; what is not known stays `None` or empty.
+/// Observations; unknown values stay `None` or empty.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
-    /// How long was listened, µs.
+    /// Time of listening, µs.
     pub listened_us: u64,
-    /// When the observation ended, µs.
+    /// Time at which the observation ended, µs.
     pub now_us: u64,
     /// Counters of the bus.
     pub statistics: Statistics,
     /// Boards as last seen.
     pub boards: Boards,
-    /// Of the adapter, where it reports them.
+    /// State of the adapter, if it reports one.
     pub controller: Option<Controller>,
     /// A harmless scan.
     pub scan: Option<ScanReport>,
@@ -169,7 +169,7 @@ fn chain(o: &Observation, f: &mut Findings) {
     }
 }
 
-/// What an init found.
+/// Adds the findings of an init.
 fn initialised(init: &InitReport, f: &mut Findings) {
     for finding in &init.findings {
         f.problem(finding.to_string(), "", after_init(finding));
@@ -204,14 +204,14 @@ fn after_init(finding: &InitFinding) -> String {
     }
 }
 
-/// What a scan found.
+/// Adds the findings of a scan.
 fn scanned(scan: &ScanReport, f: &mut Findings) {
     for shared in scan.findings.iter().filter_map(ScanFinding::error) {
         let (why, next) = SHARED_CAUSE;
         f.problem(shared.to_string(), why, next);
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // What else was read of these boards is read wrong, too.
+        // The other values of these boards were read in the wrong order, too.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }
@@ -241,7 +241,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
     }
 }
 
-/// How many boards have a number.
+/// Adds a finding about the number of boards with a number.
 fn numbers(scan: &ScanReport, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {

@@ -1,4 +1,4 @@
-//! What the fuzz targets run: any frames at any time into any procedure. A panic or a wait without end is a finding.
+//! Body of the fuzz targets: any frames at any time into any procedure. A panic or an endless wait is a finding.
 use crate::master::engine::Event;
 use crate::master::interface::Master;
 use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};
@@ -7,7 +7,7 @@ use crate::master::reports::{
 };
 use ucom::{Format, Frame, Profile, Status};
 
-/// Longest virtual time that a procedure may take whatever comes, µs: attempts × blocks × the longest timeout.
+/// Longest virtual time that a procedure may take for any input, µs: attempts × blocks × the longest timeout.
 const LIMIT_US: u64 = 3_600_000_000;
 
 fn request(choice: u8) -> Request {

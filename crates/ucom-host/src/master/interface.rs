@@ -1,4 +1,4 @@
-//! What a driver calls: [`Master`].
+//! Interface for a driver: [`Master`].
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
@@ -19,7 +19,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// Listens; sends nothing by itself.
+    /// Creates a master that listens and sends nothing by itself.
     pub fn new(profile: Profile) -> Self {
         Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
     }
@@ -45,7 +45,7 @@ impl Master {
         Ok(id)
     }
 
-    /// Ends a procedure; what it has to undo on the boards it still does, then [`Event::Done`] comes.
+    /// Cancels a procedure; it still undoes its changes on the boards, then [`Event::Done`] comes.
     pub fn cancel(&mut self, id: ProcedureId) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.cancel = true;
@@ -53,8 +53,8 @@ impl Master {
         self.run();
     }
 
-    /// The bus is gone: ends a procedure without another frame. [`Event::Done`] comes at once: an update's with what
-    /// is known of each board, the conformance tests' with those that were done, any other's with [`MasterError::Bus`].
+    /// Ends a procedure without another frame, because the bus is lost. [`Event::Done`] comes at once: an update's with
+    /// the known state of each board, the conformance tests' with the finished tests, any other's with [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -77,8 +77,8 @@ impl Master {
         self.poll_behind(now, now)
     }
 
-    /// The same for a driver that has handed over what arrived up to `received`, not what came between that and `now`: no
-    /// wait ends beyond `received`, but heartbeats go out.
+    /// Like `poll`, for a driver that has handed over the frames up to `received`, but not those between that time and
+    /// `now`: no wait ends after `received`, but heartbeats are sent.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -90,7 +90,7 @@ impl Master {
         lock(&self.core).pop()
     }
 
-    /// When [`Master::poll`] has something to do next, unless a frame arrives before. `None`: only when one arrives.
+    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives before. `None`: only when a frame arrives.
     pub fn next_deadline(&self) -> Option<u64> {
         let core = lock(&self.core);
         if !core.idle() {
@@ -100,12 +100,12 @@ impl Master {
         waiting.chain(core.duties_deadline()).min()
     }
 
-    /// What has happened, oldest first.
+    /// Takes the oldest event.
     pub fn take_event(&mut self) -> Option<Event> {
         lock(&self.core).take_event()
     }
 
-    /// Whether a procedure is under way.
+    /// Returns `true` if a procedure is in progress.
     pub fn is_busy(&self) -> bool {
         !self.work.is_empty()
     }
@@ -131,12 +131,12 @@ impl Master {
         lock(&self.core).profile
     }
 
-    /// Whether heartbeats go out.
+    /// Returns `true` if this PC sends heartbeats.
     pub fn is_master(&self) -> bool {
         lock(&self.core).session != Session::Quiet
     }
 
-    /// Another PC's last frame (D-08): when it came, what it was, and to which number.
+    /// Returns another PC's last frame (D-08): its time, its function, and its number.
     pub fn competing_master(&self) -> Option<(u64, Function, u8)> {
         lock(&self.core).competing_master
     }
@@ -177,7 +177,7 @@ impl Master {
         Ok(index)
     }
 
-    /// Writes a parameter of a described board; there is no answer, the shadow takes it as assumed (D-35).
+    /// Writes a parameter of a described board; no answer comes, so the shadow marks the value as assumed (D-35).
     pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
@@ -207,7 +207,7 @@ impl Master {
         lock(&self.core).descriptions.insert(key, description);
     }
 
-    /// Whether the inputs of a board are sent again and again: one that is lost is followed by others (D-34).
+    /// Returns `true` if the inputs of a board are sent cyclically: a lost frame is followed by others (D-34).
     pub fn repeats_inputs(&self, board: u8) -> bool {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
@@ -222,7 +222,7 @@ impl Master {
         lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
     }
 
-    /// Snapshots of a board's sensor outputs as [`Event::Snapshot`]; `dimension` where it is not described yet.
+    /// Reports a board's sensor outputs as [`Event::Snapshot`]; `dimension` is needed if the board is not described yet.
     pub fn watch(&mut self, board: u8, dimension: Option<u16>, on: bool) {
         let mut core = lock(&self.core);
         let data = core.data.entry(board & 31).or_default();
@@ -239,9 +239,8 @@ impl Master {
         core.start_session();
     }
 
-    /// Stops control loops (ADMIN_DATA, all 0) before everything else that is to be sent, and twice again a moment later: those
-    /// of these boards, the last one first, or by broadcast of all. No answer is waited for; [`Request::Stop`] sees to each
-    /// board.
+    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly after: for
+    /// these boards, the last one first, or for all by broadcast. Waits for no answer; [`Request::Stop`] checks each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

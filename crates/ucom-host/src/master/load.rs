@@ -1,4 +1,4 @@
-//! Bus load: what frames cost at worst, and the forecast before boards are started (P-19).
+//! Bus load: worst-case length of frames, and the forecast before boards are started (P-19).
 
 use core::fmt;
 
@@ -7,12 +7,12 @@ use ucom::{Dimensions, Profile};
 /// Bits of a classic frame with worst-case stuffing and the pause after it: DLC 0 = 55, 2 = 75, 8 = 135.
 pub const fn frame_bits(dlc: u8) -> u64 {
     let data = 8 * if dlc > 8 { 8 } else { dlc as u64 };
-    // 34 of the 44 bits that are no data can be stuffed, and three more separate frames.
+    // 34 of the 44 bits outside the data can be stuffed, and three more bits separate frames.
     let stuffed = 34 + data;
     44 + data + 3 + (stuffed - 1) / 4
 }
 
-/// What the control loops of some boards will put on the bus.
+/// Bus load that the control loops of some boards will cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoadForecast {
     /// Boards that run.
@@ -26,7 +26,7 @@ pub struct LoadForecast {
 }
 
 impl LoadForecast {
-    /// For boards with these dimensions.
+    /// Creates a forecast for boards with these dimensions.
     pub fn new<'a>(dimensions: impl IntoIterator<Item = &'a Dimensions>, profile: &Profile) -> Self {
         let per_second = |period_ms: u32| 1000.0 / f64::from(period_ms.max(1));
         let full = frame_bits(8) as f64;
@@ -75,7 +75,7 @@ mod tests {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);
     }
 
-    /// 7 and 16 boards with so many words of SO and CI at 10 ms, and at 1 ms.
+    /// Loads of 7 and 16 boards with given words of SO and CI at 10 ms, and at 1 ms.
     #[test]
     fn p19_forecasts_of_the_requirements() {
         let forecast = |boards: usize, so: u16, ci: u16, period: u32| {

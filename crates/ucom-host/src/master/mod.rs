@@ -1,15 +1,16 @@
 //! The PC side: procedures as state machines without I/O.
 //!
-//! A [`Master`] is fed with frames and with time and gives frames back; it never waits, has no clock and no thread.
-//! A driver is a loop of a few lines:
+//! A [`Master`] takes frames and the time and returns frames; it never waits, has no clock and no thread. A driver is a
+//! loop of a few lines:
 //!
 //! 1. hand over every frame that has arrived: [`Master::handle`];
-//! 2. send while [`Master::poll`] gives frames;
-//! 3. look at [`Master::take_event`];
+//! 2. send while [`Master::poll`] returns frames;
+//! 3. handle [`Master::take_event`];
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
-//! What has arrived is handed over before `poll` is called: waiting ends only in `poll`, so a driver that comes late
-//! mistakes no answer for silence ([`Master::poll_behind`] for what came while it handed over). Time is in microseconds from any start and must not go back (a monotonic clock).
+//! Hand over all received frames before `poll` is called: waits end only in `poll`, so a late driver never mistakes an answer for silence
+//! ([`Master::poll_behind`] covers frames that came during the hand-over). Time is in microseconds from any start and must not go back (a
+//! monotonic clock).
 //!
 //! ```
 //! use ucom_host::master::{Event, Master, Outcome, Request};
@@ -46,7 +47,7 @@ mod load;
 mod procedures;
 mod reports;
 
-/// Whether boards follow the protocol page: options, tests and report.
+/// Conformance tests against the protocol page: options, tests and report.
 pub mod conformance {
     pub use crate::master::procedures::conformance::table::test_names;
     pub use crate::master::reports::{
@@ -54,7 +55,7 @@ pub mod conformance {
     };
 }
 
-/// Measures what boards read otherwise than the defaults: options and report.
+/// Measurement of properties in which boards differ from the defaults: options and report.
 pub mod probe {
     pub use crate::master::reports::{ProbeOptions, ProbeReport, ProbeRow};
 }

@@ -7,7 +7,7 @@ const AGAIN_US: u64 = 5_000_000;
 pub const WHY: &str =
     "too many of its frames failed: a wrong bit rate, no termination, or CAN_H and CAN_L swapped or shorted";
 
-/// What has been reported of it.
+/// Bus-off events reported so far.
 #[derive(Debug, Default)]
 pub struct BusOff {
     reported: u64,
@@ -15,7 +15,7 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// What is to be reported when it has left the bus so often; `None`: nothing new, or it was reported a moment ago.
+    /// Returns the message for a new bus-off; `None` if there is no new one or if one was reported in the last 5 s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);
         if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
@@ -30,7 +30,8 @@ impl BusOff {
     }
 }
 
-/// What brings it back and finds the cause. Only the kernel's interfaces stay away until a command brings them back.
+/// Returns the command that ends the bus-off or finds its cause. Only interfaces of the kernel stay off the bus
+/// until a command restarts them.
 pub fn next(url: &str) -> String {
     match url.strip_prefix("socketcan:") {
         Some(interface) => format!(

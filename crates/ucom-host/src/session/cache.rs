@@ -1,4 +1,4 @@
-//! What is remembered from session to session: small files in a directory.
+//! Cache between sessions: small files in a directory.
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// Longest file that is read beforehand, bytes.
 const FILE_MAX: u64 = 1 << 20;
-/// Files that wait for a disk: what comes beyond is not kept.
+/// Most files that wait for the disk: further files are not stored.
 const WAITING_MAX: usize = 64;
 
-/// Where names are remembered from session to session, and whether they are taken from there.
+/// Place of the cached names, and a flag to ignore them.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     place: Place,
@@ -20,14 +20,14 @@ pub struct Cache {
 
 #[derive(Clone, Debug, Default)]
 enum Place {
-    /// Nothing is remembered.
+    /// No cache.
     #[default]
     Nowhere,
     Directory(PathBuf),
     Memory(Memory),
 }
 
-/// What a directory has, and where to write what comes.
+/// Files of a directory in memory, and the channel to the thread that writes new ones.
 #[derive(Clone, Debug)]
 struct Memory {
     texts: Arc<Mutex<BTreeMap<String, String>>>,
@@ -35,28 +35,29 @@ struct Memory {
 }
 
 impl Cache {
-    /// One that remembers in this directory; `None`: nothing is remembered.
+    /// Creates a cache in this directory; `None`: no cache.
     pub fn new(directory: Option<PathBuf>, fresh: bool) -> Self {
         Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
     }
 
-    /// The same for who must never wait for a disk: all that is there is read now, and what comes is written by a thread of its own.
+    /// Like `new`, for a caller that must never wait for a disk: reads all files now; a separate thread writes new ones.
     #[must_use]
     pub fn in_memory(self) -> Self {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // It ends with the last clone of this cache, and is not waited for: what cannot be kept is asked for anew.
+        // The thread ends with the last clone of this cache; the cache does not wait for it. Data that could not
+        // be stored is requested again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }
 
-    /// The same; boards are asked although their names are known.
+    /// Returns a cache that ignores stored names, so that boards are asked again.
     pub(super) fn refreshed(&self) -> Self {
         Self { fresh: true, ..self.clone() }
     }
 
-    /// A file; `None`: there is none, or it cannot be read.
+    /// Reads a file; `None` if it does not exist or cannot be read.
     pub(super) fn read(&self, name: &str) -> Option<String> {
         match &self.place {
             Place::Nowhere => None,
@@ -67,14 +68,14 @@ impl Cache {
         }
     }
 
-    /// Keeps a file. What cannot be kept is forgotten: that is no error.
+    /// Stores a file. A failed write is ignored: it is not an error.
     pub(super) fn write(&self, name: String, text: String) {
         match &self.place {
             Place::Nowhere => {}
             Place::Directory(directory) => write(directory, &name, text),
             Place::Memory(Memory { texts, writer }) => {
                 texts.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), text.clone());
-                // A disk that does not answer is not waited for.
+                // The cache does not wait for a disk that does not answer.
                 let _ = writer.try_send((name, text));
             }
         }
@@ -89,7 +90,7 @@ fn all(directory: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let text = |entry: fs::DirEntry| {
         let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
-        // Nothing else than a file, which could be waited for without end.
+        // Only regular files: reading from anything else could block without end.
         let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
         about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
     };
@@ -106,7 +107,7 @@ mod tests {
         let on_disk = Cache::new(Some(dir.path().join("new")), false);
         on_disk.write("a.json".into(), "1".into());
         let cache = on_disk.clone().in_memory();
-        // Nothing of the disk is looked at from now on.
+        // From here on the cache does not read the disk.
         on_disk.write("a.json".into(), "2".into());
         assert_eq!(cache.read("a.json").as_deref(), Some("1"));
         cache.write("b.json".into(), "3".into());

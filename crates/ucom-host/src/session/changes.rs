@@ -1,4 +1,4 @@
-//! Single acts on several boards: none is changed before all answer, and what was done before one fails is reported.
+//! Single actions on several boards: none is changed before all answer, and changes before a failure are reported.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use crate::master::{Error, MasterError, Outcome, RawStatus, Request, StopLevel};
 /// A board by its number, with its answer to PC_INFO.
 pub type Numbered = (u8, BoardInfo);
 
-/// What became of a stop of several boards, or of their outputs.
+/// Result of a stop of several boards, or of switching off their outputs.
 #[derive(Debug)]
 pub struct Stopped {
     /// Boards that confirmed it.
@@ -31,7 +31,7 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
 }
 
 impl SessionError {
-    /// The same with what has been done already, where one of several boards fails.
+    /// Returns this error together with the boards that were changed before, if one of several boards fails.
     #[must_use]
     pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
         let done: Vec<u8> = done.into_iter().collect();
@@ -51,7 +51,7 @@ impl Driver {
     /// Changes one board after the other; none before all of them answer.
     ///
     /// # Errors
-    /// That of the first board that fails; [`SessionError::Partly`] where others were changed before it.
+    /// Error of the first board that fails; [`SessionError::Partly`] if others were changed before it.
     pub fn change_each(
         &mut self,
         boards: &[u8],
@@ -68,7 +68,7 @@ impl Driver {
         Ok(all)
     }
 
-    /// One PC_SETSTATUS with these two bytes to each board, or by broadcast to all; `new = (old & ~mask) | value`.
+    /// Sends one PC_SETSTATUS with these two bytes to each board, or by broadcast to all; `new = (old & ~mask) | value`.
     ///
     /// # Errors
     /// As [`Self::change_each`].
@@ -95,17 +95,17 @@ impl Driver {
         Ok(all)
     }
 
-    /// Of several boards each must answer before the first one is changed.
+    /// Checks that each of several boards answers before the first one is changed.
     fn all_there(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let mut several = boards.iter().filter(|_| boards.len() > 1);
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards, as far as `level` demands. All are commanded to before any is asked: no board goes on because another one does not
-    /// answer. What fails is noted.
+    /// Stops boards down to `level`. Sends all stop commands before it asks any board, so that a board that does not answer delays no
+    /// other. Failures are collected.
     ///
     /// # Errors
-    /// Who is there is not known, or nobody is.
+    /// The boards on the bus are not known, or no board answers.
     pub fn stop_each(&mut self, boards: &Boards, level: StopLevel) -> Result<Stopped, SessionError> {
         match boards {
             Boards::All => self.stop_at_once(None),
@@ -128,12 +128,12 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; their control loops go on. Each is commanded to, also where another one or it itself does not
-    /// answer. What fails is noted.
+    /// Makes the outputs of boards safe; their control loops go on. Commands every board, even if that board or another one does not
+    /// answer. Failures are collected.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
         for board in boards {
-            // Where an end was asked for, nobody knows of those that were not commanded.
+            // After Ctrl-C the state of boards that were not commanded is unknown.
             let done = match self.stop_asked() {
                 true => Err(Error::Master(MasterError::Cancelled).into()),
                 false => self.run(Request::Stop { board: *board, level: StopLevel::Outputs, force }),
@@ -153,7 +153,7 @@ impl Driver {
     /// certain; why is noted once for each reason, except for the one that is `known` already.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
-        // A bus that is gone is gone for all boards.
+        // A lost bus is lost for all boards.
         let mut noted: BTreeSet<String> = known.into_iter().collect();
         let mut running = BTreeSet::new();
         for level in [StopLevel::Loop, StopLevel::Application] {

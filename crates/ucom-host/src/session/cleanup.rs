@@ -1,32 +1,32 @@
-//! The cleanup list: what would be left undone if the process ended now, and the command that does it.
+//! Cleanup list: work left undone if the process ended now, and the command that finishes it.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::master::{Request, StopLevel};
 
-/// What is left undone if the process ends now, and the next command.
+/// Work left undone if the process ends now, and the next command.
 type Cleanup = (String, String);
 
-/// What has been begun and would be left undone; a clone sees the same list, also from the thread that receives Ctrl-C.
+/// List of work begun and not finished; a clone shares the list, also in the thread that receives Ctrl-C.
 #[derive(Clone, Debug, Default)]
 pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// What the requests under way leave undone, the outermost first.
+    /// Work that the requests in progress leave undone, the outermost first.
     now: Vec<Option<Cleanup>>,
     /// Boards that run, by a request that has ended.
     running: Vec<u8>,
     /// Boards that were started by requests that have ended.
     started: BTreeSet<u8>,
-    /// Something on the boards is not as it was.
+    /// `true` if the state of the boards was changed.
     changed: bool,
 }
 
 impl State {
     fn words(&self) -> String {
-        // What is done with boards that run does not hide that they do.
+        // A request in progress on running boards does not hide that they run.
         let runs = (!self.running.is_empty()).then(|| cleanup_of_running(&self.running));
         let under_way = self.now.iter().flatten().next().cloned().filter(|_| runs.is_none());
         let started: Vec<String> =
@@ -47,12 +47,12 @@ impl State {
 }
 
 impl CleanupList {
-    /// What would be left undone if the process ended now, and the command that does it: lines for the operator.
+    /// Returns the work left undone if the process ended now, and the command that finishes it, as lines for the operator.
     pub fn words(&self) -> String {
         self.lock().words()
     }
 
-    /// Something begins that is no request; what it leaves undone, and the next command.
+    /// Begins an action that is not a request; `what` is the work it leaves undone, `next` the next command.
     pub fn begin_other(&self, what: &str, next: &str) {
         let mut state = self.lock();
         state.changed = true;
@@ -83,7 +83,7 @@ impl CleanupList {
         }
     }
 
-    /// Nothing is undone any more.
+    /// Clears the list of running and started boards.
     pub fn forget(&self) {
         let mut state = self.lock();
         state.running.clear();
@@ -108,7 +108,7 @@ fn several(count: usize, list: &str) -> String {
     format!("board{} {list}", if count == 1 { "" } else { "s" })
 }
 
-/// What a request may leave undone; `None`: it changes nothing.
+/// Returns the work that a request may leave undone; `None` if the request changes no board.
 fn cleanup_of(request: &Request) -> Option<Cleanup> {
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {
@@ -145,7 +145,7 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
             let what = format!("what {} took of it is not known", several(boards.len(), &boards.join(", ")));
             (what, format!("ucom status {}", boards.join(",")))
         }
-        // These may have started a board or numbered the chain anew.
+        // These may have started a board or renumbered the chain.
         Request::Probe(_) | Request::Conformance(_) => {
             ("what the boards do is not known".into(), "ucom scan".into())
         }
@@ -163,7 +163,7 @@ mod tests {
         Request::Stop { board, level: StopLevel::Application, force: true }
     }
 
-    /// What was begun is undone until its end, also while something inside it goes on.
+    /// An action counts as undone until it ends, even while another one runs inside it.
     #[test]
     fn what_is_left_undone() {
         let cleanup = CleanupList::default();
@@ -184,7 +184,7 @@ mod tests {
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
-    /// Boards that earlier requests of the same command have started are named, whatever is under way.
+    /// Boards that earlier requests of the same command started are named, whichever request is in progress.
     #[test]
     fn boards_started_before_are_named() {
         let cleanup = CleanupList::default();

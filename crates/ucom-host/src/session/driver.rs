@@ -17,19 +17,19 @@ use crate::master::{
     StopLevel, Supervision,
 };
 
-/// Whoever runs the session: may end it, and reads what is noted beside results.
+/// Operator of a session: can end it, and receives notes in addition to results.
 pub trait Operator {
-    /// An end was asked for (Ctrl-C).
+    /// Returns `true` if the user requested an end (Ctrl-C).
     fn stop_asked(&self) -> bool;
     /// Takes a line; waits for no reader.
     fn note(&self, text: String);
-    /// Something happened beside the procedure that runs; `text`: what is to be noted of it.
+    /// Receives an event outside the running procedure; `text`: the note to show for it.
     fn happened(&self, _event: &Event, text: Option<String>) {
         if let Some(text) = text {
             self.note(text);
         }
     }
-    /// Called in each turn, also of procedures: for what cannot wait for their end.
+    /// Called in each turn, also during procedures: for work that cannot wait for their end.
     fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
@@ -51,7 +51,7 @@ struct Loss {
 }
 
 impl Driver {
-    /// The PC side on a bus. What its requests would leave undone stands in `cleanup`.
+    /// Creates the PC side on a bus. `cleanup` lists the work that its requests would leave undone.
     pub fn new(profile: Profile, link: Link, operator: Box<dyn Operator>, cleanup: CleanupList) -> Self {
         let (master, pump) = (Master::new(profile), Pump::default());
         Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
@@ -67,12 +67,12 @@ impl Driver {
         &mut self.link
     }
 
-    /// The operator asked for an end.
+    /// Returns `true` if the operator requested an end.
     pub fn stop_asked(&self) -> bool {
         self.operator.stop_asked()
     }
 
-    /// Hands over what has come and sends what is due, waiting for either no longer than `patience`.
+    /// Hands over received frames and sends due ones; waits for either no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         self.operator.turned(&mut self.master, &mut self.link);
@@ -82,12 +82,12 @@ impl Driver {
         turned
     }
 
-    /// Runs a procedure to its end. Ctrl-C cancels it: what it has to undo on the boards it still does.
+    /// Runs a procedure to its end. Ctrl-C cancels it; the procedure still undoes its changes on the boards.
     pub fn run(&mut self, request: Request) -> Result<Outcome, SessionError> {
         self.run_with(request, &mut |_| {})
     }
 
-    /// The same; every event goes to `see`.
+    /// Like `run`, and passes every event to `see`.
     pub fn run_with(
         &mut self,
         request: Request,
@@ -96,12 +96,12 @@ impl Driver {
         self.drive(request, true, &mut |_, event| see(event))
     }
 
-    /// What a board reports of itself.
+    /// Asks a board for its identity and state.
     pub fn seen(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, true)
     }
 
-    /// The same, also after Ctrl-C: what was begun and cancelled may have left the board in any state.
+    /// Like `seen`, also after Ctrl-C: a cancelled procedure may have left the board in any state.
     pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, false)
     }
@@ -118,7 +118,7 @@ impl Driver {
         self.master.stop_at_once(self.link.now_us(), boards);
     }
 
-    /// Stops a board, also after Ctrl-C: what was started is not left alone.
+    /// Stops a board, also after Ctrl-C: a started board is not left running.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
         self.drive(request, false, &mut |_, _| {}).map(drop)
@@ -137,7 +137,7 @@ impl Driver {
             Err(error) => Err(error.into()),
         };
         self.cleanup.end(&request, result.is_ok());
-        // Who does not answer may never have been asked.
+        // A board that does not answer may never have received the request.
         let was_off = self.link.times_bus_off() > times_off;
         result.map_err(|failure| match was_off && failure.kind() == ErrorKind::NoLink {
             true => SessionError::BusOff { failure: Box::new(failure), url: self.link.url().into() },
@@ -155,7 +155,7 @@ impl Driver {
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
-                // Its end follows at once, with what is known.
+                // Its end follows at once, with the known results.
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
@@ -164,7 +164,7 @@ impl Driver {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {
                             (Err(Error::Master(MasterError::Bus { .. })), Some(failure)) => Err(failure),
-                            // What became of boards is reported also when the bus fails.
+                            // The results of boards are reported even if the bus fails.
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
                                 let sent = self.pump.flush(&mut self.master, &mut self.link);
@@ -186,7 +186,7 @@ impl Driver {
         }
     }
 
-    /// What was started has been stopped.
+    /// Records that all started boards have been stopped.
     pub fn nothing_is_left(&self) {
         self.cleanup.forget();
     }
@@ -196,7 +196,7 @@ impl Driver {
         self.operator.note(text);
     }
 
-    /// A failure if a board was lost, or one of these has rebooted, by what was reported.
+    /// Returns an error if a board was lost, or one of these has rebooted, according to the reports.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
         let losses = self.lost.borrow();
         let lost = losses.iter().filter(|l| !l.rebooted).count();
@@ -204,7 +204,7 @@ impl Driver {
         if lost + rebooted == 0 { Ok(()) } else { Err(SessionError::Lost { lost, rebooted }) }
     }
 
-    /// Notes what happens beside a procedure.
+    /// Notes an event outside a procedure.
     pub fn note_event(&self, event: &Event, during: Option<ProcedureId>) {
         if let Event::Supervision {
             board,
@@ -222,7 +222,7 @@ impl Driver {
         self.operator.happened(event, None);
     }
 
-    /// The numbers of the boards that are meant; `all` asks who is there, and refuses a number that two boards have.
+    /// Returns the numbers of the selected boards; for `all` it scans the bus, and refuses a number that two boards have.
     pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         let numbers = self.numbers_to_stop(boards)?;
         match self.master.shared_numbers().into_iter().next() {
@@ -231,7 +231,7 @@ impl Driver {
         }
     }
 
-    /// The same with the numbers that two boards have: a stop stops both.
+    /// Like `numbers`, including numbers that two boards share: a stop stops both.
     pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
@@ -245,7 +245,7 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Who is there and is not among these numbers is not left out silently.
+                    // Boards that are not among these numbers are noted, not left out silently.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
@@ -259,7 +259,7 @@ impl Driver {
     }
 }
 
-/// Words for an event; `None` where they would only repeat what a procedure reports itself.
+/// Returns the text for an event; `None` if the procedure reports the event itself.
 pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
@@ -301,7 +301,7 @@ pub fn nothing_shared(master: &Master) -> Result<(), SessionError> {
     master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// One short line while the tests go on.
+/// Returns one short line per test while the tests run.
 fn test_text(test: &ConformanceTest) -> String {
     let how = match &test.verdict {
         Verdict::Pass => "passed",

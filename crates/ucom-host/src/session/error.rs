@@ -1,4 +1,4 @@
-//! Why a session did not do what was asked: a procedure failed, or what is around it did.
+//! Errors of a session: a procedure failed, or its environment did.
 use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
@@ -9,14 +9,14 @@ use crate::master::error::of_one;
 use crate::master::io::Kind;
 use crate::master::{Error, ExchangeError, MasterError, Outcome, SignalError};
 
-/// Why a session did not do what was asked.
+/// Reasons why a session did not carry out a request.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
     /// A procedure failed.
     #[error(transparent)]
     Procedure(#[from] Error),
-    /// Values do not fit the boards, or what became of them is not known.
+    /// Values do not fit the boards, or the result of sending them is not known.
     #[error(transparent)]
     Values(#[from] ValuesError),
     /// The inventory cannot be read.
@@ -31,37 +31,37 @@ pub enum SessionError {
     /// The bus has no such frame.
     #[error("{0}")]
     Frame(InvalidFrame),
-    /// Nothing answered while the controller of this computer was off the bus: it may never have been asked.
+    /// No answer while the controller of this computer was bus-off: the request may never have been sent.
     #[error("{failure}; the CAN controller of this computer was bus-off meanwhile")]
     BusOff {
-        /// What failed.
+        /// Failure.
         failure: Box<SessionError>,
         /// The URL of the bus.
         url: String,
     },
-    /// One of several boards failed after others had been changed.
+    /// A board failed after other boards had been changed.
     #[error("{failure}; changed already: board {}", list(done))]
     Partly {
-        /// What failed.
+        /// Failure.
         failure: Box<SessionError>,
         /// Boards that were changed before it.
         done: Vec<u8>,
     },
-    /// No board is there.
+    /// No board answers.
     #[error("no board answers")]
     NoBoards,
     /// No board has a number.
     #[error("{}", if *boards == 1 { "1 board is there, without a number".to_owned() } else { format!("{boards} boards are there, none has a number") })]
     NoNumbers {
-        /// How many are there.
+        /// Number of boards.
         boards: usize,
     },
     /// Boards were lost, or have rebooted, in the course of the session.
     #[error("{}", losses(*lost, *rebooted))]
     Lost {
-        /// How often one was lost.
+        /// Number of losses of a board.
         lost: usize,
-        /// How often one has rebooted.
+        /// Number of reboots of a board.
         rebooted: usize,
     },
     /// Boards have left their control loops by themselves.
@@ -73,7 +73,7 @@ pub enum SessionError {
     /// The names of boards' inputs, outputs and parameters are not known.
     #[error("{}", unnamed(failed))]
     NoNames {
-        /// Those boards, each with what failed.
+        /// These boards, each with its failure.
         failed: Vec<(u8, SessionError)>,
     },
     /// An outcome that does not fit its request: a mistake in this library.
@@ -81,42 +81,42 @@ pub enum SessionError {
     Unexpected(Box<Outcome>),
 }
 
-/// Why values cannot be sent to boards, or what became of them is not known.
+/// Reasons why values cannot be sent to boards, or why the result is not known.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValuesError {
     /// The board has no signal at this place.
     #[error("board {board} has no {} {index}", kind.name())]
     NoSignal {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// Which buffer.
+        /// Buffer.
         kind: Kind,
         /// The place.
         index: u16,
     },
-    /// The value is none of the signal's.
+    /// The value is not valid for the signal.
     #[error("board {board}: {} `{name}`: {error}", kind.name())]
     Value {
         /// The board.
         board: u8,
-        /// Which buffer.
+        /// Buffer.
         kind: Kind,
-        /// As it was given.
+        /// Name as given.
         name: String,
         /// The program that the board has.
         program_id: u16,
-        /// What is wrong with it.
+        /// Error in the value.
         error: Box<ValueError>,
     },
-    /// One signal has two values.
+    /// A signal has two values.
     #[error("board {board}: {} `{name}` is given twice", kind.name())]
     Twice {
         /// The board.
         board: u8,
-        /// Which buffer.
+        /// Buffer.
         kind: Kind,
-        /// Its name.
+        /// Name.
         name: String,
     },
     /// A value for a board that is not meant.
@@ -124,19 +124,19 @@ pub enum ValuesError {
     NotMeant {
         /// The board.
         board: u8,
-        /// The signal.
+        /// Name of the signal.
         name: String,
-        /// What is to be done with the others.
+        /// Action for which boards were selected, as a verb.
         to: &'static str,
     },
-    /// Values were sent, and the application is not there to have taken them.
+    /// Values were sent, but the application was not running to take them.
     #[error("board {board}: values were sent, but {why}: what it has now is unknown{}", before(written))]
     Unknown {
         /// The board.
         board: u8,
-        /// Why.
+        /// Reason.
         why: String,
-        /// Boards that were written to before it; `None` where that is no matter.
+        /// Boards that were written to before it; `None` if irrelevant.
         written: Option<Vec<u8>>,
     },
     /// A parameter file cannot be read, or has nothing to write.
@@ -144,7 +144,7 @@ pub enum ValuesError {
     File {
         /// With the file's name.
         message: String,
-        /// What helps.
+        /// Remedy.
         hint: &'static str,
     },
     /// A parameter file does not fit the boards: one line for each mistake.
@@ -156,12 +156,12 @@ pub enum ValuesError {
 }
 
 impl SessionError {
-    /// The operator asked for an end before the procedure came to its own.
+    /// Returns `true` if the operator requested an end before the procedure was complete.
     pub fn is_cancelled(&self) -> bool {
         matches!(self, Self::Procedure(Error::Master(MasterError::Cancelled)))
     }
 
-    /// It is about one board: the others may answer.
+    /// Returns `true` if the error concerns one board only: the others may answer.
     pub(crate) fn is_of_one_board(&self) -> bool {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
@@ -171,7 +171,7 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
 
-    /// A board did not answer, whatever the reason.
+    /// Returns `true` if a board did not answer, for any reason.
     pub fn is_no_answer(&self) -> bool {
         match self {
             Self::Procedure(Error::Exchange(ExchangeError::NoAnswer { .. })) => true,
@@ -288,7 +288,7 @@ impl Diagnose for ValuesError {
     }
 }
 
-/// What was asked, and for each board the cause; the next command beside it where there are several.
+/// Lists the cause for each board, with the next command if there are several.
 fn unnamed(failed: &[(u8, SessionError)]) -> String {
     let asked = "the names of inputs, outputs and parameters are not known";
     match failed {

@@ -1,4 +1,4 @@
-//! A doctor's look at a bus: it listens, asks where that cannot do harm, and reports what it found.
+//! Diagnosis of a bus: listens, asks if that cannot do harm, and reports the findings.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use super::link::Link;
 use crate::master::doctor::{Controller, Observation, findings};
 use crate::master::{BoardSeen, Outcome, Request};
 
-/// What was found.
+/// Result of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct Examination {
     /// The worst first.
@@ -23,7 +23,7 @@ pub struct Examination {
 }
 
 impl Examination {
-    /// What kind of failure it is; `None`: nothing is a problem.
+    /// Returns the kind of failure; `None`: no problem.
     pub fn failure(&self) -> Option<ErrorKind> {
         let bad = self.findings.iter().any(|f| f.severity == Severity::Problem);
         bad.then_some(if self.received == 0 { ErrorKind::NoLink } else { ErrorKind::Device })
@@ -31,11 +31,11 @@ impl Examination {
 }
 
 impl Driver {
-    /// Listens to the bus for a while, then asks who is there. With a competing master on the bus nothing is asked: even questions
-    /// could mix with its own (D-08).
+    /// Listens to the bus for a while, then scans it. With a competing master on the bus no question is sent, because even
+    /// questions could mix with those of that master (D-08).
     ///
     /// # Errors
-    /// The bus failed, or the operator asked for an end.
+    /// The bus failed, or the operator requested an end.
     pub fn examine(&mut self, listen: Duration) -> Result<Examination, SessionError> {
         let (start, start_us) = (Instant::now(), self.now_us());
         while start.elapsed() < listen && !self.stop_asked() {
@@ -70,14 +70,14 @@ impl Driver {
         Ok(Examination { findings, boards, received: seen.statistics.received })
     }
 
-    /// What the CAN adapter reports about itself; none where it reports nothing.
+    /// Returns the state that the CAN adapter reports; `None` if it reports none.
     pub fn controller(&mut self) -> Option<Controller> {
         self.link().controller()
     }
 }
 
 impl Link {
-    /// What the CAN adapter reports about itself; none where it reports nothing.
+    /// Returns the state that the CAN adapter reports; `None` if it reports none.
     pub fn controller(&mut self) -> Option<Controller> {
         let state = self.state();
         (state.errors != ErrorState::Unknown).then_some(Controller {

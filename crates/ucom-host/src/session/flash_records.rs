@@ -1,4 +1,4 @@
-//! Updates with flash records: what is known of the boards' flash goes into an update, and what became of it comes back.
+//! Updates with flash records: an update reads the records of the boards' flash, and its results are stored as records.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use crate::files::{FlashRecord, Inventory, InventoryError};
 use crate::master::update::{UpdateOptions, UpdateReport};
 use crate::master::{Event, Outcome, Request};
 
-/// What this tool wrote to boards (D-62): in the inventory file for boards that it lists, else for as long as the session lasts.
+/// Flash records of this tool (D-62): in the inventory file for boards that it lists, else in memory until the session ends.
 #[derive(Debug, Default)]
 pub struct FlashRecords {
     inventory: Option<PathBuf>,
@@ -18,12 +18,12 @@ pub struct FlashRecords {
 }
 
 impl FlashRecords {
-    /// Those of an inventory file, which need not exist; `None`: they are kept by the session alone.
+    /// Creates the records of an inventory file, which need not exist; `None`: only the session keeps them.
     pub fn new(inventory: Option<PathBuf>) -> Self {
         Self { inventory, ..Self::default() }
     }
 
-    /// Reads the inventory again: other programs and people write it, too.
+    /// Reads the inventory again, because other programs and users write it, too.
     fn read(&mut self) -> Result<(), InventoryError> {
         self.listed.clear();
         let Some(path) = self.inventory.as_ref().filter(|path| path.exists()) else { return Ok(()) };
@@ -52,8 +52,8 @@ impl FlashRecords {
 }
 
 impl Driver {
-    /// Updates boards. The record of a board is removed before the board is reset for programming, and made anew when the board
-    /// has been read back. Where it cannot be removed the update is cancelled before anything is erased.
+    /// Updates boards. The record of a board is removed before the board is reset for programming, and written again after the
+    /// board has been read back. If it cannot be removed, the update is cancelled before anything is erased.
     ///
     /// # Errors
     /// As [`Driver::run`]; and the inventory cannot be read.

@@ -1,7 +1,7 @@
 //! Boards that a run supervises: which of them has left its control loop, and how old their values are.
 //!
-//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application does. It reports
-//! so once (MCA_ADMIN_DATA); where that frame is lost its outputs stop, and its status is asked for.
+//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application stops it. The
+//! board reports this once (MCA_ADMIN_DATA); if that frame is lost, its outputs stop and the master asks for its status.
 
 use std::collections::BTreeMap;
 
@@ -12,14 +12,14 @@ use super::error::SessionError;
 use crate::master::io::Snapshot;
 use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
-/// Outputs come every few milliseconds: after so long a silence the last ones are old, µs.
+/// Age at which the last outputs count as old, µs. Outputs normally come every few milliseconds.
 const OLD_US: u64 = 500_000;
 /// A board that sends no outputs and lives is not asked more often than this, µs.
 const ASK_US: u64 = 1_000_000;
-/// A run of which no board has been in its loop for so long has nothing left to supervise, µs.
+/// Time without any board in its loop after which a run is over, µs.
 const OVER_US: u64 = 3_000_000;
 
-/// What has become of a board.
+/// Change of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// Its heartbeat is late.
@@ -28,13 +28,13 @@ pub enum Change {
     Lost,
     /// Its heartbeats come again.
     Back,
-    /// It has started anew.
+    /// The board has rebooted.
     Rebooted,
-    /// It has left its control loop by itself.
+    /// The board left its control loop by itself.
     LeftLoop,
-    /// It was stopped because another board was lost.
+    /// The board was stopped because another board was lost.
     StoppedByPolicy,
-    /// It is in its control loop again.
+    /// The board is in its control loop again.
     InLoop,
 }
 
@@ -58,21 +58,21 @@ impl Change {
 pub struct Notice {
     /// The board.
     pub board: u8,
-    /// What has become of it.
+    /// Change.
     pub change: Change,
-    /// When, s.
+    /// Time, s.
     pub time_s: f64,
-    /// The age of its last outputs, s; `None` when none came, and where heartbeats are what has changed.
+    /// Age of its last outputs, s; `None` if none came, or if the change concerns heartbeats.
     pub age_s: Option<f64>,
 }
 
 impl Notice {
-    /// It is about the control loop, not about heartbeats.
+    /// Returns `true` if the notice is about the control loop, not about heartbeats.
     pub fn is_of_loop(&self) -> bool {
         matches!(self.change, Change::LeftLoop | Change::StoppedByPolicy | Change::InLoop)
     }
 
-    /// In words; `None` where the driver notes the event itself.
+    /// Returns the text; `None` if the driver notes the event itself.
     pub fn text(&self) -> Option<String> {
         let board = self.board;
         let age = self.age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
@@ -105,9 +105,9 @@ struct One {
     out: bool,
     /// A board was lost, or has rebooted, since this one runs: by `on_lost` it may have been stopped for that.
     lost: bool,
-    /// It was out of its loop at some time, and not because another board was lost.
+    /// `true` if the board left its loop at some time, for another reason than the loss of another board.
     left: bool,
-    /// By its status, where its own word was lost.
+    /// `true` if the board is out of its loop by its status, because its own report was lost.
     status_out: bool,
     asked_us: u64,
 }
@@ -120,7 +120,7 @@ impl Followed {
         new
     }
 
-    /// These boards run now, too, or have been started anew. What became of the others is remembered.
+    /// Adds boards that run now or have been restarted. The state of the others is kept.
     pub fn add(&mut self, boards: &[u8], now_us: u64) {
         for board in boards {
             let one = self.boards.entry(*board).or_default();
@@ -134,7 +134,7 @@ impl Followed {
         self.boards.remove(&board);
     }
 
-    /// An event of the bus, beside what the driver prints of it.
+    /// Handles an event of the bus, in addition to the text that the driver prints.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         match event {
             Event::Snapshot { board, snapshot } => {
@@ -168,7 +168,7 @@ impl Followed {
         None
     }
 
-    /// Who has left its loop, or is in it again, since the last time. Asks boards of which nothing is received.
+    /// Returns the boards that left or re-entered their loops since the last call. Asks boards that send nothing.
     pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Notice> {
         let boards = master.boards();
         let (mut notices, mut silent) = (Vec::new(), None);
@@ -200,8 +200,8 @@ impl Followed {
         notices
     }
 
-    /// Whether the run is over: every board has left its loop, or was lost and, by `on_lost`, stopped. Nothing leads a board
-    /// back into its loop but a new run; only with `report` a lost one is waited for, which may still be in it.
+    /// Returns `true` if the run is over: every board has left its loop, or was lost and, by `on_lost`, stopped. Only a new
+    /// run leads a board back into its loop. With `report` the run waits for a lost board, which may still be in its loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -216,14 +216,14 @@ impl Followed {
         now_us.saturating_sub(*self.nobody_since.get_or_insert(now_us)) >= OVER_US
     }
 
-    /// Nothing is asked any more: what comes now must not find a board busy.
+    /// Cancels the question in progress: the next request must not find a board busy.
     pub fn ask_no_more(&mut self, master: &mut Master) {
         if let Some(id) = self.asking.take() {
             master.cancel(id);
         }
     }
 
-    /// The last outputs of each board, how old they are in s, and whether they are too old to be taken for new ones.
+    /// Returns the last outputs of each board, their age in s, and `true` if they are too old to count as current.
     pub fn outputs(&self, master: &Master, now_us: u64) -> Vec<(u8, &Snapshot, f64, bool)> {
         let boards = master.boards();
         let rows = self.boards.iter().filter_map(|(number, one)| Some((number, one, one.last.as_ref()?)));
@@ -235,7 +235,7 @@ impl Followed {
         .collect()
     }
 
-    /// A failure if a board has left its loop by itself.
+    /// Returns an error if a board has left its loop by itself.
     pub fn nobody_left(&self) -> Result<(), SessionError> {
         let boards: Vec<u8> = self.boards.iter().filter(|(_, one)| one.left).map(|(n, _)| *n).collect();
         if boards.is_empty() { Ok(()) } else { Err(SessionError::LeftLoop { boards }) }
@@ -262,7 +262,7 @@ mod tests {
 
     use super::*;
 
-    /// Frames of board 1 that come at a time; what is reported of them.
+    /// Receives frames of board 1 at a time; returns the notices.
     fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();
@@ -278,7 +278,7 @@ mod tests {
         sent.into_iter().filter(|f| f != "680#").chain(notices.into_iter().map(event)).collect()
     }
 
-    /// It runs and has sent its outputs.
+    /// Board 1 runs and has sent its outputs.
     fn running() -> (Master, Followed) {
         running_with(Profile::default().on_lost)
     }
@@ -304,7 +304,7 @@ mod tests {
         assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
         assert!(receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "reported once");
         assert_eq!(stale(&master, &followed, 30_000), [true]);
-        // Another PC starts it again: the run was broken all the same.
+        // Another PC starts the board again: the run is still broken.
         let again = ["601#01000000", "381#0000640065006600"];
         assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
@@ -336,7 +336,7 @@ mod tests {
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
     }
 
-    /// What starts or stops one board makes nobody forget what became of another one.
+    /// Starting or stopping a board does not change the state of the others.
     #[test]
     fn d37_boards_that_come_and_go_leave_the_others_as_they_were() {
         let (mut master, mut followed) = running();
@@ -350,7 +350,7 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // It is started anew: whatever was lost before, it leaves its loop by itself.
+        // The board is restarted: earlier losses do not count, it leaves its loop by itself.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);
@@ -373,7 +373,7 @@ mod tests {
         assert!(followed.is_over(&master, 5_100_000));
     }
 
-    /// A board that is silent has been stopped by policy, and the run ends; with `report` it is waited for.
+    /// A silent board has been stopped by policy, and the run ends; with `report` the run waits for it.
     #[test]
     fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {

@@ -1,8 +1,8 @@
-//! What a session has started, and what it knows of its boards by it: the same for every program that owns a bus for others. In doubt
-//! a board counts as started: being stopped once more costs nothing.
+//! Boards that a session has started, and its knowledge of them; shared by all programs that own a bus for others. In doubt a board
+//! counts as started: one more stop costs nothing.
 //!
 //! - [`Held`]: the state, which the session's [`Operator`](super::Operator) writes in the middle of procedures.
-//! - [`Session`]: a driver with that state; what starts or ends boards goes through it.
+//! - [`Session`]: a driver with that state; all starts and stops of boards go through it.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,7 @@ use crate::master::io::Snapshot;
 use crate::master::update::{UpdateOutcome, UpdateReport};
 use crate::master::{Event, InitReport};
 
-/// What a session has started, and what it knows of its boards by it.
+/// Boards that a session has started, and its knowledge of them.
 #[derive(Default)]
 pub struct Held {
     started: BTreeSet<u8>,
@@ -39,7 +39,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// One that has started nothing; `has_started` shows other threads whether that is still so.
+    /// Creates a state without started boards; `has_started` tells other threads when that changes.
     pub fn new(has_started: Arc<AtomicBool>) -> Self {
         Self { has_started, ..Self::default() }
     }
@@ -93,15 +93,15 @@ impl Held {
     }
 }
 
-/// A session on a bus, and what it holds.
+/// Session on a bus, with its state.
 pub struct Session {
     /// Procedures and boards.
     pub driver: Driver,
-    /// Where names are remembered.
+    /// Cache of names.
     pub cache: Cache,
-    /// What words mean.
+    /// Meanings of the words.
     pub signals: SignalTable,
-    /// What has been started and is known; the operator of the driver has the same.
+    /// Started boards and knowledge of them, shared with the operator of the driver.
     pub held: Rc<RefCell<Held>>,
 }
 
@@ -115,26 +115,26 @@ impl Session {
         Ok(())
     }
 
-    /// Which boards have left their control loops, or are in them again, since the last time. Asks boards of which nothing is received.
+    /// Returns the boards that left or re-entered their control loops since the last call. Asks boards that send nothing.
     pub fn look(&mut self) -> Vec<Notice> {
         let now_us = self.driver.now_us();
         self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
     }
 
-    /// Asks nothing in the background any more: what comes now must not find a board busy.
+    /// Cancels background questions: the next request must not find a board busy.
     pub fn quiet(&mut self) {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Heartbeats go out for what this session has started, and while somebody `commands`: boards of another PC become safe without that
-    /// one (D-50).
+    /// Ends the heartbeats unless this session has started boards or a client `commands`: boards of another PC must become safe if that
+    /// PC is lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
         }
     }
 
-    /// Names and meanings of a board's values; asks for them where they are not known.
+    /// Returns the names and meanings of a board's values; asks the board if they are not known.
     pub fn known(&mut self, board: u8) -> Result<Arc<Known>, SessionError> {
         let kept = self.held.borrow().known.get(&board).cloned();
         let info = self.driver.master.boards().get(board).and_then(|board| board.info);
@@ -165,7 +165,7 @@ impl Session {
         known
     }
 
-    /// Does something by names; where a board turns out to have others than were kept, once more by those that it sends.
+    /// Runs an action by names; if a board turns out to have other names than the cached ones, runs it once more with those.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -174,14 +174,14 @@ impl Session {
         with_names(&cache, |cache| act(self, cache))
     }
 
-    /// Does what starts these boards or moves them. They count before anything is sent: an end may be asked for at any time. When it
-    /// fails those count no more that it was not sent to, or that answer that they are stopped.
+    /// Runs an action that starts or moves these boards. The boards count as started before anything is sent, because an end
+    /// may be requested at any time. On failure, boards that were sent nothing or that answer that they are stopped no longer count.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],
         act: impl FnOnce(&mut Self) -> Result<T, SessionError>,
     ) -> Result<T, SessionError> {
-        // Nothing is sent to any where one does not answer.
+        // No board is sent anything if one of them does not answer.
         for board in boards {
             self.driver.seen(*board)?;
         }
@@ -190,7 +190,7 @@ impl Session {
         let done = act(self);
         if done.is_err() {
             for board in boards.iter().filter(|board| !counted.contains(board)) {
-                // Who is no master has only asked.
+                // A session that is not master has sent questions only.
                 if !self.driver.master.is_master() || self.is_stopped(*board) {
                     self.runs_no_more(Some(*board));
                 }
@@ -199,7 +199,7 @@ impl Session {
         done
     }
 
-    /// The board answers that its application does not run; it is asked also where what was begun was cancelled.
+    /// Returns `true` if the board answers that its application does not run; asks even after a cancelled request.
     fn is_stopped(&mut self, board: u8) -> bool {
         self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
     }
@@ -210,13 +210,13 @@ impl Session {
         self.held.borrow_mut().runs(boards, now_us);
     }
 
-    /// This board does not run any more, or none does; what it sent is no more its state.
+    /// Removes this board, or all, from the running boards; its last outputs no longer count as its state.
     pub fn runs_no_more(&mut self, board: Option<u8>) {
         self.held.borrow_mut().runs_no_more(board);
     }
 
-    /// The control loop of this board has ended, its application goes on. One that this session has not started does not count by that:
-    /// its heartbeats are nobody's business here.
+    /// Records that the control loop of this board has ended while its application goes on. A board that this session has not started
+    /// does not count as started by that: its heartbeats are not supervised here.
     pub fn only_started(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         let counted = held.started.contains(&board);
@@ -238,7 +238,7 @@ impl Session {
         self.held.borrow().started.iter().copied().collect()
     }
 
-    /// Stops what this session has started. Returns the boards whose end is not certain, which go on counting.
+    /// Stops the boards that this session has started. Returns the boards whose stop is not certain; they still count as started.
     pub fn leave(&mut self) -> Vec<u8> {
         self.quiet();
         let started = self.started();
@@ -252,11 +252,11 @@ impl Session {
         not_stopped
     }
 
-    /// What an update leaves of the boards: those that were written do not run any more, and may have been started anew.
+    /// Applies the result of an update: boards that were written no longer run, and may have been restarted.
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {
-                // It runs on if it ran, or nobody knows.
+                // The board runs on if it ran, or its state is unknown.
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate

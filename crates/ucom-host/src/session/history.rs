@@ -1,5 +1,5 @@
-//! What this tool wrote to the parameters of a board, and when. No claim about what is there now: the protocol has no
-//! read-back, and a restart of the application, which nobody has to notice, ends it (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now: the
+//! protocol has no read-back, and a restart of the application, which may go unnoticed, ends them (D-35).
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use ucom::{BoardInfo, DateForm};
 
 use super::cache::Cache;
 
-/// One parameter.
+/// Written value of a parameter.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
 pub struct Written {
     /// The word.
@@ -24,13 +24,13 @@ pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
-    /// Where it is kept.
+    /// Cache and file name.
     #[serde(skip)]
     kept: (Cache, String),
 }
 
 impl History {
-    /// What is remembered of a board; nothing when it has another program by now.
+    /// Returns the history of a board; empty if the board has another program now.
     pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
         let file = format!("written-{:04X}.json", info.flash_number);
         let text = cache.read(&file);
@@ -40,7 +40,7 @@ impl History {
         Self { program_id: info.program_id, date: info.date, par, kept: (cache.clone(), file) }
     }
 
-    /// Remembers words that were written now. What cannot be kept is forgotten: that is no error.
+    /// Records words that were written now. A failed write is ignored: it is not an error.
     pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
         let at = host_kit::unix_time().as_secs();
         self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
@@ -50,7 +50,7 @@ impl History {
         }
     }
 
-    /// What was last written to a parameter.
+    /// Returns the value that was last written to a parameter.
     pub fn last(&self, index: usize) -> Option<Written> {
         self.par.get(&u16::try_from(index).ok()?).copied()
     }
@@ -78,7 +78,7 @@ mod tests {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 
-    /// Another program has other parameters, whatever their places are.
+    /// Another program has other parameters, even at the same places.
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();

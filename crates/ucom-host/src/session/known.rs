@@ -1,4 +1,4 @@
-//! Names of boards' inputs, outputs and parameters that were read before (D-36), and what their words mean (D-11).
+//! Cached names of boards' inputs, outputs and parameters (D-36), and the meaning of their words (D-11).
 
 use ucom::{BoardInfo, Profile};
 
@@ -10,24 +10,24 @@ use crate::files::{BoardSignals, SignalTable};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::{Outcome, Request, Setting};
 
-/// A board, its names, and what its words mean.
+/// Board, its names, and the meaning of its words.
 #[derive(Clone, Debug)]
 pub struct Known {
-    /// Its number.
+    /// Board number.
     pub board: u8,
-    /// Its answer to PC_INFO.
+    /// Answer to PC_INFO.
     pub info: BoardInfo,
-    /// Its names.
+    /// Names.
     pub names: IoDescription,
     /// Types, scales and units.
     pub signals: BoardSignals,
-    /// Where signal table and program do not fit.
+    /// Mismatches of signal table and program.
     strays: Vec<String>,
 }
 
 impl Cache {
-    /// A board with its names. They are known from before, or its application runs and is asked; what cannot be kept is
-    /// read anew next time: that is no error.
+    /// Returns a board with its names. The names come from the cache, or from the running application. A failed
+    /// write to the cache is ignored: the names are read again next time.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
         let info = driver.seen(board)?.info;
         if let Some(names) = self.kept(driver, &info) {
@@ -36,7 +36,7 @@ impl Cache {
         self.described(driver, table, board)
     }
 
-    /// The same for a board whose application must run: it is asked, for what is kept may be of another application.
+    /// Like `known` for a board whose application must run: asks the board, because cached names may be of another application.
     pub fn described(
         &self,
         driver: &mut Driver,
@@ -54,10 +54,10 @@ impl Cache {
         Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
 
-    /// Boards with their names, as [`Self::known`] gives them; those that `must_run` names as [`Self::described`] does.
+    /// Returns boards with their names, as [`Self::known`] does; boards in `must_run` as [`Self::described`] does.
     ///
     /// # Errors
-    /// [`SessionError::NoNames`] with every board that failed, after all were asked; what fails otherwise, at once.
+    /// [`SessionError::NoNames`] with every board that failed, after all were asked; other errors at once.
     pub fn all(
         &self,
         driver: &mut Driver,
@@ -80,7 +80,7 @@ impl Cache {
         if failed.is_empty() { Ok(all) } else { Err(SessionError::NoNames { failed }) }
     }
 
-    /// What is known of a program without asking for it.
+    /// Returns the cached names of a program, without asking for them.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
         let key = DescriptionKey::of(info);
         if self.fresh || !info.has_application() {
@@ -96,14 +96,14 @@ impl Cache {
     }
 }
 
-/// Where the names of a program are kept.
+/// Returns the file name for the names of a program.
 fn file(key: DescriptionKey) -> String {
     let DescriptionKey { program_id, date, flash_number } = key;
     format!("io-{program_id:04X}-{date:04X}-{flash_number:04X}.json")
 }
 
 impl Known {
-    /// A word of this board as the master takes it; by number where a name would mean another signal.
+    /// Returns a word of this board in the master's form; by number if the name would mean another signal.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
         // A text that means another signal cannot be its name, and numbers may be names.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
@@ -111,12 +111,12 @@ impl Known {
         Setting { name, value: word.word }
     }
 
-    /// The same board by the names that it has sent since.
+    /// Returns this board with the names that it has sent since.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
 
-    /// Notes where signal table and program do not fit.
+    /// Notes mismatches between signal table and program.
     fn with_notes(self, driver: &Driver) -> Self {
         for stray in &self.strays {
             driver.note(format!("signal table: {stray}"));
@@ -137,7 +137,7 @@ fn with_signals(
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
     let mut signals = BoardSignals::new(&names, program, &profile);
-    // Who gives a table thinks in its units: numbers for a program that is not in it would be sent as they are.
+    // A table was given, so its units are expected: values for a program that is not in it would be sent unscaled.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("it knows nothing of {who}"));
         signals = signals.raw_only();

@@ -10,11 +10,11 @@ use super::error::SessionError;
 use super::pump::Line;
 use crate::files::recording::{FrameKind, RecordedFrame};
 
-/// Waits that are no longer than this are kept exactly.
+/// Longest wait that is kept exactly.
 const COARSE: Duration = Duration::from_millis(12);
-/// How often the bus is looked at in such a wait.
+/// Interval at which the bus is polled in such a wait.
 const LOOK: Duration = Duration::from_micros(100);
-/// Sleeping takes up to so much longer than it was asked to: the end of such a wait is not slept.
+/// Most that a sleep exceeds its duration; this last part of a wait is not slept.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// An open bus with its clock.
@@ -29,13 +29,13 @@ impl Link {
     /// Opens a bus.
     ///
     /// # Errors
-    /// The URL is none, or the bus cannot be opened.
+    /// The URL is not valid, or the bus cannot be opened.
     pub fn open(url: &str) -> Result<Self, SessionError> {
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         Ok(Self::on(bus, url))
     }
 
-    /// On a bus that is open already; `url` is what people call it.
+    /// Creates a link on an open bus; `url` is its name for display.
     pub fn on(bus: Box<dyn CanBus + Send>, url: &str) -> Self {
         Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() }
     }
@@ -55,7 +55,7 @@ impl Link {
         self.bus.send(frame).map_err(SessionError::Bus)
     }
 
-    /// The next frame, of any protocol; waits at most so long.
+    /// Returns the next frame, of any protocol; waits at most `timeout`.
     pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, SessionError> {
         if timeout > COARSE {
             return self.bus.receive(timeout - COARSE).map_err(SessionError::Bus);
@@ -78,17 +78,17 @@ impl Link {
         }
     }
 
-    /// How the adapter gets on with the bus.
+    /// Returns the state of the adapter.
     pub fn state(&mut self) -> ControllerState {
         self.bus.state()
     }
 
-    /// How often the controller of this computer has left the bus.
+    /// Returns how often the controller of this computer has been bus-off.
     pub fn times_bus_off(&self) -> u64 {
         self.bus.times_bus_off()
     }
 
-    /// What is to be reported of the controller of this computer: that it has left the bus, and what to do.
+    /// Returns the message for a new bus-off of this computer's controller, and the next command.
     pub fn news(&mut self) -> Option<String> {
         let (times, now_us) = (self.bus.times_bus_off(), self.now_us());
         self.bus_off.look(times, now_us, &self.url)
@@ -135,7 +135,7 @@ pub fn recorded(frame: &CanFrame) -> RecordedFrame {
     RecordedFrame { id, extended, kind, data: frame.data().to_vec(), dlc: None }
 }
 
-/// A frame of a recording for the bus; `None` for what is no frame.
+/// Converts a frame of a recording for the bus; `None` for error frames and invalid frames.
 pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     let id = if frame.extended { Id::extended(frame.id) } else { Id::standard(frame.id) }.ok()?;
     match frame.kind {

@@ -1,15 +1,16 @@
-//! A session on a bus: a master with the frames that carry it, in wall-clock time, and what commands make of it.
+//! A session on a bus: a master connected to the bus in wall-clock time, and the procedures that commands need.
 //!
-//! - [`Link`]: an open bus with its clock; [`Prompt`]: one that is never waited for long; [`pump`]: frames between it and the master, in the order that keeps times honest.
+//! - [`Link`]: an open bus with its clock; [`Prompt`]: a bus with a short receive timeout; [`pump`]: frames between it and the master, in
+//!   the order that keeps times correct.
 //! - [`Driver`]: procedures from start to end, with an [`Operator`] who may stop them and reads notes.
-//! - [`Examination`]: what is wrong with a bus; [`Watch`]: a bus as it is looked at live.
-//! - [`CleanupList`]: what would be left undone if the process ended now.
-//! - [`Cache`], [`History`]: what is remembered of boards from session to session.
+//! - [`Examination`]: diagnosis of a bus; [`Watch`]: live view of a bus.
+//! - [`CleanupList`]: work left undone if the process ended now.
+//! - [`Cache`], [`History`]: knowledge of boards that is kept between sessions.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
-//! - [`FlashRecords`]: what this tool wrote to boards, for [`Driver::update`].
+//! - [`FlashRecords`]: images that this tool wrote to boards, for [`Driver::update`].
 //! - [`Recorder`], [`replay()`]: frames of the bus to a recording and back.
 //! - [`Followed`]: the boards of a run under supervision.
-//! - [`Session`], [`Held`]: what has been started and is known, for who owns a bus for others.
+//! - [`Session`], [`Held`]: started boards and knowledge of them, for the owner of a bus that others use.
 pub mod bus_off;
 mod cache;
 mod changes;

@@ -7,7 +7,7 @@ use crate::files::Signal;
 use crate::master::io::{Kind, short};
 
 impl Known {
-    /// Words of a buffer by the names of its signals, in their units where a signal table knows them (D-11), as a JSON object.
+    /// Returns the words of a buffer by signal names, in units if a signal table knows them (D-11), as a JSON object.
     pub fn values(&self, kind: Kind, words: &[u16]) -> Value {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
@@ -27,8 +27,8 @@ impl Known {
     }
 }
 
-/// Keys for so many values: the short names; the whole text where another signal has the same one, with its place where
-/// that does not help either.
+/// Returns `count` keys: the short names; the whole text if another signal has this short name, with its place if the
+/// whole text is not unique either.
 fn keys(names: &[String], count: usize) -> Vec<String> {
     let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
     let key = |i: usize| match names.get(i) {

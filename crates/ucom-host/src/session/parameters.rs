@@ -17,14 +17,14 @@ use crate::files::params::{
 use crate::master::io::Kind;
 use crate::master::{AdminChange, Error, Outcome, Request};
 
-/// A board, the words that it is to get, and what it got before.
+/// Board, the words to write to it, and the words written before.
 #[derive(Debug)]
 pub struct Parameters {
     /// The board with its names.
     pub known: Known,
-    /// What is to be written.
+    /// Words to write.
     pub words: Vec<Word>,
-    /// What was written before.
+    /// Words written before.
     pub history: History,
 }
 
@@ -63,8 +63,8 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Lets what is queued leave, and sees that the application is still there to have taken it: nothing answers to inputs and
-/// parameters themselves (D-35). Frames leave in their order, so the answer to a question comes after all of them.
+/// Sends queued frames, then checks that the application still runs and has taken them: inputs and parameters themselves
+/// are not answered (D-35). Frames leave in their order, so the answer to a question comes after all of them.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
@@ -74,7 +74,7 @@ pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     }
 }
 
-/// The inventory, where there is one.
+/// Reads the inventory if it exists.
 pub fn inventory(path: &Path) -> Result<Option<Inventory>, InventoryError> {
     match path.exists() {
         true => Inventory::read(path).map(Some),
@@ -88,7 +88,7 @@ pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str>
     Some(board.name.as_str()).filter(|name| !name.is_empty())
 }
 
-/// A parameter file that was read, against the boards that are there.
+/// Parameter file that was read, for the boards on the bus.
 #[derive(Debug)]
 pub struct ParameterFile {
     file: String,
@@ -116,7 +116,7 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Only the boards that are meant, where they were not known when it was read.
+    /// Keeps only the selected boards, for files read before the boards were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));
@@ -128,7 +128,7 @@ impl ParameterFile {
         self.boards.iter().map(|b| b.number).collect()
     }
 
-    /// Whether the boards are those that the file means. Only asks.
+    /// Checks that the boards are those of the file. Sends questions only.
     pub fn identities(&self, driver: &mut Driver) -> Result<(), SessionError> {
         let mut problems = Vec::new();
         for board in &self.boards {

@@ -11,7 +11,7 @@ use super::values::{Prepared, Word, note_rounded, words};
 use crate::master::io::Kind;
 use crate::master::{RunBoard, Setting};
 
-/// What each board is to get: the file's values, then those that are given beside it.
+/// Returns the values for each board: those of the file, then those given in addition.
 pub fn plans(
     driver: &Driver,
     prepared: &Prepared,

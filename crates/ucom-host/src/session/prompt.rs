@@ -7,7 +7,7 @@ use can_link::{CanBus, CanError, CanFrame, ControllerState};
 /// Longest wait for a frame.
 const WAIT: Duration = Duration::from_millis(5);
 
-/// A bus that is never waited for longer than 5 ms: what is asked of its owner by others is looked at so often.
+/// Bus wrapper with a receive timeout of at most 5 ms, so that its owner checks for requests that often.
 pub struct Prompt(pub Box<dyn CanBus + Send>);
 
 impl CanBus for Prompt {

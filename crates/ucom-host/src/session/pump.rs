@@ -1,5 +1,5 @@
-//! Moves frames between the bus and the PC side, in the order that keeps its times honest: what has arrived is handed over
-//! before anything is taken for silence, and neither side can keep the other from its turn.
+//! Moves frames between the bus and the PC side, in the order that keeps its times correct: received frames are handed
+//! over before a timeout can end, and neither direction can block the other.
 
 use std::time::Duration;
 
@@ -8,15 +8,15 @@ use ucom::{Foreign, Frame};
 use super::error::SessionError;
 use crate::master::Master;
 
-/// Longest wait: so often Ctrl-C is looked at.
+/// Longest wait, and thus the interval at which Ctrl-C is checked.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Most frames that are handed over, and the longest time that it takes, before it is looked at what is to be sent: a
-/// flooded bus must not stop heartbeats.
+/// Most frames that are handed over, and the longest time that it takes, before due frames are sent: a flooded bus
+/// must not stop heartbeats.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
-/// Most frames that are sent before it is looked at what has arrived.
+/// Most frames that are sent before received frames are handled.
 const MOST_SENT: usize = 64;
-/// On a bus that floods without end, what is so old counts as handed over.
+/// Age from which frames count as handed over on a bus that floods without end, µs.
 const BEHIND_US: u64 = 1_000_000;
 
 /// A bus with a clock.
@@ -25,11 +25,11 @@ pub trait Line {
     fn now_us(&self) -> u64;
     /// Puts a frame on the bus.
     fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
-    /// The next frame; waits at most so long, and not at all for zero.
+    /// Returns the next frame; waits at most `timeout`, and not at all for zero.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
-/// What the loop remembers.
+/// State of the loop.
 #[derive(Debug, Default)]
 pub struct Pump {
     /// Everything that arrived up to then has been handed over, µs.
@@ -37,8 +37,7 @@ pub struct Pump {
 }
 
 impl Pump {
-    /// Waits for a frame until something is to be done, no longer than `patience`; hands over all that has arrived; sends
-    /// what is due.
+    /// Waits for a frame until an action is due, no longer than `patience`; hands over all that has arrived; sends the due frames.
     pub fn turn(
         &mut self,
         master: &mut Master,
@@ -50,7 +49,7 @@ impl Pump {
         self.send(master, line).map(drop)
     }
 
-    /// Lets what is queued leave.
+    /// Sends all queued frames.
     pub fn flush(&mut self, master: &mut Master, line: &mut impl Line) -> Result<(), SessionError> {
         let end = line.now_us() + BEHIND_US;
         while self.send(master, line)? && line.now_us() < end {}
@@ -74,7 +73,7 @@ impl Pump {
                         break;
                     }
                 }
-                // Nothing was there at that time.
+                // No frame had arrived at that time.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -87,7 +86,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Sends what is due; `true`: there may be more.
+    /// Sends due frames; `true`: there may be more.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
@@ -109,11 +108,11 @@ mod tests {
     /// A bus in virtual time with board 1, which answers PC_INFO within a millisecond, and a CPU that is lost now and then.
     struct Bench {
         now: u64,
-        /// What is on its way to us, by time.
+        /// Frames on their way to the PC, by time.
         coming: VecDeque<(u64, Frame)>,
-        /// How long the CPU is lost before and after each access to the bus, µs; the list is gone through once.
+        /// Durations of CPU loss before and after each access to the bus, µs; each entry is used once.
         lost: VecDeque<u64>,
-        /// A frame of somebody else comes every so many µs.
+        /// Period of frames from another member, µs.
         flood_us: Option<u64>,
         flooded_up_to: u64,
         sent: Vec<(u64, Frame)>,
@@ -201,7 +200,7 @@ mod tests {
         z ^ (z >> 27)
     }
 
-    /// Wherever the CPU is lost, and for longer than the answer may take: what has arrived meanwhile is no silence.
+    /// The CPU may be lost anywhere, and for longer than the answer takes: a frame that arrived meanwhile is not silence.
     #[test]
     fn a_lost_cpu_is_no_silence() {
         let ask = |lost: Vec<u64>| {
@@ -220,7 +219,7 @@ mod tests {
         }
     }
 
-    /// D-50: a bus that brings more frames than can be handed over does not stop heartbeats, nor what has its time.
+    /// D-50: a bus that brings more frames than can be handed over stops neither heartbeats nor timeouts.
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);

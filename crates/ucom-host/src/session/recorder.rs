@@ -1,4 +1,4 @@
-//! Recording a bus: frames with their time, and with what they are.
+//! Recording of a bus: frames with their time, and with their names.
 
 use std::io::Write;
 use std::path::Path;
@@ -30,7 +30,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// A recording as a file, with the profile in it or beside it; `channel` is the bus's name in it.
+    /// Creates a recording as a file, with the profile in it or next to it; `channel` is the bus's name in it.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -58,7 +58,7 @@ impl Recorder {
     /// Writes a frame that came at `now_us` of the session and at `time_ns` since 1970.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The frame cannot be written.
     pub fn take(&mut self, now_us: u64, time_ns: u64, frame: &CanFrame) -> Result<(), RecordingError> {
         let frame = recorded(frame);
         self.master.handle(now_us, protocol_frame(&frame));
@@ -77,14 +77,14 @@ impl Recorder {
         Ok(())
     }
 
-    /// Lets what was written reach the disk: a recorder that is killed afterwards does not lose it.
+    /// Writes all data to the disk: a recorder that is killed afterwards does not lose them.
     ///
     /// # Errors
-    /// The disk does not take it.
+    /// The disk does not accept the data.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match &mut self.sink {
             Sink::File(writer) => writer.flush(),
-            // Line by line by itself.
+            // A stream is written line by line.
             Sink::Stream(_) => Ok(()),
         }
     }
@@ -99,7 +99,7 @@ impl Recorder {
         self.left_out
     }
 
-    /// What was received, as a master that only listens sees it.
+    /// Returns a master that only listens and has received the recorded frames.
     pub fn master(&self) -> &Master {
         &self.master
     }
@@ -107,7 +107,7 @@ impl Recorder {
     /// Ends the recording.
     ///
     /// # Errors
-    /// Its end cannot be written.
+    /// The end cannot be written.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self.sink {
             Sink::File(writer) => writer.finish(),

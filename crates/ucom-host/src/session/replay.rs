@@ -30,7 +30,7 @@ pub fn replay(
             if rest.is_zero() {
                 break;
             }
-            // What others send is of no interest here, and must not pile up.
+            // Received frames are discarded here so that they do not pile up.
             bus.receive(rest.min(Duration::from_millis(100)))?;
             bus.news().into_iter().for_each(|news| operator.note(news));
         }
@@ -52,7 +52,7 @@ pub fn is_intrusive(frame: &RecordedFrame) -> bool {
     function.is_some_and(intrusive_function)
 }
 
-/// What changes boards or keeps them running; questions and frames of boards do not.
+/// Returns `true` for functions that change boards or keep them running; `false` for questions and frames of boards.
 fn intrusive_function(function: ucom::Function) -> bool {
     use ucom::Function;
     let asks = matches!(function, Function::Info | Function::AskReport | Function::DumpIo | Function::DumpCi);

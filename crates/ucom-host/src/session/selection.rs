@@ -1,11 +1,11 @@
-//! Which boards are meant, and values for their signals, as people write them.
+//! Selection of boards, and values for their signals, as written by users.
 
 use std::str::FromStr;
 
 use super::error::ValuesError;
 use crate::files::SignalValue;
 
-/// Which boards are meant: numbers, a list, ranges, or all.
+/// Selected boards: numbers, a list, ranges, or all.
 #[derive(Clone, Debug, Eq, PartialEq)]
 pub enum Boards {
     /// Every board that answers.
@@ -57,7 +57,7 @@ pub struct Assignment {
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
-    /// The value; what word it becomes is the signal's matter.
+    /// Value; the signal defines its word.
     pub value: SignalValue,
 }
 

@@ -51,7 +51,7 @@ pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     }
 }
 
-/// Does something by names that may be kept from before; when a board turns out to have others, once more by those that it sends.
+/// Runs an action by cached names; if a board turns out to have other names, runs it once more by the names that the board sends.
 pub fn with_names<T>(
     cache: &Cache,
     mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
@@ -64,7 +64,7 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names, whose applications were started where only they could send the names.
+/// Boards with their names; applications were started if only they could send the names.
 #[derive(Default)]
 pub struct Prepared {
     /// By number.
@@ -73,7 +73,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Asks for the names of a board; starts its application where nothing else helps. Nothing moves by that.
+    /// Asks for the names of a board; starts its application only if necessary. This moves no axis.
     pub fn add(
         &mut self,
         driver: &mut Driver,
@@ -103,7 +103,7 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops what was started only to be asked, once: a refusal leaves the boards as they were. What cannot be stopped is reported.
+    /// Stops applications that were started only to be asked, once: a refusal leaves the boards as they were. Failures are reported.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

@@ -1,4 +1,4 @@
-//! What a live view of a bus shows: load, events, what is wrong and the next command, and what became of the last wish.
+//! Live view of a bus: load, events, problems with the next command, and the result of the last request.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -18,28 +18,28 @@ pub const HISTORY: usize = 120;
 /// Lines of the log that are kept.
 pub const LOG: usize = 200;
 
-/// What the view shows beside the boards.
+/// Content of the view apart from the boards.
 pub struct Watch {
     /// The bus.
     pub url: String,
     /// Percent, one value a second.
     pub load: VecDeque<f64>,
-    /// What happened, oldest first: time in s and words.
+    /// Events, oldest first: time in s and text.
     pub log: VecDeque<(f64, String)>,
-    /// Another PC is master, by what it sent last: nothing is asked.
+    /// Last frame of another PC that is master; while it is set, no question is sent.
     pub competing_master: Option<CompetingMaster>,
-    /// Nothing may be sent.
+    /// `true` if nothing may be sent.
     pub listen_only: bool,
-    /// The boards are to be asked who they are.
+    /// `true` if the boards shall be asked for their identity.
     pub ask: bool,
-    /// How the boards read the protocol.
+    /// Profile of the boards.
     pub profile: Profile,
-    /// What became of the last wish, until the next one.
+    /// Result of the last request, until the next one.
     pub message: String,
     loaded: Instant,
 }
 
-/// So long boards have for their answer before silence is reported, µs.
+/// Time for an answer of the boards before silence is reported, µs.
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
@@ -58,7 +58,7 @@ impl Watch {
         }
     }
 
-    /// Who is there has had the time to answer.
+    /// Returns `true` if the boards have had time to answer.
     pub fn quiet_long(&self, now_us: u64) -> bool {
         now_us >= QUIET_US
     }
@@ -104,7 +104,7 @@ impl Watch {
         self.message = "stop sent to all boards; `ucom stop all` also ends their applications".into();
     }
 
-    /// Asks the boards again who they are, where that is allowed.
+    /// Asks the boards for their identity again, if that is allowed.
     pub fn ask_again(&mut self) {
         self.ask = !self.listen_only;
         self.message =
@@ -118,12 +118,12 @@ impl Watch {
         }
     }
 
-    /// Asks once, or when the user wants it again. Asking all the time would look like a second master to others (D-08), and
-    /// what changes is received anyway.
+    /// Asks once, or when the user requests it again. Constant questions would look like a second master to others (D-08),
+    /// and changes are received anyway.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
-            // Nothing else is under way that it could meet.
+            // No other procedure runs that this one could meet.
             let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
     }
@@ -133,31 +133,31 @@ impl Watch {
 pub struct Picture<'a> {
     /// The boards as last seen.
     pub boards: &'a Boards,
-    /// What the bus carried.
+    /// Traffic on the bus.
     pub statistics: &'a Statistics,
     /// Numbers that two boards have, in words.
     pub shared: &'a [String],
-    /// The CAN adapter, where it reports something about itself.
+    /// CAN adapter, if it reports its state.
     pub controller: Option<Controller>,
     /// µs.
     pub now: u64,
-    /// What is beside the boards.
+    /// Content apart from the boards.
     pub watch: &'a Watch,
 }
 
-/// What is wrong, and what to do.
+/// Problems, and the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Problems {
-    /// What keeps boards from working.
+    /// Problems that keep boards from working.
     pub causes: Vec<String>,
-    /// What works, but not as it should.
+    /// Problems that do not keep boards from working.
     pub warnings: Vec<String>,
     /// The next command against the worst; empty when there is nothing to do.
     pub next: String,
 }
 
 impl Picture<'_> {
-    /// What a doctor would find in what was received, and numbers that two boards have.
+    /// Returns the findings of a diagnosis of the received frames, and numbers that two boards have.
     pub fn problems(&self) -> Problems {
         let Picture { boards, statistics, now, watch, .. } = self;
         let seen = Observation {
@@ -176,7 +176,7 @@ impl Picture<'_> {
             next.push("ucom doctor".into());
         }
         let all = findings(&seen).into_iter();
-        // Silence is reported below, with what was asked.
+        // Silence is reported below, together with the question.
         for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
             let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
             let text = format!("{}{why}", finding.what);
@@ -186,7 +186,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // It is this view that would show more.
+            // The hint refers to this view.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

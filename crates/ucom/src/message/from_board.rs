@@ -12,8 +12,8 @@ use crate::report::Report;
 
 /// A message from a board.
 ///
-/// DSP_INFO, the IO description and debug texts are several frames with one identifier and no tag (G-15): only
-/// who counts them knows which part a frame is. They come out as bare payloads, to be read with
+/// DSP_INFO, the IO description and debug texts are several frames with one identifier and no tag (G-15): a receiver must
+/// count the frames to know which part a frame is. They are returned as bare payloads, to be read with
 /// [`BoardInfo::parse`](crate::BoardInfo::parse), [`Dimensions::parse`](crate::Dimensions::parse) and
 /// [`StringAssembler`](crate::StringAssembler).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

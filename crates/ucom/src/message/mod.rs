@@ -16,7 +16,7 @@ use crate::frame::{Frame, Payload};
 use crate::function::Function;
 use crate::profile::Profile;
 
-/// Why a frame is no message of the wanted direction.
+/// Reasons why a frame is not a message of the wanted direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
     /// Not of this protocol at all (D-02).
@@ -25,17 +25,17 @@ pub enum DecodeError {
     Direction(Function),
     /// Fewer bytes than the message needs (D-12).
     TooShort {
-        /// What it would have been.
+        /// Function of the frame.
         function: Function,
         /// Bytes that came.
         len: u8,
         /// Bytes that it needs.
         need: u8,
     },
-    /// A length that the message cannot have, where the length has a meaning (D-12), or any other than the
-    /// exact one with `dlc.strict`.
+    /// A length that is not valid for the message, if its length has a meaning (D-12), or any other length than the exact
+    /// one with `dlc.strict`.
     Length {
-        /// What it would have been.
+        /// Function of the frame.
         function: Function,
         /// Bytes that came.
         len: u8,
@@ -45,7 +45,7 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// Whether the length is at fault: a board sends DSP_ERROR 7.
+    /// Returns `true` if the length is at fault: a board sends DSP_ERROR 7.
     pub const fn is_length(&self) -> bool {
         matches!(self, Self::TooShort { .. } | Self::Length { .. })
     }

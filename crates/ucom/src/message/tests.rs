@@ -46,7 +46,7 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: what both sides send is distinguished by side, and where it can be by length.
+/// D-05: functions that both sides send are distinguished by side, and by length if possible.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));
@@ -59,7 +59,7 @@ fn d05_shared_functions() {
     assert_eq!(from("681#"), Ok(FromBoard::Alive));
 }
 
-/// D-04: each side acts only on what the other sends.
+/// D-04: each side acts only on messages of the other.
 #[test]
 fn d04_direction() {
     for function in Function::ALL {
@@ -213,7 +213,7 @@ fn profiles() -> impl Strategy<Value = Profile> {
 }
 
 proptest! {
-    /// D-12: what is sent is understood, in every profile.
+    /// D-12: a sent message is decoded to itself, in every profile.
     #[test]
     fn d12_round_trip(pc in pc_messages(), board in board_messages(), number in 0..32u8, profile in profiles()) {
         let number = Sequence::new(number).unwrap();

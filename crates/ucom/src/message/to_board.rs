@@ -18,7 +18,7 @@ pub enum ToBoard {
     SetStatus {
         /// Bits that are cleared first.
         mask: u8,
-        /// Bits that are set then, whatever the mask.
+        /// Bits that are set then, for any mask.
         value: u8,
     },
     /// PC_INFO.

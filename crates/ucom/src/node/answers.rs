@@ -39,7 +39,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         };
         match made {
             Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
-            // The end; or the description has become shorter meanwhile, and the PC asks again.
+            // The end; or the description has become shorter since, and the PC asks again.
             _ => self.jobs.info_done(),
         }
         made.map(|(payload, _)| FromBoard::Info(payload))
@@ -78,7 +78,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
                 self.jobs.dump_io = Some(next);
             }
-            // The end; or a text has become shorter meanwhile, and the PC asks again.
+            // The end; or a text has become shorter since, and the PC asks again.
             _ => self.jobs.dump_io_done(),
         }
         made.map(|(payload, _)| FromBoard::IoDescription(payload))
@@ -108,14 +108,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         (package.count > 0).then_some(FromBoard::Ci(package))
     }
 
-    /// Whether a text waits that is not under way yet.
+    /// Returns `true` if a text waits whose transmission has not begun.
     pub(super) fn wants_text(&self) -> bool {
         let up = matches!(self.app, App::Up | App::Running);
         up && self.jobs.text.is_none()
             && (self.jobs.own_text.is_some() || self.application.debug_text().is_some())
     }
 
-    /// Debug texts: only when wanted, and not too many (D-38).
+    /// Returns the next package of a debug text: only when requested, and limited in rate (D-38).
     fn next_of_text(&mut self) -> Option<FromBoard> {
         if self.wants_text() {
             let own = self.jobs.own_text.is_some();

@@ -69,7 +69,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.own_text = Some(PC_LOST);
     }
 
-    /// Inputs as nobody has set them.
+    /// Sets the inputs to their initial values.
     pub(super) fn initial_ci(&mut self) {
         for index in 0..self.application.dimensions().ci {
             let word = self.application.initial_ci(index);
@@ -119,7 +119,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Whether the package starts inside the buffer; its words are then there.
+/// Stores the words of a package; returns `true` if the package starts inside the buffer.
 fn put(package: &BufferPackage, buffer: &mut [u16], dimension: usize) -> bool {
     let len = buffer.len().min(dimension);
     buffer.get_mut(..len).is_some_and(|buffer| package.apply(buffer).is_ok())

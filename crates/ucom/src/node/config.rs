@@ -1,4 +1,4 @@
-//! What a board is set to, and what it counts.
+//! Settings and counters of a board.
 
 use crate::profile::Profile;
 
@@ -7,7 +7,7 @@ use crate::profile::Profile;
 pub struct NodeConfig {
     /// Number chosen when the bootloader was flashed; the low byte is the UCoM id (D-07).
     pub flash_number: u16,
-    /// How this board reads the protocol.
+    /// Profile of this board.
     pub profile: Profile,
     /// Start of its random numbers (back-off of D-05).
     pub seed: u32,
@@ -36,7 +36,7 @@ impl NodeConfig {
     }
 }
 
-/// What a board counts; nothing of it goes over the bus.
+/// Counters of a board; they are not sent on the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames that are not of this protocol (D-02).

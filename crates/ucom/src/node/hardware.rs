@@ -1,4 +1,4 @@
-//! What a board has: flash, init pins, a little lasting memory, and the application.
+//! Hardware of a board: flash, init pins, a little lasting memory, and the application.
 
 use crate::header::Memory;
 use crate::info::Dimensions;
@@ -13,19 +13,19 @@ pub struct Area {
 }
 
 impl Area {
-    /// Whether `other` lies inside, and has at least one word.
+    /// Returns `true` if `other` lies inside, and has at least one word.
     pub const fn holds(&self, other: Self) -> bool {
         let end = self.start as u64 + self.words as u64;
         other.words > 0 && other.start >= self.start && other.start as u64 + other.words as u64 <= end
     }
 }
 
-/// What the flash is doing.
+/// State of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashState {
-    /// The last operation is done and was good, or there was none.
+    /// The last operation succeeded, or there was none.
     Ready,
-    /// An operation is under way.
+    /// An operation is in progress.
     Busy,
     /// The last operation failed; so it stays until the next one starts.
     Failed,
@@ -40,17 +40,17 @@ pub const RECORD_LEN: usize = 16;
 
 /// Flash of the board, and the RAM that an exloader may be loaded into.
 ///
-/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node
-/// starts none while another is under way. Implementations MUST keep the validity record apart from the
-/// application area: erasing one leaves the other.
+/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node starts
+/// none while another is in progress. Implementations MUST keep the validity record apart from the application area:
+/// erasing one leaves the other.
 pub trait Flash {
-    /// Where applications may lie in a memory; `None` when the board has no such memory.
+    /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
 
     /// Progress of the last operation.
     fn state(&mut self, now_us: u64) -> FlashState;
 
-    /// Starts to erase what `area` covers; whole sectors may go, but never beyond the application area.
+    /// Starts to erase `area`; may erase whole sectors, but never beyond the application area.
     fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError>;
 
     /// Starts to write up to 64 bytes, an even number, in wire order from a word address on.
@@ -59,7 +59,7 @@ pub trait Flash {
     /// Reads bytes back in the order they were written, from a word address on.
     fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
 
-    /// The validity record as it stands; anything when none was written.
+    /// Returns the present validity record; any bytes if none was written.
     fn record(&self) -> [u8; RECORD_LEN];
 
     /// Starts to make the record invalid.
@@ -78,7 +78,7 @@ pub trait Pins {
     fn set_init_out(&mut self, active: bool);
 }
 
-/// What lasts over power loss, and what is fixed.
+/// Data that survive a power loss, and fixed data.
 pub trait Store {
     /// ASTART.
     fn autostart(&self) -> bool;
@@ -109,28 +109,28 @@ pub trait Application {
     /// The exloader starts the program.
     fn start(&mut self, now_us: u64);
 
-    /// The program ends; what it drives MUST be safe when this returns.
+    /// Ends the program; its outputs MUST be safe when this returns.
     fn stop(&mut self);
 
-    /// Whether the start is over and requests can be served.
+    /// Returns `true` if the start is over and requests can be served.
     fn is_up(&mut self, now_us: u64) -> bool;
 
-    /// How many inputs, outputs and parameters there are. MUST NOT change while the program runs.
+    /// Returns the number of inputs, outputs and parameters. MUST NOT change while the program runs.
     fn dimensions(&self) -> Dimensions;
 
-    /// A description, Latin-1; empty for what does not exist.
+    /// Returns a description, Latin-1; empty if it does not exist.
     fn text(&self, text: Text) -> &[u8];
 
-    /// The inputs as they are when nobody has set them; as many as there are inputs.
+    /// Returns the initial value of an input, which holds until the input is set.
     fn initial_ci(&self, index: u16) -> u16;
 
-    /// Where received inputs are put; as many as there are inputs. They count from [`Application::latch_ci`] on.
+    /// Returns the buffer for received inputs, one word for each input. They count from [`Application::latch_ci`] on.
     fn ci(&mut self) -> &mut [u16];
 
-    /// The inputs in [`Application::ci`] take effect together.
+    /// Makes the inputs in [`Application::ci`] take effect together.
     fn latch_ci(&mut self);
 
-    /// Where received parameters are put; they count from the next control cycle on (D-35).
+    /// Returns the buffer for received parameters; they count from the next control cycle on (D-35).
     fn par(&mut self) -> &mut [u16];
 
     /// Takes a snapshot of the outputs for [`Application::so`].
@@ -142,18 +142,18 @@ pub trait Application {
     /// The control loop starts or ends.
     fn run(&mut self, now_us: u64, running: bool);
 
-    /// One control cycle; only while the loop runs.
+    /// Runs a control cycle; called only while the loop runs.
     fn step(&mut self, now_us: u64);
 
-    /// Enables what the board drives, or makes it safe.
+    /// Enables the outputs of the board, or makes them safe.
     fn outputs(&mut self, active: bool);
 
-    /// The oldest text for people that waits, Latin-1. MUST stay the same until [`Application::debug_done`].
+    /// Returns the oldest waiting debug text, Latin-1. MUST stay the same until [`Application::debug_done`].
     fn debug_text(&self) -> Option<&[u8]> {
         None
     }
 
-    /// Forgets that text: it was sent, or nobody wants it.
+    /// Forgets that text: it was sent, or is not wanted.
     fn debug_done(&mut self) {}
 }
 
@@ -161,7 +161,7 @@ pub trait Application {
 mod tests {
     use super::*;
 
-    /// As little as a program can be.
+    /// Minimal application.
     struct Mute;
 
     impl Application for Mute {

@@ -1,32 +1,32 @@
-//! Answers of several frames that are under way.
+//! Answers of several frames in progress.
 
 use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Where an answer stands: nothing sent, or the next package of the string `string`.
+/// Progress of an answer: nothing sent, or the next package of the string `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
     String { string: u32, package: u16 },
 }
 
-/// Answers under way.
+/// Answers in progress.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Jobs {
     pub info: Option<Place>,
     pub info_again: bool,
     pub dump_io: Option<Place>,
-    /// When the dump may begin or go on.
+    /// Time from which the dump may begin or continue.
     pub dump_io_at: u64,
-    /// When the next one may begin, if it was asked for during this one.
+    /// Time from which the next dump may begin, if it was requested during this one.
     pub dump_io_again: Option<u64>,
     /// Offset of the next package.
     pub dump_ci: Option<u16>,
     pub dump_ci_again: bool,
     /// Offset of the next package of the outputs.
     pub so: Option<u16>,
-    /// Next package of the text under way, and whether it is the node's own.
+    /// Next package of the text in progress; `true` if the text is the node's own.
     pub text: Option<(u16, bool)>,
     /// A text of the node itself.
     pub own_text: Option<&'static [u8]>,
@@ -54,7 +54,7 @@ impl Jobs {
         self.info = self.info.or(Some(Place::First));
     }
 
-    /// The same; and no answer leaves before `due_us`, when the request with the same identifier is gone (D-05).
+    /// Like `ask_info`, and no answer leaves before `due_us`: by then the request with the same identifier has left the bus (D-05).
     pub fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);
@@ -94,7 +94,7 @@ impl Jobs {
     }
 }
 
-/// A package of the `string`-th text, and where the answer goes on; `None` when there is no such package.
+/// Returns a package of the `string`-th text, and the place of the next package; `None` if the package does not exist.
 pub(super) fn package(text: &[u8], string: u32, package: u16, profile: &Profile) -> Option<(Payload, Place)> {
     let payload = string_package(text, package, profile)?;
     let last = string_package(text, package + 1, profile).is_none();

@@ -1,9 +1,9 @@
-//! The board side: a UCoM board as a state machine without clock, heap or I/O, usable in a board's firmware as
-//! it is and behind every simulated board.
+//! The board side: a UCoM board as a state machine without clock, heap or I/O, usable in a board's firmware as it is;
+//! every simulated board runs it.
 //!
-//! The caller hands in what was received ([`Node::receive`]), asks what to send ([`Node::poll`]) and reports when
-//! that has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`]
-//! returns until when nothing will happen by itself. Flash, pins, lasting memory and the application are traits
+//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when a
+//! frame has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`] returns
+//! the time until which the node does nothing by itself. Flash, pins, lasting memory and the application are traits
 //! ([`Flash`], [`Pins`], [`Store`], [`Application`]); the crate `ucom-sim` has all four in memory.
 //!
 //! The node offers one frame at a time: the next comes after `sent`. Strings and dumps are made frame by frame
@@ -38,7 +38,7 @@ use crate::frame::Frame;
 use crate::function::Sequence;
 use crate::message::FromBoard;
 
-/// What the board is doing; the states S1 to S6 of the protocol page.
+/// Phase of the board; the states S1 to S6 of the protocol page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Phase {
     /// Between reset and listening.
@@ -59,7 +59,7 @@ pub enum Phase {
     Running,
 }
 
-/// How far the application is.
+/// State of the application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum App {
     Stopped,
@@ -97,7 +97,7 @@ pub struct Node<F, P, S, A> {
     debug: bool,
     global_debug: bool,
     autostart_at: Option<u64>,
-    /// When the PC counts as lost; while the loop runs.
+    /// Time at which the PC counts as lost; while the loop runs.
     pc_lost_at: Option<u64>,
     step_at: Option<u64>,
     so_at: Option<u64>,
@@ -148,20 +148,20 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         node
     }
 
-    /// The board rebooted by itself: crash, watchdog, brown-out. It sends one report unasked (D-26).
+    /// Reboots the board as after a crash, watchdog reset or brown-out. It sends one report unasked (D-26).
     pub fn restart(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, true);
     }
 
-    /// Power came back: everything but flash and [`Store`] is lost. Nothing is sent.
+    /// Starts the board after a power loss: everything but flash and [`Store`] is lost. Sends no report.
     pub fn power_up(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, false);
     }
 
-    /// What the bus shall get next; `None` while nothing is due or the frame before has not left. What is not
-    /// confirmed by [`Node::sent`] or [`Node::not_sent`] blocks what comes after it, as in a controller.
+    /// Returns the next frame for the bus; `None` while no frame is due or the frame before has not left. A frame that is
+    /// not confirmed by [`Node::sent`] or [`Node::not_sent`] blocks the frames after it, as in a controller.
     pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
         self.advance(now_us);
         if self.outbox.in_flight.is_some() || self.boot_until.is_some() {
@@ -183,7 +183,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // One of before the number was forgotten is not about the number that is being taken.
+            // An acknowledgement sent before the number was forgotten does not concern the number that is being taken.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }
@@ -217,7 +217,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Until when the node does nothing by itself: call [`Node::poll`] then. A time in the past means at once.
+    /// Returns the time until which the node does nothing by itself: call [`Node::poll`] then. A time in the past means at once.
     pub fn next_deadline(&self) -> u64 {
         self.deadline()
     }
@@ -227,7 +227,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         &self.config
     }
 
-    /// What was counted since [`Node::new`].
+    /// Returns the counters since [`Node::new`].
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
@@ -242,7 +242,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.record
     }
 
-    /// What the board is doing.
+    /// Returns the phase of the board.
     pub const fn phase(&self) -> Phase {
         match self.app {
             _ if self.boot_until.is_some() => Phase::Booting,

@@ -14,7 +14,7 @@ const REPORTS: usize = 4;
 pub(super) struct Outbox {
     /// With the controller, not yet left.
     pub in_flight: Option<Frame>,
-    /// A frame was given up; DSP_ERROR 6 follows the next that leaves.
+    /// `true` if the controller gave up a frame; DSP_ERROR 6 follows the next frame that leaves.
     pub trouble: bool,
     /// INITACK.
     pub ack: bool,
@@ -23,7 +23,7 @@ pub(super) struct Outbox {
     pub block_taken: bool,
     /// DSP_PROGFINISHED.
     pub finished: bool,
-    /// When each report is due and which of its frames is next.
+    /// Due time of each report, and its next frame.
     pub reports: [Option<(u64, u8)>; REPORTS],
     /// A report is due after the boot.
     pub report_after_boot: bool,
@@ -31,7 +31,7 @@ pub(super) struct Outbox {
     pub mca_ready: bool,
     /// Heartbeat.
     pub alive: bool,
-    /// When MCA_ADMIN_DATA is due.
+    /// Due time of MCA_ADMIN_DATA.
     pub admin_at: Option<u64>,
 }
 
@@ -58,7 +58,7 @@ impl Outbox {
         self.finished = false;
     }
 
-    /// What only an application sends.
+    /// Drops frames that only an application sends.
     pub fn forget_application(&mut self) {
         self.mca_ready = false;
         self.alive = false;
@@ -86,7 +86,7 @@ impl Outbox {
         }
     }
 
-    /// When the next of these frames is due.
+    /// Returns the due time of the next of these frames.
     pub fn deadline(&self) -> u64 {
         let first_error = self.errors.first().is_some_and(Option::is_some);
         if self.ack || first_error || self.block_taken || self.finished || self.mca_ready || self.alive {

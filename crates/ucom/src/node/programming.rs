@@ -11,7 +11,7 @@ use crate::program::{Checksum, Digest};
 const VERIFY_STEP: usize = 1024;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Whether the flash holds a valid application.
+    /// Returns `true` if the flash holds a valid application.
     pub fn has_application(&self) -> bool {
         self.record.is_some()
     }
@@ -53,7 +53,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Pauses, and one step of the work under way.
+    /// Checks the pauses, and performs one step of the work in progress.
     pub(super) fn program_timers(&mut self) {
         let programming = &self.programming;
         let pause = u64::from(self.config.profile.prog_frame_timeout) * 1000;
@@ -73,7 +73,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Work::Block(_) => return self.take_block(),
             _ => {}
         }
-        // Nothing is started on a busy flash, whoever made it busy.
+        // No operation is started on a busy flash, whatever made it busy.
         let state = self.flash.state(now);
         if state == FlashState::Busy {
             return Ok(());
@@ -124,7 +124,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// D-41, and what of it this board refuses.
+    /// Takes a header (D-41); refuses headers that this board cannot accept.
     fn take_header(&mut self) -> Result<(), ErrorCode> {
         let endian = self.config.profile.prog_endian;
         let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
@@ -154,7 +154,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // Where the second image is another one, its own Program ID takes the place of this.
+        // If the second image is another one, its own Program ID replaces this one.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
@@ -207,7 +207,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// The block is where it belongs; was it the last of the cycle?
+    /// Continues after a block was stored; ends the cycle if it was the last one.
     fn after_data(&mut self) -> Result<(), ErrorCode> {
         let profile = self.config.profile;
         let headerless = profile.prog_header == HeaderForm::None;
@@ -232,7 +232,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Reads the image back (D-44: the Program ID must be that of what is in the flash).
+    /// Reads the image back (D-44: its checksum must match the Program ID).
     fn verify(&mut self, done: u32) -> Result<(), ErrorCode> {
         let checksum = self.config.profile.prog_checksum;
         let cycle = self.programming.cycle.as_mut().ok_or(ErrorCode::ExloadCycle)?;
@@ -273,7 +273,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// Program memory gives the board its Program ID, also where data memory came last.
+    /// Returns the new record. Program memory gives the board its Program ID, even if data memory came last.
     fn new_record(&self) -> Option<Record> {
         let header = match self.config.profile.prog_plan {
             Plan::PmemXmem => self.programming.first?,

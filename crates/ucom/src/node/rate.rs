@@ -15,7 +15,7 @@ impl<const N: usize> RateLimit<N> {
         Self { times: [None; N], next: 0 }
     }
 
-    /// Whether an event may happen now, at most `limit` (and `N`) in any second; it is then remembered.
+    /// Returns `true` and records the event if an event may happen now: at most `limit` (and `N`) in any second.
     pub fn allow(&mut self, now_us: u64, limit: u32) -> bool {
         let recent = |time: &&Option<u64>| time.is_some_and(|time| now_us.saturating_sub(time) < SECOND_US);
         if self.times.iter().filter(recent).count() >= (limit as usize).min(N) {
@@ -50,7 +50,7 @@ mod tests {
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
 
-    /// Section 9: what was a whole second ago does not count, a microsecond less does; neither what is beyond the memory.
+    /// Section 9: an event 1 s ago does not count, an event 999 999 µs ago does; events beyond the memory do not count.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

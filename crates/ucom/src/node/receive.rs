@@ -1,4 +1,4 @@
-//! What the board does with what it receives.
+//! Reaction of the board to received frames.
 
 use super::{App, Application, Flash, Node, Pins, Store};
 use crate::error_code::ErrorCode;
@@ -54,7 +54,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.config.profile.broadcast_number() == Some(to)
     }
 
-    /// Whether a message concerns this board (D-04).
+    /// Returns `true` if a message concerns this board (D-04).
     fn is_meant(&self, function: Function, to: Sequence) -> bool {
         match (function, self.number) {
             (Function::Init, _) => self.config.profile.is_board(to),
@@ -64,8 +64,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// D-12: DSP_ERROR 7, but not for what would be ignored anyway, and not without a number: all such boards would send it
-    /// at once with one identifier (D-06).
+    /// Sends DSP_ERROR 7 (D-12), but not for messages that would be ignored anyway, and not without a number: all such
+    /// boards would send it at once with one identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
         let served = matches!(self.app, App::Up | App::Running);

@@ -4,14 +4,14 @@ use super::hardware::RECORD_LEN;
 use crate::profile::Endian;
 use crate::program::{Checksum, checksum};
 
-/// What the board remembers about its application. Without a whole record there is no application.
+/// Record of the board about its application. Without a whole record the board has no application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Program ID (D-44).
     pub program_id: u16,
     /// Flash date (D-45).
     pub date: u16,
-    /// Where the image starts, words.
+    /// Address of the image, words.
     pub address: u32,
     /// Length of the image, words.
     pub words: u32,
@@ -20,7 +20,7 @@ pub struct Record {
 const MAGIC: [u8; 2] = *b"UR";
 
 impl Record {
-    /// The bytes for the flash, with a check of their own: a record that was cut off by power loss is none.
+    /// Returns the bytes for the flash, with a check of their own: a record that was cut off by power loss is invalid.
     pub fn build(&self) -> [u8; RECORD_LEN] {
         let [p0, p1] = self.program_id.to_le_bytes();
         let [d0, d1] = self.date.to_le_bytes();
@@ -35,7 +35,7 @@ impl Record {
         bytes
     }
 
-    /// `None` unless every byte is there.
+    /// Returns the record; `None` unless every byte is present.
     pub fn parse(bytes: &[u8; RECORD_LEN]) -> Option<Self> {
         let [_, _, p0, p1, d0, d1, a0, a1, a2, a3, w0, w1, w2, w3, ..] = *bytes;
         let record = Self {
@@ -52,7 +52,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// D-45: erased flash is no record, and neither is one with a byte that was not written.
+    /// D-45: erased flash is not a valid record, and neither is a record with a byte that was not written.
     #[test]
     fn d45_half_a_record_is_none() {
         let record = Record { program_id: 0x4B3F, date: 0x3AC1, address: 0x1000, words: 500 };

@@ -7,7 +7,7 @@ use crate::message::FromBoard;
 use crate::report::Report;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// What the board puts into its identifiers: its number, without one what the profile requires (D-06).
+    /// Returns the number for the board's identifiers: its own; without one, the number that the profile requires (D-06).
     pub(super) fn own_number(&self) -> Sequence {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
@@ -18,14 +18,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.outbox.push_report(self.after_ms(wait));
     }
 
-    /// MCA_ADMIN_DATA as an answer: not at once, the PC's frame with this identifier must be gone (D-05). What was to be
-    /// sent anyway goes with it: one frame is enough for both.
+    /// Queues MCA_ADMIN_DATA as an answer: not at once, because the PC's frame with this identifier must have left the
+    /// bus (D-05). An unasked report that is due goes with it: one frame is enough for both.
     pub(super) fn answer_admin(&mut self) {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// MCA_ADMIN_DATA unasked: after a random time, the PC may be about to send the same identifier (D-05). An answer that
-    /// waits for its time carries it, too.
+    /// Queues MCA_ADMIN_DATA unasked: after a random time, because the PC may be about to send the same identifier (D-05).
+    /// A pending answer carries it, too.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);

@@ -1,4 +1,4 @@
-//! Status byte, reset, number, and what PC_SETSTATUS does (D-20 to D-25).
+//! Status byte, reset, number, and the effect of PC_SETSTATUS (D-20 to D-25).
 
 use super::{App, Application, Flash, Node, Pins, Record, Store};
 use crate::error_code::ErrorCode;
@@ -42,7 +42,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// The number is gone, and with it what needs one.
+    /// Forgets the number, and all that depends on it.
     pub(super) fn forget_number(&mut self) {
         self.number = None;
         self.taking = None;
@@ -69,7 +69,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// PC_XRESET: exloader, programming enabled, a transfer starts anew (D-23).
+    /// Handles PC_XRESET: exloader, programming enabled, a new transfer (D-23).
     pub(super) fn xreset(&mut self) {
         self.stop_application();
         self.autostart_at = None;
@@ -81,7 +81,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// PC_SETSTATUS: the formula literally, then what reality allows of it (D-22).
+    /// Handles PC_SETSTATUS: applies the formula literally, then the limits of the board (D-22).
     pub(super) fn set_status(&mut self, mask: u8, value: u8) {
         let old = self.status();
         let new = old.set(mask, value);

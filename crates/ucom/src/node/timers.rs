@@ -1,4 +1,4 @@
-//! What happens by itself as time passes.
+//! Actions that are due as time passes.
 
 use super::{App, Application, Flash, FlashState, Node, Pins, Store};
 use crate::error_code::ErrorCode;
@@ -18,7 +18,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         1 + self.random % most.max(1)
     }
 
-    /// DSP_ERROR, unless this code was sent too often within a second (section 9).
+    /// Sends DSP_ERROR, unless this code was sent too often within a second (section 9).
     pub(super) fn error(&mut self, code: ErrorCode) {
         let from = self.own_number();
         let limit = self.config.profile.error_rate;
@@ -35,7 +35,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         let now = self.now_us;
         let due = |at: Option<u64>| at.is_some_and(|at| at <= now);
         if self.boot_until.is_some() {
-            // An erase that the reset interrupted may still be under way.
+            // An erase that the reset interrupted may still be in progress.
             if due(self.boot_until) && self.flash.state(now) != FlashState::Busy {
                 self.booted();
             }
@@ -95,7 +95,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// The beat after `at` that lies ahead; beats that were missed are left out.
+/// Returns the next beat after `at` that is in the future; missed beats are left out.
 fn next_beat(at: Option<u64>, period_us: u64, now: u64) -> u64 {
     let period = period_us.max(1);
     let at = at.unwrap_or(now);

@@ -1,4 +1,4 @@
-//! How far a transfer of a new application is.
+//! Progress of a transfer of a new application.
 
 use super::config::NodeConfig;
 use super::hardware::Area;
@@ -6,12 +6,12 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::Profile;
 use crate::program::Digest;
 
-/// What is being done with the last block, or after it.
+/// Work on the last block, or after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
     /// Waits for frames.
     None,
-    /// A whole block came; it is looked at at this time.
+    /// A whole block came; it is processed at this time.
     Block(u64),
     /// The validity record goes first.
     ClearRecord,
@@ -22,21 +22,21 @@ pub(super) enum Work {
     Verify(u32),
     WriteRecord,
     AwaitRecord,
-    /// DSP_READY is on its way; until it has left, the block buffer is in use.
+    /// DSP_READY is being sent; until it has left, the block buffer is in use.
     Answer,
 }
 
-/// A cycle under way.
+/// Cycle in progress.
 #[derive(Clone, Debug)]
 pub(super) struct Cycle {
     pub header: Header,
     pub area: Area,
     pub memory: Memory,
-    /// Whether its data go to memory, or are only checked.
+    /// `true` if its data go to memory; `false` if they are only checked.
     pub writes: bool,
     /// Bytes of the image that came.
     pub done: u32,
-    /// Over what came, later over what was read back.
+    /// Digest of the received data, later of the data read back.
     pub digest: Digest,
 }
 
@@ -76,12 +76,12 @@ impl Programming {
         }
     }
 
-    /// A transfer starts anew with cycle 1.
+    /// Starts a new transfer with cycle 1.
     pub fn restart(&mut self, profile: &Profile) {
         *self = Self::new(profile);
     }
 
-    /// The transfer is dropped; an error keeps the board silent all the same.
+    /// Drops the transfer; an error keeps the board silent nevertheless.
     pub fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }

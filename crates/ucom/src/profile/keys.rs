@@ -5,24 +5,24 @@ use core::fmt;
 use super::values::{AliveMode, Broadcast, CiLatch, Endian, HeaderForm, OnLost, Plan, ReportMode, Value};
 use crate::program::{Checksum, DateForm};
 
-/// What kind of value a key has, for files with types.
+/// Kind of a key's value, for files with types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A whole number.
     Number,
     /// `yes` or `no`.
     YesNo,
-    /// One of some words.
+    /// A word from a fixed set.
     Word,
 }
 
-/// One key of the profile.
+/// Key of the profile.
 pub struct Key {
     /// Name in files, `prog.frame_gap_us`.
     pub name: &'static str,
     /// Default as text.
     pub default: &'static str,
-    /// What is allowed, in words.
+    /// Allowed values, in words.
     pub range: &'static str,
     /// Rule and meaning, with the unit.
     pub doc: &'static str,

@@ -1,7 +1,7 @@
-//! The compatibility profile: how a board reads what the published description leaves open.
+//! The compatibility profile: the board's interpretation of points that the published description leaves open.
 //!
-//! Each decision of this project has a key here, so that the same code can talk to a board that was built with
-//! another reading. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values.
+//! Each decision of this project has a key here, so that the same code can work with a board that was built with another
+//! interpretation. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values.
 
 mod keys;
 mod values;
@@ -12,10 +12,10 @@ pub(crate) use values::{Value, words};
 
 use crate::function::Sequence;
 
-/// Why a value or a whole profile is refused.
+/// Reasons why a value or a whole profile is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ProfileError {
-    /// There is no such key.
+    /// The key does not exist.
     UnknownKey,
     /// The key's range does not have the value.
     Value(&'static Key),
@@ -56,7 +56,7 @@ impl Profile {
         Err(ProfileError::Contradiction(contradiction))
     }
 
-    /// The broadcast number of the PC; `None` when there is none (D-04).
+    /// Returns the broadcast number of the PC; `None` if the profile has none (D-04).
     pub const fn broadcast_number(&self) -> Option<Sequence> {
         match self.addr_broadcast {
             Broadcast::Zero => Some(Sequence::ZERO),
@@ -74,7 +74,7 @@ impl Profile {
         }
     }
 
-    /// Whether a board can have this number.
+    /// Returns `true` if a board can have this number.
     pub const fn is_board(&self, number: Sequence) -> bool {
         let broadcast = match self.broadcast_number() {
             Some(broadcast) => broadcast.number() == number.number(),
@@ -89,7 +89,7 @@ impl Profile {
         Sequence::all().filter(move |number| profile.is_board(*number))
     }
 
-    /// The number that a process word without a type of its own stands for (D-11).
+    /// Returns the number of a process word without a type of its own (D-11).
     pub const fn process_value(&self, word: u16) -> i32 {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }

@@ -1,4 +1,4 @@
-//! The values that keys can have beside numbers.
+//! Values of keys other than numbers.
 
 use core::fmt;
 
@@ -86,11 +86,11 @@ words! {
 }
 
 words! {
-    /// How boards answer PC_REPORT and PC_RESET (D-07).
+    /// Form of the boards' reports to PC_REPORT and PC_RESET (D-07).
     pub enum ReportMode {
-        /// One frame; function and sequence field are the 7-bit flash id.
+        /// A single frame; function and sequence field are the 7-bit flash id.
         Flash7 = "flash7",
-        /// One DSP_REPORT0 with the board's sequence number.
+        /// A single DSP_REPORT0 with the board's sequence number.
         Seq = "seq",
         /// All four functions, one frame each.
         All4 = "all4",
@@ -98,9 +98,9 @@ words! {
 }
 
 words! {
-    /// What the two cycles of an update carry (D-40).
+    /// Content of the two cycles of an update (D-40).
     pub enum Plan {
-        /// The same image twice: checked, then written.
+        /// Twice the same image: checked, then written.
         VerifyWrite = "verify-write",
         /// An exloader into RAM, then the application.
         ExloaderApp = "exloader-app",
@@ -112,17 +112,17 @@ words! {
 }
 
 words! {
-    /// What precedes the data of a cycle (D-41).
+    /// Block before the data of a cycle (D-41).
     pub enum HeaderForm {
         /// The header block of this project.
         V1 = "v1",
-        /// Nothing: the first block is data, and the board knows the length by itself.
+        /// No header: the first block is data, and the board knows the length by itself.
         None = "none",
     }
 }
 
 words! {
-    /// When controller inputs take effect (D-34).
+    /// Time at which controller inputs take effect (D-34).
     pub enum CiLatch {
         /// Each package by itself.
         Frame = "frame",
@@ -134,9 +134,9 @@ words! {
 words! {
     /// To whom the PC's heartbeat goes (D-04, D-50).
     pub enum AliveMode {
-        /// One broadcast frame.
+        /// A single broadcast frame.
         Broadcast = "broadcast",
-        /// One frame to each board; boards do not count broadcast ones.
+        /// A frame to each board; boards do not count broadcast ones.
         Unicast = "unicast",
         /// Both.
         Both = "both",
@@ -144,7 +144,7 @@ words! {
 }
 
 words! {
-    /// What the PC does when a board's heartbeat stays away (D-51).
+    /// Reaction of the PC if a board's heartbeat stays away (D-51).
     pub enum OnLost {
         /// An event, nothing else.
         Report = "report",

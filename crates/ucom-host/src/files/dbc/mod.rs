@@ -19,14 +19,14 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 pub struct NamedSignal {
     /// The signal's name; becomes an identifier.
     pub name: String,
-    /// What its word means (D-11).
+    /// Meaning of its word (D-11).
     pub signal: Signal,
 }
 
 /// A board whose process data are known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DbcBoard {
-    /// Its number.
+    /// Board number.
     pub number: u8,
     /// The controller inputs, one each.
     pub ci: Vec<NamedSignal>,
@@ -37,7 +37,7 @@ pub struct DbcBoard {
 }
 
 impl DbcBoard {
-    /// A board with its names and what their words mean.
+    /// Creates a board with its names and the meanings of their words.
     pub fn new(number: u8, description: &IoDescription, signals: &BoardSignals) -> Self {
         let of = |kind: Kind| {
             let pairs = description.names(kind).iter().zip(signals.all(kind));
@@ -49,7 +49,7 @@ impl DbcBoard {
     }
 }
 
-/// One signal of a message.
+/// Signal of a message.
 struct DbcSignal {
     name: String,
     /// First byte.
@@ -60,7 +60,7 @@ struct DbcSignal {
     signed: bool,
     /// ` M` or ` m3`, or nothing.
     multiplex: String,
-    /// Scale, offset and unit, where they are known.
+    /// Scale, offset and unit, if they are known.
     signal: Option<Signal>,
 }
 
@@ -70,7 +70,7 @@ impl DbcSignal {
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
-        // Motorola order counts from the field's most significant bit, which stands in its first byte.
+        // Motorola order counts from the field's most significant bit, which is in its first byte.
         let big = endian == Endian::Big && self.bits > 8;
         let start = self.byte * 8 + if big { 7 } else { self.bit };
         let (order, sign) = (u8::from(!big), if self.signed { '-' } else { '+' });
@@ -81,7 +81,7 @@ impl DbcSignal {
         };
         let Self { name, multiplex, bits, signal, .. } = self;
         let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
-        // The shortest number for the limit: what calculating loses is not written.
+        // The shortest number for the limit, without rounding errors.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match signal {
             Some(signal) if signal.known && signal.kind != SignalType::Hex => {
@@ -208,7 +208,7 @@ fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
 }
 
 fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
-    // What boards without any signal never send needs no selector.
+    // A message that boards without any signal never send needs no selector.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,

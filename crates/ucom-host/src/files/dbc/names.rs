@@ -1,4 +1,4 @@
-//! Names of signals: C identifiers of at most 32 characters, each once, made from texts that people wrote.
+//! Names of signals: unique C identifiers of at most 32 characters, made from free texts.
 
 use std::collections::BTreeSet;
 /// Longest name that every reader of DBC files takes.
@@ -24,7 +24,7 @@ impl Names {
         Self { used: taken.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
 
-    /// The name for a text; `fallback` where the text has no letter or digit at all.
+    /// Returns the name for a text; `fallback` if the text has no letter or digit at all.
     pub(super) fn name(&mut self, text: &str, fallback: &str) -> String {
         let mut base = identifier(text);
         if base.is_empty() {
@@ -33,7 +33,7 @@ impl Names {
         base.truncate(MAX);
         let mut name = base.clone();
         let mut number = 2_u32;
-        // Readers may ignore case: names must differ otherwise, too.
+        // Readers may ignore case, so names must differ in more than case.
         while !self.used.insert(name.to_ascii_lowercase()) {
             let suffix = format!("_{number}");
             name = base.chars().take(MAX - suffix.len()).collect::<String>() + &suffix;

@@ -1,4 +1,4 @@
-//! The files as the crate `can-dbc` reads them, and numbers taken out of frames by what it read.
+//! Tests with the crate `can-dbc`: it reads the files, and its result is used to decode frames.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;
@@ -45,7 +45,7 @@ fn value(signal: &Signal, data: &[u8]) -> i64 {
     raw
 }
 
-/// Decoded signals of a frame, multiplexed ones only where they apply.
+/// Returns the decoded signals of a frame, multiplexed ones only if they apply.
 fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     let message = message(dbc, frame.id());
     let data = frame.payload().padded();

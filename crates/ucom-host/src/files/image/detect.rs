@@ -1,31 +1,31 @@
-//! The format of a file that no option names: records by their first line, raw bytes only where they cannot be text.
+//! Format of a file without a format option: records by their first line, raw bytes only if they cannot be text.
 //!
-//! A text that is taken for raw bytes is flashed, read back and called verified, and the board has no program any more.
-//! So raw bytes are only taken from a `.bin` without printable text. Where an option asks for raw bytes, other names are taken
-//! as well, and a text from a `.bin`; records never are, damaged ones neither.
+//! A text that is taken for raw bytes is flashed, read back and called verified, and the board has no program any more. So raw
+//! bytes are only taken from a `.bin` without printable text. If an option asks for raw bytes, other names are taken as well,
+//! and a text from a `.bin`; records are never taken as raw bytes, not even damaged ones.
 
 use super::{Format, ImageError, segments::lines};
 use std::path::Path;
 
-/// Of so many bytes in a hundred that can be printed, it is a text.
+/// Percentage of printable bytes from which a content is a text.
 const TEXT_PERCENT: usize = 90;
-/// Of so many hexadecimal digits in a hundred characters, a line is or was a record.
+/// Percentage of hexadecimal digits from which a line is or was a record.
 const HEX_PERCENT: usize = 80;
 const MARKED_PERCENT: usize = 50;
-/// So much of a text is shown, characters.
+/// Length of the part of a text that is shown, characters.
 const SHOWN: usize = 24;
 
-/// Bytes that editors put before a text, and what they mean.
+/// Bytes that editors put before a text, and their meaning.
 const MARKS: [(&[u8], &str); 3] =
     [(b"\xEF\xBB\xBF", "UTF-8"), (b"\xFF\xFE", "UTF-16"), (b"\xFE\xFF", "UTF-16")];
 
 impl Format {
-    /// By content: the first line that is a record decides; what has none is raw bytes.
+    /// Detects the format by content: the first line that is a record decides; a content without records is raw bytes.
     pub fn detect(content: &[u8]) -> Self {
         record_form(content).unwrap_or(Self::Bin)
     }
 
-    /// What a file of this name holds, where no option names it: raw bytes only from a `.bin`, and never text.
+    /// Returns the format of a file of this name, if no option names it: raw bytes only from a `.bin`, and never text.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         let by_name = extension(name);
         let expected = by_name.as_deref().and_then(Self::by_extension);
@@ -87,8 +87,8 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// The place of the first line that is a record or may have been one, as a text shows it: in any encoding, with characters
-/// missing or damaged. `None`: it is no text, or no such line is in it.
+/// Returns the place of the first line that is or may have been a record, as a text shows it: in any encoding, with
+/// characters missing or damaged. `None`: the content is not a text, or has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
     // Two bytes a character, padding and ends of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
@@ -111,7 +111,7 @@ fn was_record(line: &[u8]) -> bool {
     digits >= 8 && digits * 100 >= line.len() * percent
 }
 
-/// The form of the first line that is a record, whatever stands before it.
+/// Returns the form of the first line that is a record, ignoring the lines before it.
 fn record_form(content: &[u8]) -> Option<Format> {
     let hex = |digits: &[u8]| digits.len() >= 8 && digits.iter().all(u8::is_ascii_hexdigit);
     let line = |line: &[u8]| {
@@ -145,7 +145,7 @@ fn is_text(content: &[u8]) -> bool {
     content.len() >= 8 && (wide(0) || wide(1))
 }
 
-/// How a text begins.
+/// Returns the beginning of a text.
 fn start(content: &[u8]) -> String {
     let text = String::from_utf8_lossy(content);
     let shown: String = text.chars().filter(|c| !c.is_control() || *c == ' ').take(SHOWN).collect();

@@ -1,9 +1,9 @@
-//! Why a file is no image.
+//! Reasons why a file is not a valid image.
 
 use super::{AddressUnit, Format};
 use std::path::PathBuf;
 
-/// Why a file cannot be used as an image.
+/// Reasons why a file cannot be used as an image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -12,7 +12,7 @@ pub enum ImageError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// System error.
         source: std::io::Error,
     },
     /// No data byte.
@@ -26,13 +26,13 @@ pub enum ImageError {
         "line 1, column 1: a text and no image, no line is a record of Intel HEX or S-record: \"{starts}…\""
     )]
     Text {
-        /// How it begins.
+        /// Beginning of the text.
         starts: String,
     },
     /// An editor has put a mark before the first record.
     #[error("byte 1: a {mark} byte order mark stands before the text; save it as plain ASCII")]
     ByteOrderMark {
-        /// The encoding that it stands for.
+        /// Encoding of the mark.
         mark: &'static str,
     },
     /// Bytes that may be anything.
@@ -41,21 +41,21 @@ pub enum ImageError {
         /// The file.
         name: String,
     },
-    /// The file would be taken for raw bytes, and it holds records, whole or damaged.
+    /// The file would be taken for raw bytes, but holds records, whole or damaged.
     #[error(
         "{place}: a record of Intel HEX or S-record, or what is left of one; its characters are no program"
     )]
     WasRecords {
-        /// Where the first one stands.
+        /// Place of the first record.
         place: String,
     },
-    /// Raw bytes were asked for, and the file is a text.
+    /// Raw bytes were requested, but the file is a text.
     #[error("a text is no program, raw bytes were asked for: \"{starts}…\"")]
     RawText {
-        /// How it begins.
+        /// Beginning of the text.
         starts: String,
     },
-    /// Raw bytes were asked for, and the file has the name of a file of records.
+    /// Raw bytes were requested, but the file has the name of a file of records.
     #[error("{name}: raw bytes were asked for, but the name is that of a file of records")]
     RawName {
         /// The file.
@@ -64,7 +64,7 @@ pub enum ImageError {
     /// The addresses do not fit in the usual unit, but they do in the other one.
     #[error("{error}")]
     OtherUnit {
-        /// What is wrong in the usual unit.
+        /// Error in the usual unit.
         error: Box<Self>,
         /// The other one.
         unit: AddressUnit,
@@ -72,25 +72,25 @@ pub enum ImageError {
     /// No such form.
     #[error("unknown image format `{name}`: one of bin, hex, srec")]
     UnknownFormat {
-        /// What was asked for.
+        /// Requested name.
         name: String,
     },
     /// More than the limit.
     #[error("the image has {bytes} bytes, the limit is {limit}")]
     TooLarge {
-        /// Its size, or that of the file.
+        /// Size of the image or of the file.
         bytes: u64,
         /// The limit.
         limit: usize,
     },
-    /// A line is no good record.
+    /// A line is not a valid record.
     #[error("line {line}, column {column}: {problem}")]
     Line {
         /// From 1.
         line: usize,
         /// From 1.
         column: usize,
-        /// What is wrong.
+        /// Error in the line.
         problem: LineProblem,
     },
     /// The file ends before its end record.
@@ -119,7 +119,7 @@ pub enum ImageError {
     },
 }
 
-/// What is wrong with a line.
+/// Errors in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineProblem {
     /// Not the mark of a record.
@@ -190,27 +190,27 @@ pub enum LineProblem {
     },
 }
 
-/// What helps against an [`ImageError`]. None of it leads past a check of the file's content.
+/// Remedy for an [`ImageError`]. No remedy bypasses a check of the file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageAdvice {
     /// The error says all.
     None,
-    /// The file is damaged or is no image: make it again.
+    /// The file is damaged or not an image: make it again.
     MakeAgain,
-    /// Bytes that are no text: `.bin` is the name of raw bytes, or an option takes them as raw.
+    /// Bytes that are not text: `.bin` is the name of raw bytes, or an option takes them as raw.
     NameRaw,
-    /// The file has the name of a file of records and holds none: give it the name of what it is.
+    /// The file has the name of a file of records and holds none: rename it after its content.
     Rename,
     /// Gaps between records can be filled.
     FillGaps,
-    /// The records follow each other where addresses count this unit.
+    /// The records follow each other if addresses count this unit.
     OtherUnit(AddressUnit),
-    /// Addresses overlap, are no whole words, or go too far.
+    /// Addresses overlap, are not at whole words, or go too far.
     Addresses,
 }
 
 impl ImageError {
-    /// What helps.
+    /// Returns the remedy.
     pub fn advice(&self) -> ImageAdvice {
         match self {
             Self::OtherUnit { unit, .. } => ImageAdvice::OtherUnit(*unit),
@@ -232,7 +232,7 @@ impl ImageError {
         }
     }
 
-    /// The records are sound, but their addresses leave gaps, overlap or go too far: perhaps they count something else.
+    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or go too far: perhaps they count another unit.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
         matches!(

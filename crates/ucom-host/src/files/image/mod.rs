@@ -1,10 +1,10 @@
 //! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; the characters of a
 //! file of records never do.
 //!
-//! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of
-//! the boards' tool chain count words as well; Intel HEX and everything else counts bytes. Files of the other kind are recognised by
-//! their records: where those leave gaps or overlap in one unit and follow each other without any in the other one. What one
-//! record or two can mean is not guessed; the unit can always be given.
+//! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of the boards'
+//! tool chain count words as well; Intel HEX and all other formats count bytes. Files of the other kind are recognised by their
+//! records, if those leave gaps or overlap in one unit and follow each other without gaps in the other one. The unit of one or two
+//! records alone is not guessed; an option can always set the unit.
 mod detect;
 mod error;
 mod hex;
@@ -22,8 +22,8 @@ use segments::Segments;
 /// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// So many records in a row are no coincidence: a hole as long as the record before it may be meant once, and in a table of
-/// interrupt vectors behind each, whose records are short.
+/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once,
+/// and after each entry in a table of interrupt vectors, whose records are short.
 const EVIDENCE: usize = 3;
 /// Bytes that they have on average at least; linkers write 16 and more.
 const EVIDENCE_BYTES: usize = 12;
@@ -63,7 +63,7 @@ impl FromStr for Format {
     }
 }
 
-/// What an address of a record counts.
+/// Unit of record addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AddressUnit {
     /// Bytes.
@@ -81,7 +81,7 @@ impl fmt::Display for AddressUnit {
     }
 }
 
-/// What to do with addresses between the first and the last byte that no record fills.
+/// Treatment of addresses between the first and the last byte that no record fills.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
     /// Refuse the file.
@@ -91,14 +91,14 @@ pub enum Gaps {
     Fill,
 }
 
-/// How to read an image file.
+/// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
     /// Form of the file; `None` decides by content and name. Raw bytes never hold records, and text only from a `.bin`
     /// when the form is given.
     pub format: Option<Format>,
-    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other one where at least three records
-    /// follow each other in that one alone.
+    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other unit if at least three records
+    /// follow each other in the other unit alone.
     pub address_unit: Option<AddressUnit>,
     /// Gaps between records.
     pub gaps: Gaps,
@@ -130,7 +130,7 @@ pub enum ImageNote {
     GapFilled {
         /// First address without data, words.
         address_words: u32,
-        /// Its length, bytes.
+        /// Length, bytes.
         bytes: usize,
     },
     /// The last word had one byte; 0xFF was added.
@@ -140,7 +140,7 @@ pub enum ImageNote {
         /// The data records.
         records: u32,
     },
-    /// The records follow each other only if their addresses count this, which is not what their form usually counts.
+    /// The records follow each other only if their addresses count this unit, which is not the usual unit of their form.
     AddressesCount(AddressUnit),
 }
 
@@ -171,7 +171,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file's content, as of a `.bin` where the options leave it open and it is none of the others.
+    /// Reads a file's content; as a `.bin` if neither options nor content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }
@@ -274,7 +274,7 @@ impl Image {
         &self.bytes
     }
 
-    /// The same without a copy.
+    /// Returns the bytes without a copy.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
@@ -303,7 +303,7 @@ impl Image {
         self.format
     }
 
-    /// What its records' addresses count; `None` for raw bytes, which have none.
+    /// Returns the unit of its records' addresses; `None` for raw bytes, which have none.
     pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
         let detected = self.notes.iter().find_map(|note| match note {
             ImageNote::AddressesCount(unit) => Some(*unit),
@@ -317,7 +317,7 @@ impl Image {
         Some(options.address_unit.or(detected).unwrap_or(usual))
     }
 
-    /// What was changed on the way.
+    /// Returns the changes made while reading.
     pub fn notes(&self) -> &[ImageNote] {
         &self.notes
     }

@@ -35,7 +35,7 @@ impl Segments {
         }
         let mut rest = data;
         let mut at = start;
-        // What lies over earlier data must equal it.
+        // Data that overlap earlier data must equal them.
         let covering: Vec<u64> = self.covering(start, end);
         for run_start in covering {
             let Some(run) = self.runs.get(&run_start) else { continue };
@@ -86,7 +86,7 @@ impl Segments {
         self.runs.insert(at, bytes.to_vec());
     }
 
-    /// The whole as words: load address and bytes.
+    /// Joins all segments: load address and bytes.
     pub(super) fn join(self, gaps: Gaps, notes: &mut Vec<ImageNote>) -> Result<(u32, Vec<u8>), ImageError> {
         let Some((&first, _)) = self.runs.first_key_value() else { return Err(ImageError::Empty) };
         let words = |byte: u64| u32::try_from(byte / 2);

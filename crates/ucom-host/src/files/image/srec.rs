@@ -2,7 +2,7 @@
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, ImageNote, LineProblem};
 
-/// A count record at the end proves the file whole, too: some tools write no end record.
+/// Reads the records. A count record at the end also proves that the file is complete: some tools write no end record.
 pub(super) fn read(
     content: &[u8],
     segments: &mut Segments,

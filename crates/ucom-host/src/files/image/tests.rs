@@ -53,7 +53,7 @@ fn intel_hex_as_published() {
 
 #[test]
 fn s_records_as_published_count_words_here() {
-    // The example of the format's manual page, made whole; as byte addresses it has no gap, as word addresses it has.
+    // The example of the format's manual page, completed; as byte addresses it has no gap, as word addresses it has one.
     let text = "S00F000068656C6C6F202020202000003C\n\
                 S11F00007C0802A6900100049421FFF07C6C1B787C8C23783C6000003863000026\n\
                 S11F001C4BFFFFE5398000007D83637880010014382100107C0803A64E800020E9\n\
@@ -147,12 +147,12 @@ fn raw_bytes_are_whole_words() {
     assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
     let options = ImageOptions { load_address_words: Some(u32::MAX), ..Default::default() };
     assert!(matches!(Image::parse(&[1, 2], &options), Err(ImageError::AddressRange { .. })));
-    // Asked for: records are no raw bytes all the same.
+    // Even on request, records are not raw bytes.
     let forced = ImageOptions { format: Some(Format::Bin), ..Default::default() };
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text is never raw bytes, whatever its name; what is wrong is named with its place.
+/// A text is never raw bytes, whatever its name; the error names its place.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -214,7 +214,7 @@ fn a_count_record_ends_a_file() {
             let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
             assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
         }
-        // Cut behind it, or what it does not count: the file is not whole.
+        // Cut after the count, or extended by records that it does not count: the file is not whole.
         for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
             let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
             assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
@@ -223,8 +223,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// Damaged files of records, of both forms: each is refused by its content, with and without the option that asks for raw
-/// bytes, whatever the name is, and what is advised takes no check away.
+/// Damaged files of records, of both forms: each is refused by its content, with and without the option for raw bytes,
+/// under any name, and the advice bypasses no check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -332,7 +332,7 @@ fn raw_bytes_on_request_are_looked_at() {
 }
 
 proptest! {
-    /// The same bytes in the three forms, records of any size in any order, give the same image.
+    /// Equal bytes in the three forms, records of any size in any order, give equal images.
     #[test]
     fn three_forms_are_one_image(
         words in prop::collection::vec(any::<[u8; 2]>(), 1..300),

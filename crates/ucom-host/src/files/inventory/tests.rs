@@ -1,4 +1,4 @@
-//! What inventories take and refuse, and how flash records are kept in them.
+//! Tests of inventories: accepted and refused files, and flash records.
 use proptest::prelude::*;
 
 use super::*;
@@ -75,7 +75,7 @@ fn d62_a_record_changes_one_key_of_the_file() {
     assert!(Inventory::set_record(&dir.path().join("nowhere"), 0x21, None).is_err());
 }
 
-/// D-62: a record that was copied to another board is none, and a damaged one is refused.
+/// D-62: a record that was copied to another board does not count, and a damaged one is refused.
 #[test]
 fn d62_a_record_belongs_to_one_board() {
     let with = |record: &str| format!("[[board]]\nnumber = 1\nflash_number = 0x42\nprogram = {record}\n");

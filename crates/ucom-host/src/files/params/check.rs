@@ -1,4 +1,4 @@
-//! A file against the boards that are there: every mistake with its place, before anything is sent.
+//! Checks a file against the boards on the bus: reports every mistake with its place, before anything is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
@@ -10,9 +10,9 @@ use ucom::BoardInfo;
 /// A board as it is.
 #[derive(Clone, Copy, Debug)]
 pub struct ParamsTarget<'a> {
-    /// Its answer to PC_INFO.
+    /// Answer to PC_INFO.
     pub info: &'a BoardInfo,
-    /// Its name in the inventory; `None`: it has none.
+    /// Name in the inventory; `None`: the inventory has no name.
     pub name: Option<&'a str>,
 }
 
@@ -21,31 +21,31 @@ pub struct ParamsTarget<'a> {
 pub struct ParamsWord {
     /// Place in the buffer.
     pub index: u16,
-    /// The whole text of the signal.
+    /// Text of the signal, not shortened.
     pub name: String,
     /// The word.
     pub word: u16,
     /// The value in the signal's unit, with the unit.
     pub text: String,
-    /// `0.04 → 0.0` where the value lies between two words.
+    /// `0.04 → 0.0` if the value lies between two words.
     pub rounded: Option<String>,
 }
 
-/// One mistake of a file.
+/// Mistake of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
     /// Where in the file.
     pub place: Place,
-    /// For which board.
+    /// Board number.
     pub board: u8,
-    /// What it is.
+    /// Kind of mistake.
     pub kind: ParamsProblemKind,
 }
 
 impl core::fmt::Display for ParamsProblem {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { place, board, kind } = self;
-        // The library's own words for a name that is not there begin with the board.
+        // The library's own message for an unknown name begins with the board.
         let board = if matches!(kind, ParamsProblemKind::NoSignal(_)) {
             String::new()
         } else {
@@ -55,14 +55,14 @@ impl core::fmt::Display for ParamsProblem {
     }
 }
 
-/// What can be wrong.
+/// Kinds of mistakes.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsProblemKind {
-    /// Nobody answers under this number.
+    /// No board answers under this number.
     #[error("it does not answer")]
     Absent,
-    /// Another board stands there.
+    /// Another board has this number.
     #[error("its flash number is 0x{found:04X}, the file is for 0x{wanted:04X}")]
     WrongFlash {
         /// The file's.
@@ -94,7 +94,7 @@ pub enum ParamsProblemKind {
     Twice {
         /// `CI` or `PAR`.
         kind: &'static str,
-        /// As in the file.
+        /// Name in the file.
         name: String,
         /// Line of the first.
         first: u32,
@@ -104,14 +104,14 @@ pub enum ParamsProblemKind {
     Value {
         /// `CI` or `PAR`.
         kind: &'static str,
-        /// As in the file.
+        /// Name in the file.
         name: String,
-        /// Why.
+        /// Reason.
         problem: ValueError,
     },
 }
 
-/// Whether the board is the one that the file means, and has the program that it means.
+/// Checks that the board and its program are those of the file.
 pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
     let mut problems = Vec::new();
     let mut add = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });

@@ -1,7 +1,7 @@
-//! Parameter files: which parameters, and which first inputs, boards are to have. YAML, written to be edited.
+//! Parameter files: the parameters and first inputs that boards shall have. YAML, written to be edited.
 //!
-//! The protocol has no way to read parameters back (D-35), so a file never shows what is on a board. It shows what somebody
-//! wants there; who stands where is checked by flash number or name, and the names belong to a Program ID.
+//! The protocol has no way to read parameters back (D-35), so a file shows the wanted values, never the present ones of a
+//! board. Boards are identified by flash number or name, and the names of signals belong to a Program ID.
 
 mod check;
 mod read;
@@ -20,16 +20,16 @@ pub const PARAMS_HELP: &str = include_str!("help.txt");
 /// A parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParamsFile {
-    /// Its boards, each number once, in the order of the file.
+    /// Boards, each number once, in the order of the file.
     pub boards: Vec<ParamsBoard>,
 }
 
-/// One board of a parameter file.
+/// Board of a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsBoard {
     /// Position in the chain.
     pub number: u8,
-    /// Where it stands in the file.
+    /// Place in the file.
     pub place: Place,
     /// The flash number that must stand there.
     pub flash_number: Option<u16>,
@@ -50,7 +50,7 @@ pub struct ParamsEntry {
     pub name: String,
     /// The value.
     pub given: SignalValue,
-    /// Where it stands in the file.
+    /// Place in the file.
     pub place: Place,
 }
 
@@ -69,7 +69,7 @@ impl core::fmt::Display for Place {
     }
 }
 
-/// Why a text is no parameter file.
+/// Reasons why a text is not a valid parameter file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsError {
@@ -79,9 +79,9 @@ pub enum ParamsError {
     /// Not YAML of this form.
     #[error("{place}: {what}")]
     Form {
-        /// Where.
+        /// Place.
         place: Place,
-        /// What is wrong.
+        /// Error.
         what: String,
     },
     /// Not YAML of this form, at no place.
@@ -92,7 +92,7 @@ pub enum ParamsError {
     In {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// Error in the file.
         source: Box<ParamsError>,
     },
 }

@@ -117,7 +117,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     Ok(ParamsBoard { number: number_of, place: at, flash_number, name, program_id, par, ci })
 }
 
-/// The YAML library's message, in words for whoever wrote the file.
+/// Rewords the YAML library's message for the author of the file.
 fn people(words: &str) -> String {
     // This message has a place of its own.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');

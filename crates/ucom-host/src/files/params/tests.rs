@@ -151,7 +151,7 @@ fn saved() -> SavedBoard {
     }
 }
 
-/// D-35: what is not wanted is a comment, never a value.
+/// D-35: a value that is not wanted is written as a comment.
 #[test]
 fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let text = params_text(&[saved()]);
@@ -221,7 +221,7 @@ fn names() -> impl Strategy<Value = Vec<String>> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// Whatever boards call their parameters: a saved file gives the same words for the same places.
+    /// For any parameter names, a saved file gives the same words for the same places.
     #[test]
     fn a_saved_file_gives_the_same_words(par in names(), words in prop::collection::vec(any::<Option<u16>>(), 8), kind in 0..4_usize, text in any::<String>()) {
         let description = IoDescription { description: text.clone(), par, ..Default::default() };

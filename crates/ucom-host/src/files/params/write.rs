@@ -8,13 +8,13 @@ use std::fmt::Write;
 /// A board to be written down.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SavedBoard {
-    /// Its number.
+    /// Board number.
     pub number: u8,
-    /// Its flash number.
+    /// Flash number of the board.
     pub flash_number: u16,
-    /// Its name in the inventory; empty: none.
+    /// Name in the inventory; empty: none.
     pub name: String,
-    /// Its program.
+    /// Program ID.
     pub program_id: u16,
     /// The names of its signals.
     pub description: IoDescription,
@@ -24,14 +24,14 @@ pub struct SavedBoard {
     pub ci: Vec<SavedSignal>,
 }
 
-/// What is written of one signal.
+/// Entry of a signal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedSignal {
-    /// Its meaning.
+    /// Meaning.
     pub signal: Signal,
     /// The word that is wanted; `None`: the name becomes a comment.
     pub word: Option<u16>,
-    /// For a wanted word when it was written, for others what is known beside.
+    /// Time of writing for a wanted word; other information for the rest.
     pub remark: String,
 }
 
@@ -90,8 +90,8 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// What a word is written as. A file is read again with another signal table, or with none; a bare number would then be another
-/// word. So there is a unit behind each number, which whoever does not know it refuses, or it is the word itself.
+/// Returns the text for a word. A file may be read again with another signal table, or with none; a bare number would then be
+/// another word. So each number gets a unit, which a reader without the table refuses, or the word itself is written.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -109,7 +109,7 @@ fn value(signal: &Signal, word: u16) -> String {
     if text.chars().all(plain) { text } else { quoted(&text) }
 }
 
-/// A remark at the end of a line. Texts of boards may hold anything: only what is one line stays.
+/// Returns a remark for the end of a line. Texts of boards may hold any characters: control characters and line separators become blanks.
 fn comment(words: &str) -> String {
     let one_line: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let one_line = one_line.replace(['\u{2028}', '\u{2029}', '\u{FEFF}', '\u{FFFE}', '\u{FFFF}'], " ");
@@ -119,7 +119,7 @@ fn comment(words: &str) -> String {
 /// Characters that YAML allows an implicit key (1.2.2, section 7.4.2), quotes and escapes counted.
 const KEY_MAX: usize = 1024;
 
-/// The name of a signal, as short as it can be and still mean this one; its number where no key of YAML holds the name.
+/// Returns the shortest unambiguous name of a signal; its number if a YAML key cannot hold the name.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);

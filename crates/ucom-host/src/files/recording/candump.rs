@@ -1,4 +1,4 @@
-//! `candump -L` of can-utils: `(sec.frac) interface ID#DATA`, an optional `R` or `T` behind it.
+//! `candump -L` of can-utils: `(sec.frac) interface ID#DATA`, optionally followed by `R` or `T`.
 
 use super::{Direction, FrameKind, Record, RecordProblem, RecordedFrame, RecordingError};
 use super::{hex_bytes, lines::Lines, seconds};
@@ -141,7 +141,7 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Passes on what is buffered.
+    /// Writes buffered data.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }

@@ -1,30 +1,30 @@
-//! Why a recording cannot be read or written.
+//! Errors of reading and writing recordings.
 
 use std::path::{Path, PathBuf};
-/// Why a recording cannot be read or written.
+/// Reasons why a recording cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
     /// The file cannot be used.
     #[error("{}{source}", prefix(path))]
     Io {
-        /// The file; empty where it is not known.
+        /// File; empty if not known.
         path: PathBuf,
-        /// Why.
+        /// System error.
         source: std::io::Error,
     },
-    /// A line is no record.
+    /// A line is not a valid record.
     #[error("line {line}: {problem}")]
     Line {
         /// From 1.
         line: usize,
-        /// What is wrong.
+        /// Error in the line.
         problem: RecordProblem,
     },
     /// Not an FZI-CAN stream of version 1.2.
     #[error("the first line is `{first}`, not `{}`", super::FZI_HEADER)]
     FziHeader {
-        /// What it is.
+        /// First line of the file.
         first: String,
     },
     /// The form has no place for this frame.
@@ -36,14 +36,14 @@ pub enum RecordingError {
     /// An MCAP file is damaged.
     #[error("{}{problem}", prefix(path))]
     Mcap {
-        /// The file; empty where it is not known.
+        /// File; empty if not known.
         path: PathBuf,
-        /// What is wrong.
+        /// Error in the file.
         problem: String,
     },
 }
 
-/// What is wrong with a line.
+/// Errors in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordProblem {
     /// Longer than any record.
@@ -64,7 +64,7 @@ pub enum RecordProblem {
     /// Not data.
     #[error("the data are not pairs of hexadecimal digits, or too many")]
     Data,
-    /// The file ends in the middle of it: even what can be read of it may be only its beginning.
+    /// The file ends in the middle of the record: the readable part may be only its beginning.
     #[error("the file is broken off here: the line has no end")]
     BrokenOff,
     /// Wrong number of columns.

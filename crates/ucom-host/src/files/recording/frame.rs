@@ -1,14 +1,14 @@
-//! One frame of a recording, foreign ones included.
+//! Frame of a recording, foreign frames included.
 
 use std::fmt;
-/// What kind of frame it is.
+/// Kind of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameKind {
     /// Classic data frame.
     Data,
-    /// Remote frame: no data, asks for so many bytes.
+    /// Remote frame: no data, asks for `length` bytes.
     Remote {
-        /// The length asked for, 0..8.
+        /// Requested length, 0..8.
         length: u8,
     },
     /// CAN FD.
@@ -73,7 +73,7 @@ impl fmt::Display for RecordedFrame {
     }
 }
 
-/// Who sent a frame, where the recording knows it.
+/// Direction of a frame, if the recording shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Received (`R`).
@@ -89,7 +89,7 @@ pub struct Record {
     pub time_ns: u64,
     /// Name of the interface.
     pub channel: String,
-    /// Who sent it.
+    /// Direction.
     pub direction: Option<Direction>,
     /// The frame.
     pub frame: RecordedFrame,

@@ -82,7 +82,7 @@ impl<W: Write> FziWriter<W> {
         Ok(())
     }
 
-    /// Passes on what is buffered.
+    /// Writes buffered data.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }

@@ -18,7 +18,7 @@ impl<R: BufRead> Lines<R> {
         Self { input, number: 0, endless: false, failed: false }
     }
 
-    /// The next line without blanks around it; `None` at the end of the file. Memory is bounded whatever comes.
+    /// Returns the next line without blanks around it; `None` at the end of the file. Memory is bounded for any input.
     pub fn line(&mut self) -> Result<Option<String>, RecordingError> {
         let mut line = Vec::new();
         self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;

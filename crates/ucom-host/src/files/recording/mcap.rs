@@ -148,7 +148,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.write_to_known_channel(&header, &json)?)
     }
 
-    /// Ends the chunk under way: what was written so far can be read without the rest.
+    /// Ends the open chunk: the data written so far can then be read without the rest.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
@@ -160,7 +160,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Reads a whole file, or one whose writer was killed up to its last whole record.
+/// Reads a whole file, or the file of a killed writer up to its last whole record.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();

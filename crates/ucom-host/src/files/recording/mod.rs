@@ -1,8 +1,8 @@
 //! Recordings of a bus: `candump -L`, FZI-CAN 1.2 and MCAP.
 //!
 //! A recording is only meaningful with the profile that was in use. MCAP keeps it as metadata. The two text forms have no
-//! place for it that every reader accepts (python-can's candump reader takes each line for a frame), so it lies beside
-//! the recording as a file of its own, see [`profile_path`]; comment lines `# …` with it are read where they occur.
+//! place for it that every reader accepts (python-can's candump reader takes each line for a frame), so it is stored in a
+//! separate file next to the recording, see [`profile_path`]; comment lines `# …` with it are read if they occur.
 mod candump;
 mod error;
 mod frame;
@@ -22,7 +22,7 @@ pub use frame::{Direction, FrameKind, Record, RecordedFrame};
 pub use fzi::{FZI_HEADER, FziReader, FziWriter};
 pub use mcap::{McapWriter, read_mcap};
 
-/// Longest line of a text recording, bytes; more is no recording.
+/// Longest line of a text recording, bytes; a longer line is not a recording.
 pub const MAX_LINE: usize = 4096;
 
 /// Form of a recording.
@@ -58,7 +58,7 @@ impl RecordingFormat {
     }
 }
 
-/// Where the profile of a text recording lies: `NAME.profile.toml` beside it.
+/// Returns the path of the profile of a text recording: `NAME.profile.toml` next to it.
 pub fn profile_path(recording: &Path) -> PathBuf {
     let mut name = recording.as_os_str().to_owned();
     name.push(".profile.toml");
@@ -72,12 +72,12 @@ pub struct Recording {
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
-    /// Where and how the file ends in the middle of a record, as after a writer that was killed; `None`: it is whole.
+    /// Place and kind of an end in the middle of a record, as after a killed writer; `None`: the file is complete.
     pub broken_off: Option<String>,
 }
 
 impl Recording {
-    /// Reads a file of any of the forms, and the profile beside it.
+    /// Reads a file of any of the forms, and the profile next to it.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let mut file = BufReader::new(File::open(path).map_err(io)?);
@@ -110,7 +110,7 @@ impl Recording {
     }
 }
 
-/// The records of a text up to its end, and how that looks if it is none.
+/// Returns the records of a text up to its end; if the last line is cut off, also its error.
 fn whole(
     lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
 ) -> Result<(Vec<Record>, Option<String>), RecordingError> {
@@ -138,7 +138,7 @@ pub enum RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Makes the file, and for text forms the profile's beside it.
+    /// Creates the file, and for text forms the profile's file next to it.
     pub fn create(path: &Path, format: RecordingFormat, profile: &str) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let out = BufWriter::new(File::create(path).map_err(io)?);
@@ -163,7 +163,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Lets all that was written reach the file: a writer that is killed later loses only what came since.
+    /// Writes all data to the file: a writer that is killed later loses only newer records.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.flush(),
@@ -172,7 +172,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes what is left; without it an MCAP file has no index and a text file may lack its last lines.
+    /// Writes the remaining data; without this call an MCAP file has no index and a text file may lack its last lines.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => Ok(w.into_inner().flush()?),

@@ -45,7 +45,7 @@ fn times_are_written_with_six_decimals() {
     assert_eq!(String::from_utf8(out.into_inner()).unwrap(), "(0000000007.123456) can0 680#\n");
 }
 
-/// D-02: foreign frames are read as what they are, and come back as the same text.
+/// D-02: foreign frames are read with their kind, and are written as the same text.
 #[test]
 fn d02_foreign_lines_are_recognised() {
     for frame in [
@@ -118,7 +118,7 @@ fn frames() -> impl Strategy<Value = RecordedFrame> {
     })
 }
 
-/// Bytes that a file's writer left behind when it was killed.
+/// Returns the bytes that a file's writer left when it was killed.
 fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("recording");
@@ -132,7 +132,7 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// A writer that is killed leaves a file that is cut off anywhere: whole records are read, none is made up, the rest is named.
+/// A killed writer leaves a file that is cut off anywhere: whole records are read, none is made up, the rest is reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     let record = |i: u64| {
@@ -168,7 +168,7 @@ fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     }
 }
 
-/// The same where a chunk of MCAP was under way: its head does not contain its length yet.
+/// As before, while a chunk of MCAP was being written: its head does not contain its length yet.
 #[test]
 fn a_chunk_without_its_end_hides_nothing_before_it() {
     let record = |i: u64| {
@@ -215,7 +215,7 @@ proptest! {
         prop_assert_eq!(read(&text).unwrap(), records);
     }
 
-    /// C-7 for FZI-CAN: what it can hold comes back as it was, DLC below 8 included.
+    /// C-7 for FZI-CAN: frames that the format can hold are read back unchanged, DLC below 8 included.
     #[test]
     fn c7_fzi_round_trip(records in records(true)) {
         let mut out = FziWriter::new(Vec::new()).unwrap();

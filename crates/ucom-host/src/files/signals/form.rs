@@ -1,4 +1,4 @@
-//! The TOML of a signal table, and what its numbers may be.
+//! TOML form of a signal table, and the ranges of its numbers.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::value::may_follow;
 use super::{Signal, SignalType};
 
-/// Largest scale and offset; smallest scale is its inverse. Keeps what is shown within what a number can hold.
+/// Largest scale and offset; the smallest scale is its inverse. The limit keeps displayed values within the range of a number.
 pub(super) const LARGEST: f64 = 1e9;
 
 #[derive(Deserialize)]
@@ -119,7 +119,7 @@ impl FileSignal {
     }
 }
 
-/// The TOML library's message, in words for whoever wrote the table.
+/// Rewords the TOML library's message for the author of the table.
 pub(super) fn people(words: &str) -> String {
     let terms = [
         ("duplicate key", "the same key is given twice"),

@@ -1,5 +1,5 @@
 //! Signal tables: type, scale, offset, unit and limits of a program's inputs, outputs and parameters (D-11), as `SG_` lines
-//! hold them in a DBC file. A file beside the tool, as boards send no more than a text for each signal.
+//! hold them in a DBC file. The table is a separate file because boards send only a text for each signal.
 
 mod form;
 mod signal;
@@ -23,7 +23,7 @@ pub struct BoardSignals {
 }
 
 impl BoardSignals {
-    /// Those of a description; what the table does not know is a bare word.
+    /// Creates the signals of a description; a signal that the table does not know is a bare word.
     pub fn new(description: &IoDescription, program: Option<&ProgramSignals>, profile: &Profile) -> Self {
         let of = |kind: Kind| {
             let names = description.names(kind).iter().enumerate();
@@ -36,8 +36,8 @@ impl BoardSignals {
         Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 
-    /// For a program that the given table does not know: only words themselves can be given, as numbers may be meant in
-    /// units that nobody here knows.
+    /// Returns the signals of a program that the given table does not know: only words themselves are accepted, because
+    /// the units of numbers are not known.
     pub fn raw_only(mut self) -> Self {
         for signal in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
             signal.raw_only = true;
@@ -54,7 +54,7 @@ impl BoardSignals {
         }
     }
 
-    /// One signal; `None` beyond the dimension.
+    /// Returns a signal; `None` beyond the dimension.
     pub fn get(&self, kind: Kind, index: usize) -> Option<&Signal> {
         self.all(kind).get(index)
     }

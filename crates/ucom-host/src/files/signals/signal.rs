@@ -1,4 +1,4 @@
-//! One input, output or parameter: what its word means, both ways (D-11).
+//! Signal of an input, output or parameter: conversion between word and value (D-11).
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use super::value_error::space;
 use super::{SignalValue, ValueError};
 use ucom::Profile;
 
-/// What kind of number a word is.
+/// Number type of a word.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SignalType {
@@ -21,14 +21,14 @@ pub enum SignalType {
     Bool,
 }
 
-/// What the word of a signal means: `word × scale + offset`, in a unit.
+/// Meaning of a signal's word: `word × scale + offset`, in a unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
-    /// What kind of number the word is.
+    /// Number type of the word.
     pub kind: SignalType,
     /// Units for each step of the word.
     pub scale: f64,
-    /// What the word 0 means, in units.
+    /// Value of the word 0, in units.
     pub offset: f64,
     /// As `deg`; empty: none.
     pub unit: String,
@@ -36,13 +36,13 @@ pub struct Signal {
     pub min: Option<f64>,
     /// Largest value that may be written, in units.
     pub max: Option<f64>,
-    /// It comes from a table; otherwise it is a bare word.
+    /// `true` if the signal comes from a table; otherwise it is a bare word.
     pub known: bool,
-    /// There is a table, and it knows nothing of the program: only the word itself can be given.
+    /// `true` if a table is given that does not know the program: only the word itself is accepted.
     pub raw_only: bool,
 }
 
-/// What calculating with fractions may lose, as a share.
+/// Relative error allowed for floating-point arithmetic.
 const SLACK: f64 = 1e-9;
 
 impl Signal {
@@ -65,7 +65,7 @@ impl Signal {
         self.scale == 1.0 && self.offset == 0.0
     }
 
-    /// Whether the word is a signed number.
+    /// Returns `true` if the word is a signed number.
     pub fn signed(&self) -> bool {
         self.kind == SignalType::Int16
     }
@@ -87,7 +87,7 @@ impl Signal {
         f64::from(number) * self.scale + self.offset
     }
 
-    /// Digits behind the point that distinguish two neighbouring words.
+    /// Returns the number of decimals that distinguish two neighbouring words.
     fn digits(&self) -> usize {
         let written = |x: f64| format!("{x}").split_once('.').map_or(0, |(_, digits)| digits.len());
         let enough = (-self.scale.abs().log10()).ceil().max(0.0) as usize + 2;
@@ -110,7 +110,7 @@ impl Signal {
         }
     }
 
-    /// The same with the unit behind it.
+    /// Returns the text followed by the unit.
     pub fn text_with_unit(&self, word: u16) -> String {
         self.text(word) + &space(&self.unit)
     }
@@ -133,7 +133,7 @@ impl Signal {
         (self.min.map_or(low, |min| min.max(low)), self.max.map_or(high, |max| max.min(high)))
     }
 
-    /// The same as text.
+    /// Returns the limits as text.
     pub fn limits(&self) -> (String, String) {
         if self.kind == SignalType::Hex {
             return ("0x0000".into(), "0xFFFF".into());
@@ -148,7 +148,7 @@ impl Signal {
         (text(low, self.min), text(high, self.max))
     }
 
-    /// Smallest and largest number of a word whose value is within the limits; the first is larger where there is none.
+    /// Returns the smallest and largest number of a word whose value is within the limits; the first is larger if no word is.
     pub(super) fn allowed(&self) -> (i32, i32) {
         let (low, high) = self.words();
         let steps = |limit: f64| (limit - self.offset) / self.scale;
@@ -159,7 +159,7 @@ impl Signal {
         (from.map_or(low, |from| from.max(low)), to.map_or(high, |to| to.min(high)))
     }
 
-    /// Whether a value keeps the limits, but for what calculation with fractions loses.
+    /// Returns `true` if a value keeps the limits, within the tolerance of floating-point arithmetic.
     fn within(&self, value: f64) -> bool {
         let slack = |limit: f64| SLACK * (limit.abs().max(value.abs()) + self.scale.abs());
         let below = self.min.is_some_and(|min| value < min - slack(min));
@@ -167,7 +167,7 @@ impl Signal {
         !below && !above
     }
 
-    /// What is sent instead of a value that lies between two words, with the unit; `None`: the value itself.
+    /// Returns the value that is sent instead of one that lies between two words, with the unit; `None`: the value itself.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -175,8 +175,7 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// The word for a value. Between two words the nearer one is taken where the signal has a scale, but never one beyond
-    /// the limits.
+    /// Returns the word for a value. Between two words the nearer one is taken if the signal has a scale, but never one beyond the limits.
     ///
     /// # Errors
     /// A value outside of the limits, in another unit, between two words of a signal without scale, or of another type.
@@ -186,7 +185,7 @@ impl Signal {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // The word itself goes whatever the scale is; limits hold for it, too.
+            // The word itself is sent for any scale; limits hold for it, too.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
@@ -201,7 +200,7 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // Which of the two a bare number means would hang on what table lies in the directory.
+                // Otherwise the meaning of a bare number would depend on the table in the directory.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }
@@ -229,7 +228,7 @@ impl Signal {
         let (min, max) = self.limits();
         let (low, high) = self.range();
         let (limit, shown) = if value < low { (low, &min) } else { (high, &max) };
-        // As it is shown, without the digits that calculating with fractions adds.
+        // Without the digits that floating-point arithmetic adds.
         let limit = shown.parse().unwrap_or(limit);
         ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone(), value, limit }
     }

@@ -17,19 +17,19 @@ pub struct SignalTable {
     given: bool,
 }
 
-/// What is known of one program's signals.
+/// Signals of a program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramSignals {
     /// Program IDs of the versions that it fits.
     pub program_ids: Vec<u16>,
-    /// For people.
+    /// Name for display.
     pub name: String,
     ci: BTreeMap<String, Signal>,
     so: BTreeMap<String, Signal>,
     par: BTreeMap<String, Signal>,
 }
 
-/// Why a file is no signal table.
+/// Reasons why a file is not a valid signal table.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalTableError {
@@ -42,10 +42,10 @@ pub enum SignalTableError {
     /// A program without an ID.
     #[error("program {number} has no program_id")]
     NoId {
-        /// Which, from 1.
+        /// Index, from 1.
         number: usize,
     },
-    /// One Program ID in two tables.
+    /// Two tables have the same Program ID.
     #[error("program 0x{id:04X} is given twice")]
     Twice {
         /// The Program ID.
@@ -60,7 +60,7 @@ pub enum SignalTableError {
         kind: &'static str,
         /// The signal.
         signal: String,
-        /// What is wrong, with the limit.
+        /// Error, with the limit.
         what: String,
     },
     /// In a file.
@@ -68,7 +68,7 @@ pub enum SignalTableError {
     In {
         /// The file.
         path: PathBuf,
-        /// What is wrong in it.
+        /// Error in the file.
         source: Box<SignalTableError>,
     },
 }
@@ -113,18 +113,18 @@ impl SignalTable {
         Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Whether it was read from anything; otherwise the meaning of words is unknown.
+    /// Returns `true` if a table was read; otherwise the meaning of words is unknown.
     pub fn is_given(&self) -> bool {
         self.given
     }
 
-    /// What is known of a program.
+    /// Returns the signals of a program.
     pub fn program(&self, id: u16) -> Option<&ProgramSignals> {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// The file's text for programs that are to get a table: every name, and what the texts of the boards seem to mean for
-    /// scale and unit, to be looked over by somebody who knows.
+    /// Returns the file's text for programs that need a table: every name, with scale and unit as guessed from the texts
+    /// of the boards, for review by an expert.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
@@ -182,7 +182,7 @@ fn keys(name: &str) -> String {
 }
 
 impl ProgramSignals {
-    /// Which signals of one kind are known, by the table's own names.
+    /// Returns the known signals of one kind, by the table's own names.
     pub fn names(&self, kind: Kind) -> impl Iterator<Item = &String> {
         self.of(kind).keys()
     }
@@ -195,8 +195,8 @@ impl ProgramSignals {
         }
     }
 
-    /// What is known of a signal: by its whole text, its text without the unit in brackets, or its number. Small and
-    /// capital letters are the same where names stay distinct by that, as they are for names that people give.
+    /// Returns a signal: by its whole text, its text without the unit in brackets, or its number. Letter case is ignored
+    /// if names stay distinct without it, as for names given by the user.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    /// D-11: by Program ID; what a table does not name stays a bare word.
+    /// D-11: tables are found by Program ID; a signal without a table entry stays a bare word.
     #[test]
     fn d11_tables_are_found_by_program_and_name() {
         let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
@@ -296,7 +296,7 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: letters in another case are the same name, as where values are given.
+    /// D-11: names in another letter case are equal, as for given values.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\

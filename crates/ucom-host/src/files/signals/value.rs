@@ -1,4 +1,4 @@
-//! A value as people write it: on a command line, in a parameter file.
+//! Value as written by a user: on a command line, in a parameter file.
 use core::fmt;
 use core::str::FromStr;
 
@@ -8,26 +8,26 @@ const UNIT_MAX: usize = 32;
 /// A value before it is known which signal it is for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SignalValue {
-    /// `0x05DC`: the word itself, whatever the signal's type and scale.
+    /// `0x05DC`: the word itself, for any type and scale of the signal.
     Raw(u16),
-    /// `15.5 deg`: in the unit of the signal. `15.5`: where the signal has no unit; without a table, the word as a number.
+    /// `15.5 deg`: in the unit of the signal. `15.5`: if the signal has no unit; without a table, the word as a number.
     Number {
         /// The number.
         value: f64,
-        /// The unit behind it; empty: none was given.
+        /// Unit after the number; empty: none was given.
         unit: String,
     },
     /// `on`, `off`, `true`, `false`, `yes`, `no`.
     Switch(bool),
 }
 
-/// A text that is no value.
+/// Texts that are not valid values.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalValueError {
-    /// Hexadecimal, but no word of 16 bits.
+    /// Hexadecimal, but not a word of 16 bits.
     #[error("\"{0}\" is no word of 16 bits; they are 0x0000 to 0xFFFF")]
     Hex(String),
-    /// Nothing that a value can be.
+    /// Not a value of any form.
     #[error(
         "\"{0}\" is no value; values are numbers (15.5deg; without a unit where there is none), words (0x05DC), on and off"
     )]
@@ -50,11 +50,11 @@ impl FromStr for SignalValue {
             return word.map(Self::Raw).ok_or_else(|| SignalValueError::Hex(text.into()));
         }
         let wrong = || SignalValueError::Form(text.into());
-        // Words like "inf" and "nan" are numbers for Rust, not for people.
+        // Words like "inf" and "nan" are numbers for Rust, but not for users.
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
         }
-        // The longest beginning that is a number; what follows is its unit.
+        // The longest beginning that is a number; the rest is its unit.
         let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
@@ -76,7 +76,7 @@ impl FromStr for SignalValue {
     }
 }
 
-/// Whether a unit can stand behind a number without becoming a part of it.
+/// Returns `true` if a unit can follow a number without becoming a part of it.
 pub(super) fn may_follow(unit: &str) -> bool {
     !unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_:;'".contains(c))
 }
@@ -133,7 +133,7 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
-        // What is taken is taken again as it is shown, with a blank more.
+        // An accepted text is accepted again as it is displayed, with an additional blank.
         assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);

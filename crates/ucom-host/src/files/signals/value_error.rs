@@ -1,11 +1,11 @@
 //! Why a value cannot be written to a signal.
-/// Why a value cannot be written to a signal.
+/// Reasons why a value cannot be written to a signal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
     /// Too large or too small.
     #[error("{given} is outside {min}..{max}{}", space(unit))]
     Range {
-        /// What was given.
+        /// Given text.
         given: String,
         /// Smallest value.
         min: String,
@@ -21,15 +21,15 @@ pub enum ValueError {
     /// Given in another unit than the signal's.
     #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
     Unit {
-        /// What was given.
+        /// Given text.
         given: String,
         /// The signal's unit.
         unit: String,
     },
-    /// A number alone, where it could be the word or a value in the signal's unit.
+    /// A number alone that could be the word or a value in the signal's unit.
     #[error("{given}: {}, or the word itself as 0x0000", no_unit(given, unit))]
     NoUnit {
-        /// What was given.
+        /// Given text.
         given: String,
         /// The signal's unit; empty: the table scales it and names none.
         unit: String,
@@ -37,27 +37,27 @@ pub enum ValueError {
     /// Between two words.
     #[error("{given}: it is a whole number")]
     Fraction {
-        /// What was given.
+        /// Given text.
         given: String,
     },
     /// Not 0 or 1, on or off.
     #[error("{given}: it is on or off")]
     Switch {
-        /// What was given.
+        /// Given text.
         given: String,
     },
-    /// A number or a switch, and nobody knows what it means here.
+    /// A number or a switch without a known meaning here.
     #[error(
         "{given}: the signal table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
     )]
     Meaning {
-        /// What was given.
+        /// Given text.
         given: String,
     },
     /// On or off, but the signal is a number.
     #[error("{given}: it is a number")]
     NoSwitch {
-        /// What was given.
+        /// Given text.
         given: String,
     },
 }

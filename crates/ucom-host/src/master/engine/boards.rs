@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, Status, StringAssembler};
 
-/// How a board's heartbeats are.
+/// State of a board's heartbeats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
     /// No heartbeat yet, or the application was stopped on purpose.
@@ -11,23 +11,23 @@ pub enum Life {
     Unarmed,
     /// In time.
     Alive,
-    /// One is missing.
+    /// One heartbeat is missing.
     Late,
     /// Three are missing.
     Lost,
 }
 
-/// So long a board's last heartbeat may still be under way when its application has ended, µs.
+/// Time for which a board's last heartbeat may still arrive after its application has ended, µs.
 const UNDER_WAY: u64 = 100_000;
 
-/// What is known of a board.
+/// State of a board as last received.
 #[derive(Clone, Debug, Default)]
 pub struct Board {
-    /// Its last answer to PC_INFO.
+    /// Last answer to PC_INFO.
     pub info: Option<BoardInfo>,
-    /// Its description, when it came whole.
+    /// Description, if it came whole.
     pub description: Option<String>,
-    /// Its flags, as it last sent them.
+    /// Flags, as last sent by the board.
     pub admin: Option<Admin>,
     /// Supervision.
     pub life: Life,
@@ -37,19 +37,19 @@ pub struct Board {
     pub last: Option<(u64, Function)>,
     /// Last sensor output, µs: the control loop was running then.
     pub so_at: Option<u64>,
-    /// It has rebooted since it got its number.
+    /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
     /// Errors it reported, newest last, at most 16: time in µs and code.
     pub errors: Vec<(u64, ErrorCode)>,
-    /// How many errors it reported.
+    /// Number of reported errors.
     pub error_count: u64,
     /// Strings of its own that could not be put together.
     pub bad_strings: u64,
-    /// MCA_DSP_READY that came, asked for or not.
+    /// Number of MCA_DSP_READY frames, requested or not.
     pub ready_count: u64,
-    /// Since when its application is known to be stopped, and not to start by itself.
+    /// Time since which its application is known to be stopped, and not to start by itself.
     pub(crate) stopped_at: Option<u64>,
-    /// When it was last commanded to start, until it shows that it has.
+    /// Time of the last start command, until the board shows that it has started.
     pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
@@ -66,7 +66,7 @@ impl Life {
     }
 }
 
-/// What a board of this status does, in one word.
+/// Returns the state of a board with this status, in one word.
 pub const fn state_name(status: Status) -> &'static str {
     if status.has(Status::MCARUN) {
         "running"
@@ -80,12 +80,12 @@ pub const fn state_name(status: Status) -> &'static str {
 }
 
 impl Board {
-    /// What was last received of it still holds: it is not lost, and has not begun anew.
+    /// Returns `true` if the last received state still holds: the board is not lost and has not rebooted.
     pub fn is_known(&self) -> bool {
         self.life != Life::Lost && !self.rebooted
     }
 
-    /// What it does, in one word: what comes by itself counts more than an old answer.
+    /// Returns the state in one word: frames that the board sends by itself count more than an old answer.
     pub fn state_name(&self, now_us: u64) -> &'static str {
         match (self.life, self.status()) {
             _ if self.rebooted => "rebooted",
@@ -107,18 +107,19 @@ impl Board {
         self.info.map(|info| info.status)
     }
 
-    /// Whether it sends its outputs: its control loop runs now, whatever was last answered.
+    /// Returns `true` if the board sends its outputs: its control loop runs now, whatever its last answer was.
     pub fn sends_outputs(&self, now: u64) -> bool {
         self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
     }
 
-    /// Whether the control loop runs, by what was last received.
+    /// Returns `true` if the control loop runs, by the frames last received.
     pub fn running(&self, now: u64) -> bool {
         self.sends_outputs(now)
             || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
-    /// A piece of a text of its own; the text when it is whole. `passed_us` is the time that has passed between frames.
+    /// Takes a package of a text of the board; returns the text when it is complete. `passed_us` is the time that has
+    /// passed between frames.
     pub(crate) fn debug_text(
         &mut self,
         passed_us: u64,
@@ -144,12 +145,12 @@ impl Board {
         self.errors.push((at, code));
     }
 
-    /// Whether a heartbeat under its number cannot be its own (D-08).
+    /// Returns `true` if a heartbeat under its number cannot be its own (D-08).
     pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// The application has ended or is about to: its heartbeats are no longer expected, nothing of it is known.
+    /// Records that the application has ended or is about to: its heartbeats are no longer expected, its state is unknown.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;
@@ -165,7 +166,7 @@ pub struct Boards {
 }
 
 impl Boards {
-    /// A board of which something is known.
+    /// Returns a board with a known state.
     pub fn get(&self, number: u8) -> Option<&Board> {
         self.boards.get(&number)
     }

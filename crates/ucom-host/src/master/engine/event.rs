@@ -1,4 +1,4 @@
-//! Events: what the master reports to its user unasked.
+//! Events: unsolicited reports of the master to its user.
 use crate::master::error::Error;
 use crate::master::io::Snapshot;
 use crate::master::reports::update::Progress;
@@ -11,103 +11,104 @@ use ucom::{Admin, BoardInfo, ErrorCode, Foreign, Function};
 pub enum Event {
     /// A procedure ended.
     Done {
-        /// Which.
+        /// Procedure.
         id: ProcedureId,
-        /// How.
+        /// Result.
         result: Result<Outcome, Error>,
     },
     /// An update went on.
     Progress {
-        /// Which procedure.
+        /// Procedure.
         id: ProcedureId,
-        /// How far.
+        /// Progress.
         progress: Progress,
     },
-    /// An update is about to reset this board for programming: its flash record does not hold any more (D-62). Nothing is
-    /// erased before the board has answered to the reset.
+    /// An update is about to reset this board for programming: its flash record no longer holds (D-62). Nothing is erased
+    /// before the board has answered the reset.
     FlashBegins {
-        /// Which procedure.
+        /// Procedure.
         id: ProcedureId,
-        /// Its flash number.
+        /// Flash number of the board.
         flash_number: u16,
     },
     /// A board showed the program that an update wrote (D-62).
     FlashVerified {
-        /// Which procedure.
+        /// Procedure.
         id: ProcedureId,
-        /// What it shows.
+        /// Answer of the board.
         info: BoardInfo,
     },
     /// A conformance test was done.
     Tested {
-        /// Which procedure.
+        /// Procedure.
         id: ProcedureId,
-        /// How it ended.
+        /// Result.
         test: ConformanceTest,
     },
-    /// A procedure reports something on its way.
+    /// A procedure reports a note before its end.
     Note {
-        /// Which procedure.
+        /// Procedure.
         id: ProcedureId,
         /// In words.
         text: String,
     },
     /// A board's heartbeats changed.
     Supervision {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// What happened.
+        /// Change.
         change: Supervision,
     },
     /// A board reported an error.
     BoardError {
-        /// Its number; 0 (or what stands for it) from a board without one.
+        /// Board number; 0 (or its equivalent) from a board without a number.
         board: u8,
         /// The code.
         code: ErrorCode,
         /// The procedure that was at work with the board; `None`: unsolicited.
         during: Option<ProcedureId>,
     },
-    /// A board's flags, sent by itself.
+    /// A board's flags, sent without a request.
     Admin {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The flags.
         admin: Admin,
     },
     /// A text of a board.
     Debug {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The text.
         text: String,
     },
     /// All sensor outputs of a board at one time (only for boards that [`Master::watch`](crate::master::Master::watch) names).
     Snapshot {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The words.
         snapshot: Snapshot,
     },
     /// A frame that is not of this protocol (D-02); the first of each kind, all are counted.
     Foreign(Foreign),
-    /// A competing master: another PC sends on the bus (D-08), and has not for a second; [`Master::competing_master`](crate::master::Master::competing_master) also shows one that goes on.
+    /// A competing master: another PC sends on the bus (D-08) after at least one second without a frame of it;
+    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows one that continues.
     CompetingMaster {
-        /// What it sent.
+        /// Function that it sent.
         function: Function,
         /// To which number.
         to: u8,
     },
-    /// Two boards have one number (D-24); reported once, until numbers are given anew.
+    /// Two boards have the same number (D-24); reported once, until numbers are assigned again.
     NumberShared {
         /// The number.
         board: u8,
         /// Their flash numbers; twice the same one when they cannot be distinguished.
         found: Vec<u16>,
     },
-    /// So many events were dropped because nobody took them.
+    /// Events were dropped because no caller took them.
     Overflow {
-        /// How many.
+        /// Number of dropped events.
         dropped: u64,
     },
 }
@@ -119,14 +120,14 @@ pub enum Supervision {
     Late,
     /// Three are; frames of the policy follow at once.
     Lost,
-    /// They are there again.
+    /// The heartbeats are back.
     Back,
-    /// A report came that nobody asked for: it has rebooted and has no number any more (D-26).
+    /// An unsolicited report came: the board has rebooted and no longer has a number (D-26).
     Rebooted {
         /// Low byte of its flash number.
         ucom_id: u8,
     },
-    /// A report came that nobody asked for, of a board that is not known.
+    /// An unsolicited report of an unknown board came.
     UnknownRebooted {
         /// Low byte of its flash number.
         ucom_id: u8,

@@ -1,14 +1,14 @@
-//! Whether each number belongs to one board: every answer to PC_INFO is looked at, whoever asked for it.
+//! Detection of shared numbers: every answer to PC_INFO is checked, whichever procedure asked.
 //!
-//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot see it, the
-//! PC can: one PC_INFO is answered twice. What is only asked is compared all the time ([`Holders::received`]); before a
-//! procedure changes something it waits until nobody else answers (`one_board_each`).
+//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot detect
+//! this, the PC can: one PC_INFO is answered twice. Answers to questions are compared all the time
+//! ([`Holders::received`]); before a procedure changes something it waits until no other board answers (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// So many questions in a row must be answered twice by one flash number: a gateway may double a frame now and then.
+/// Number of consecutive questions that one flash number must answer twice: a gateway may double a frame now and then.
 const TWICE: u32 = 3;
 /// Most flash numbers that are remembered of a number: damaged answers may show any.
 const MOST: usize = 8;
@@ -21,24 +21,24 @@ pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<B
     (possible && info.sequence == number).then_some(info)
 }
 
-/// Who answered to which number.
+/// Boards that answered, by number.
 #[derive(Debug, Default)]
 pub(crate) struct Holders {
     numbers: BTreeMap<u8, Holder>,
 }
 
-/// Who answered to one number since it was given.
+/// Boards that answered to a number since it was assigned.
 #[derive(Debug, Default)]
 struct Holder {
     /// The last PC_INFO, µs.
     asked_at: Option<u64>,
-    /// What answered it: heads by flash number, other frames, and how many of those one answer has.
+    /// Answers to it: heads by flash number, other frames, and the number of other frames in one answer.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
     /// Questions before it that were answered twice by one flash number, in a row.
     twice: u32,
-    /// How many questions each flash number answered, which one the last, and how often that changed.
+    /// Number of questions that each flash number answered, the last one to answer, and the number of changes between them.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
@@ -86,10 +86,10 @@ impl Holder {
         }
     }
 
-    /// The flash numbers of those that share the number, by what was received so far; else none.
+    /// Returns the flash numbers of the boards that share the number, by the answers received so far; else none.
     ///
-    /// One damaged answer is not another board, and neither is a board that was put in the place of another: flash numbers
-    /// that came in answer to different questions must come again and again, in turns.
+    /// A single damaged answer is not another board, and neither is a board that replaced another one: flash numbers that
+    /// came in answer to different questions must come repeatedly, in turns.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -106,14 +106,14 @@ impl Holder {
     }
 }
 
-/// What is still to be done before a number is known to be one board's.
+/// Steps that remain before a number is known to belong to one board.
 pub(crate) enum Open {
     Nothing,
-    /// Somebody may still answer until then.
+    /// A board may still answer until then.
     Wait(u64),
-    /// Nobody has answered.
+    /// No board has answered.
     Ask,
-    /// One flash number answered twice: is it so again?
+    /// One flash number answered twice: check once more.
     AskAgain,
 }
 
@@ -134,7 +134,7 @@ impl Holders {
         (!holder.shared.is_empty()).then(|| holder.shared.clone())
     }
 
-    /// A frame of this PC, or of another one: what it means for who has which number.
+    /// Handles a frame of this PC, or of another one, that may change the holder of a number.
     pub(crate) fn may_change(
         &mut self,
         function: Function,
@@ -153,7 +153,7 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // A reset reaches all boards under the number that is no board's, whatever `addr.broadcast` is.
+            // A reset reaches all boards under the number that belongs to no board, for any `addr.broadcast`.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -164,13 +164,13 @@ impl Holders {
         }
     }
 
-    /// When one of these boards (by bit) was last asked who it is, µs.
+    /// Returns the time of the last PC_INFO to one of these boards (by bit), µs.
     pub(crate) fn last_asked(&self, boards: u32) -> Option<u64> {
         let mine = self.numbers.iter().filter(|(number, _)| boards >> **number & 1 == 1);
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Who has the number may have changed: it was given, taken, or its board has rebooted.
+    /// Forgets a number whose holder may have changed: it was assigned or withdrawn, or its board has rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
@@ -216,7 +216,7 @@ impl Holders {
 mod tests {
     use super::*;
 
-    /// One PC_INFO and these answers to it.
+    /// Sends one PC_INFO per set of answers.
     fn question(holders: &mut Holders, answers: &[&[u16]]) -> Option<Vec<u16>> {
         let profile = Profile::default();
         let mut news = None;

@@ -1,4 +1,4 @@
-//! Inputs and parameters on their way to the boards.
+//! Sending of inputs and parameters to the boards.
 use crate::master::engine::mailbox::Forget;
 use crate::master::engine::shared::{Core, Session};
 use crate::master::io::process_data::ProcessData;
@@ -7,12 +7,12 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percent of the bus that repeated inputs may take.
 const INPUTS_SHARE: u64 = 70;
-/// How far they may be behind that and catch up, µs.
+/// Longest time that they may lag that share and catch up, µs.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
-    /// No repetition of a board's inputs any more, and none that waits. Those of a board that is only being started are no
-    /// repetition yet.
+    /// Ends the repetition of a board's inputs and drops queued ones. Inputs of a board that is only being started are not
+    /// yet a repetition.
     pub(crate) fn stop_inputs(&mut self, board: u8) {
         if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
             self.forget_inputs(board);
@@ -24,10 +24,10 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// CI again every `ci.period`, so that a lost frame heals (D-34): whoever has waited longest is first.
+    /// Sends CI again every `ci.period`, so that a lost frame heals (D-34): the board that has waited longest is first.
     ///
-    /// All repetitions together leave the bus to others for a part of the time, whatever was started with force: answers
-    /// and heartbeats come after inputs on the bus, and a socket takes more frames than the bus carries.
+    /// All repetitions together leave a part of the bus time to others, even for boards started with force: answers and
+    /// heartbeats have a lower priority than inputs on the bus, and a socket takes more frames than the bus carries.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -59,8 +59,8 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// An input that has changed, at once. Where all inputs are this PC's its whole package goes (it is atomic, D-34); else
-    /// the word alone (DLC 4, D-15), for those beside it are not known here.
+    /// Sends a changed input at once. If this PC sends all inputs, the whole package is sent (it is atomic, D-34); else
+    /// the word alone (DLC 4, D-15), because the other words are not known here.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {
@@ -86,7 +86,7 @@ impl Core {
 
     /// Writes one parameter; the shadow takes it as assumed (D-35).
     ///
-    /// The package holds this word alone (DLC 4, which every receiver takes): words beside it may be unknown here and must
+    /// The package holds this word alone (DLC 4, which every receiver takes): the other words may be unknown here and must
     /// not be touched.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };

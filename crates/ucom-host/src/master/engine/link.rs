@@ -1,8 +1,8 @@
-//! What a procedure can do: send, wait for frames, sleep.
+//! Actions of a procedure: send, wait for frames, sleep.
 //!
-//! Procedures are `async` functions. Nothing of an executor is behind them: the compiler makes each a state machine,
-//! [`Master`](crate::master::Master) moves it on when a frame arrives or its time has come, and they read like the steps they
-//! are. No lock is ever held while one waits.
+//! Procedures are `async` functions without an executor: the compiler turns each into a state machine, and
+//! [`Master`](crate::master::Master) advances it when a frame arrives or its time has come. Procedures read as a sequence of
+//! steps. No lock is ever held during a wait.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use core::future::{Future, poll_fn};
@@ -46,7 +46,7 @@ impl Link {
         self.with(|core| core.profile)
     }
 
-    /// The broadcast number, or 0 where the profile has none.
+    /// Returns the broadcast number, or 0 if the profile has none.
     pub(crate) fn broadcast_number(&self) -> Sequence {
         self.profile().unnumbered()
     }
@@ -61,21 +61,21 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// As [`Link::send`]; what was received before the frame left is forgotten.
+    /// Like [`Link::send`]; discards frames received before the frame left.
     pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
         self.left(serial).await;
     }
 
-    /// As [`Link::ask`], but errors are kept: program data, where an error may come in the middle of a block. Returns when
-    /// the frame left.
+    /// Like [`Link::ask`], but keeps errors: for program data, for which an error may arrive in the middle of a block.
+    /// Returns when the frame left.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
         self.with(|core| core.sent_at)
     }
 
-    /// As [`Link::send`] with a frame of any form.
+    /// Like [`Link::send`] with a frame of any form.
     pub(crate) async fn send_frame(&self, frame: Frame) {
         let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
         self.left(serial).await;
@@ -106,7 +106,7 @@ impl Link {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
-    /// What `take` finds in the mailbox, or `None` when `until` has come first.
+    /// Returns the result of `take` on the mailbox, or `None` at the time `until`.
     pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
@@ -141,12 +141,12 @@ impl Link {
         });
     }
 
-    /// Waits; what is received meanwhile stays in the mailbox.
+    /// Waits; frames received during the wait stay in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }
 
-    /// The same up to a time.
+    /// Sleeps up to a time.
     pub(crate) async fn sleep_until(&self, until: u64) {
         poll_fn(|_| {
             self.with(|core| {
@@ -173,9 +173,9 @@ impl Link {
         }
     }
 
-    /// Ends `work` with [`MasterError::Cancelled`] when the caller asks to, with [`MasterError::Bus`] when he reports that
-    /// the bus is gone, with [`NumberShared`](crate::master::IdentityError::NumberShared) once when two boards with one
-    /// number show, unless it bears that; its queued frames do not leave then.
+    /// Ends `work` with [`MasterError::Cancelled`] when the caller requests it, with [`MasterError::Bus`] when the caller
+    /// reports that the bus is lost, with [`NumberShared`](crate::master::IdentityError::NumberShared) once when two
+    /// boards with one number appear, unless the procedure tolerates that; its queued frames are then dropped.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -190,7 +190,7 @@ impl Link {
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
                     ended = core.holders.shared(mailbox.claims).map(Error::from);
-                    // What follows undoes something.
+                    // The steps that follow undo changes.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {
@@ -222,7 +222,7 @@ impl Link {
         Sequence::new(number).filter(|n| profile.is_board(*n)).ok_or(wrong)
     }
 
-    /// A board's error, as what the procedure ends with.
+    /// Converts a board's error to the error of the procedure.
     pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<ExchangeError> {
         match message {
             FromBoard::Error(code) => Some(ExchangeError::Device { board, code: *code, during }),

@@ -1,4 +1,4 @@
-//! What a procedure wants to receive, and what waits for it.
+//! Mailbox of a procedure: its filter and its received frames.
 use std::collections::VecDeque;
 
 use ucom::{Frame, FromBoard, Function};
@@ -15,7 +15,7 @@ pub(crate) struct Received {
     pub message: FromBoard,
 }
 
-/// What a procedure wants to receive.
+/// Frames that a procedure wants to receive.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
     /// Boards by bit.
@@ -37,7 +37,7 @@ impl Filter {
     }
 }
 
-/// What a procedure has received and waits for.
+/// Frames that a procedure has received, and the events that it waits for.
 #[derive(Debug, Default)]
 pub(crate) struct Mailbox {
     pub name: &'static str,
@@ -48,13 +48,13 @@ pub(crate) struct Mailbox {
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
-    /// Two boards with one number do not end it: a stop, what undoes something, or what sees to numbers itself.
+    /// `true` if two boards with one number do not end it: a stop, a step that undoes changes, or a procedure that checks numbers itself.
     pub bears_shared_numbers: bool,
-    /// Nothing can be sent or received any more, and why.
+    /// Reason why no frame can be sent or received any more.
     pub bus_gone: Option<String>,
 }
 
-/// What a procedure forgets when one of its frames leaves: it cannot be an answer to it.
+/// Frames that a procedure discards when one of its frames leaves, because they cannot be answers to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,

@@ -1,4 +1,4 @@
-//! What every procedure stands on: the clock, frames on their way, mailboxes, the boards as last seen and their supervision.
+//! Base of all procedures: the clock, queued frames, mailboxes, the boards as last seen and their supervision.
 //!
 //! Files import downwards only; from the lowest: times, statistics, boards, holders, event, mailbox, shared, inputs,
 //! supervise, link.

@@ -1,4 +1,4 @@
-//! What all procedures share: the clock, frames on their way out, mailboxes, the boards as last seen.
+//! State that all procedures share: the clock, queued frames, mailboxes, the boards as last seen.
 
 use crate::master::engine::boards::Boards;
 use crate::master::engine::event::Event;
@@ -19,22 +19,21 @@ const MAX_EVENTS: usize = 4096;
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// What of that which the owner has received is forgotten when this frame leaves.
+    /// Received frames of the owner that are discarded when this frame leaves.
     forget: Forget,
     what: What,
 }
 
 enum What {
     Frame(Frame),
-    /// The package of a board's inputs that begins with this word: as they are when it leaves, so what waits is never
-    /// stale.
+    /// Package of a board's inputs that begins with this word, with their values at the time of sending, so queued values are never stale.
     Inputs {
         board: u8,
         offset: u16,
     },
 }
 
-/// Whether this PC is master.
+/// Role of this PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Session {
     /// Only listens and asks.
@@ -51,10 +50,10 @@ pub(crate) struct Core {
     /// Time up to which waiting ends: that of the last `poll`. Up to then the caller has handed over all that came, which a
     /// late one has not up to `now`.
     pub fired: u64,
-    /// Time that has certainly passed between the frames that came: what was between the last one and the next `poll`. A
-    /// caller that hands over late what came at once adds nothing, so it makes no gap in a string.
+    /// Time that has certainly passed between received frames: from the last one to the next `poll`. A caller that hands
+    /// over simultaneous frames late adds no time, so it makes no gap in a string.
     pub passed: u64,
-    /// When the last frame was handed over.
+    /// Time at which the last frame was handed over.
     handed_over: u64,
     /// Since when the bus has been listened to.
     pub since: Option<u64>,
@@ -65,10 +64,10 @@ pub(crate) struct Core {
     pub report_until: u64,
     /// Stops of the policy that are sent again, and when: one frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
-    /// When inputs may be repeated again.
+    /// Time from which inputs may be repeated again.
     pub inputs_from: u64,
     pub boards: Boards,
-    /// Who answers to which number.
+    /// Boards that answer, by number.
     pub holders: Holders,
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
@@ -80,7 +79,7 @@ pub(crate) struct Core {
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
-    /// When the last frame of a procedure left.
+    /// Time at which the last frame of a procedure left.
     pub sent_at: u64,
     events: VecDeque<Event>,
     dropped: u64,
@@ -125,7 +124,7 @@ impl Core {
     }
 
     pub(crate) fn event(&mut self, event: Event) {
-        // The end of a procedure must arrive, whatever else is lost.
+        // The end of a procedure must arrive, even if other events are dropped.
         if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
             self.dropped += 1;
         } else {
@@ -141,7 +140,7 @@ impl Core {
         event
     }
 
-    /// Queues a frame that must not wait behind others: heartbeats and stops.
+    /// Queues a frame ahead of all others: heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
@@ -179,7 +178,7 @@ impl Core {
         self.queued
     }
 
-    /// Whether a frame has left.
+    /// Returns `true` if a frame has left.
     pub(crate) fn left(&self, serial: u64) -> bool {
         self.sent >= serial
     }
@@ -210,7 +209,7 @@ impl Core {
                 What::Frame(frame) => Some(frame),
                 What::Inputs { board, offset } => self.inputs_frame(board, offset),
             };
-            // What there is no more of needs no frame.
+            // An entry that is invalid by now needs no frame.
             if frame.is_some() {
                 return frame;
             }
@@ -249,7 +248,7 @@ impl Core {
         addressed.for_each(|(_, board)| board.stopped_at = None);
     }
 
-    /// Drops what a procedure has queued.
+    /// Drops the queued frames of a procedure.
     pub(crate) fn forget_queued(&mut self, owner: ProcedureId) {
         self.retain_queued(|next| next.owner != Some(owner));
     }
@@ -262,7 +261,7 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // Whoever waits for a frame in front of the first one left must not wait for ever.
+        // A procedure that waits for a frame in front of the first one left must not wait for ever.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -287,7 +286,7 @@ impl Core {
         }
     }
 
-    /// Gives a frame as it is to the procedures that want it so.
+    /// Gives the unparsed frame to the procedures that request it.
     pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
         let at = self.now;
         for raw in self.mailboxes.values_mut().filter_map(|mailbox| mailbox.raw.as_mut()) {
@@ -326,10 +325,10 @@ impl Core {
             self.may_start(to);
         }
         if function == Function::AskReport {
-            // The reports that follow answer the other PC: nobody has rebooted.
+            // The reports that follow answer the other PC: no board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // One that goes on is no news.
+        // An event only after a pause of at least 1 s.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

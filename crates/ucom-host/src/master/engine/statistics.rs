@@ -1,4 +1,4 @@
-//! What a monitor shows: rates of each board, load of the bus, frames of others.
+//! Values for a monitor: rates of each board, load of the bus, frames of others.
 
 use crate::master::load::frame_bits;
 use std::collections::{BTreeMap, VecDeque};
@@ -50,7 +50,7 @@ pub struct Statistics {
     pub foreign: Vec<(Foreign, u64)>,
     /// Frames that only a PC sends.
     pub competing_master: u64,
-    /// Frames of boards that are too short or contain nothing that can be.
+    /// Frames of boards that are too short or have impossible contents.
     pub undecodable: u64,
 }
 

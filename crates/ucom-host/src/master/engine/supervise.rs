@@ -1,4 +1,4 @@
-//! The master's own duties beside the procedures: heartbeats of both sides, policies, repeated inputs.
+//! Background duties of the master: heartbeats of both sides, policies, repeated inputs.
 use crate::master::engine::boards::Life;
 use crate::master::engine::event::{Event, Supervision};
 use crate::master::engine::shared::{Core, Session};
@@ -17,7 +17,7 @@ impl Core {
         }
     }
 
-    /// What has to happen by `now` whether a procedure runs or not.
+    /// Performs the duties that are due at `now`, with or without a running procedure.
     pub(crate) fn duties(&mut self) {
         let now = self.now;
         if let Session::Master { next_alive } = self.session
@@ -25,7 +25,7 @@ impl Core {
         {
             self.send_alive();
             let period = self.times.alive_pc;
-            // After a long pause of the caller the rhythm starts anew instead of catching up.
+            // After a long pause of the caller the rhythm restarts instead of catching up.
             let next = if now - next_alive >= period { now + period } else { next_alive + period };
             self.session = Session::Master { next_alive: next };
         }
@@ -33,7 +33,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // Not up to `now`: the heartbeat may be among what the caller has not handed over yet.
+            // Not up to `now`: the heartbeat may be among the frames that the caller has not handed over yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -71,7 +71,7 @@ impl Core {
         }
     }
 
-    /// The policy for boards whose heartbeats are gone; only a master stops boards.
+    /// Applies the policy for boards whose heartbeats have stopped; only a master stops boards.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
@@ -89,7 +89,7 @@ impl Core {
         }
     }
 
-    /// Run = 0 at once, and twice again: what stops motion must not hang on one frame. It has no further effect.
+    /// Sends run = 0 at once and twice more, because a stop must not depend on one frame. Repetition has no further effect.
     pub(crate) fn stop_running(&mut self, to: Sequence) {
         self.urgent(to, ToBoard::Admin(Admin::default()));
         self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
@@ -102,7 +102,7 @@ impl Core {
         due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
     }
 
-    /// When duties are due next.
+    /// Returns the time of the next duty.
     pub(crate) fn duties_deadline(&self) -> Option<u64> {
         let alive = match self.session {
             Session::Quiet => None,
@@ -146,7 +146,7 @@ impl Core {
         }
     }
 
-    /// Whether only a PC can have sent it (D-08, D-12).
+    /// Returns `true` if only a PC can have sent the frame (D-08, D-12).
     fn is_pc(&self, function: Function, number: Sequence, frame: &Frame) -> bool {
         let broadcast = number == self.profile.unnumbered();
         match function {
@@ -199,7 +199,7 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // A probe wants to know who answers under the number that should be nobody's.
+        // A probe needs to know if boards answer under the number that belongs to no board.
         self.deliver(from, message);
     }
 
@@ -252,7 +252,7 @@ impl Core {
                     self.event(Event::Debug { board: from, text });
                 }
             }
-            // After PC_START it is an answer; another one means nothing by itself (D-30).
+            // After PC_START the frame is an answer; otherwise it has no meaning by itself (D-30).
             FromBoard::McaReady => {
                 let board = self.boards.of(from);
                 board.ready_count += 1;

@@ -5,7 +5,7 @@ use ucom::Profile;
 /// Microseconds of a millisecond.
 pub(crate) const MS: u64 = 1000;
 
-/// What the procedures wait for, µs.
+/// Timeouts of the procedures, µs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Times {
     pub listen: u64,

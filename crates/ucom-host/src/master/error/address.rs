@@ -2,7 +2,7 @@
 use crate::master::error::identity::OTHER_PROTOCOL;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Why boards did not get their numbers.
+/// Reasons why boards did not get their numbers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AddressError {
@@ -17,7 +17,7 @@ pub enum AddressError {
     /// Giving a number could give it to the first board of the chain.
     #[error("board {other} does not answer: without a number it would take number {board}")]
     MayTakeNumber {
-        /// The number that was to be given.
+        /// Number that was to be assigned.
         board: u8,
         /// The first board.
         other: u8,

@@ -5,7 +5,7 @@ use crate::master::error::words::MEASURE_ORDER;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::{ErrorCode, Function};
 
-/// Why an exchange with a board failed.
+/// Reasons why an exchange with a board failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExchangeError {
@@ -20,27 +20,27 @@ pub enum ExchangeError {
     /// A board did not answer.
     #[error("board {board} does not answer {} ({tries} tries, {waited_ms} ms; {})", asked.name(), Received(*last))]
     NoAnswer {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// What was asked.
+        /// Request.
         asked: Function,
-        /// How often.
+        /// Number of tries.
         tries: u32,
         /// Time from the first request to giving up, ms.
         waited_ms: u64,
-        /// What was last received from it.
+        /// Last frame that was received from the board.
         last: Option<LastReceived>,
     },
-    /// An answer never came whole.
+    /// No complete answer came.
     #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
     Incomplete {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// What was asked.
+        /// Request.
         asked: Function,
-        /// How often.
+        /// Number of tries.
         tries: u32,
-        /// What was wrong with the last one.
+        /// Error in the last answer.
         problem: Incomplete,
     },
     /// Answers of a board contradict each other.
@@ -48,19 +48,19 @@ pub enum ExchangeError {
         "board {board}: its answers to PC_INFO contradict each other in {tries} tries (two boards with one number?)"
     )]
     Contradiction {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// How often it was asked.
+        /// Number of tries.
         tries: u32,
     },
     /// The board reported an error.
     #[error("board {board} reports {code} during {during}: {}", code.meaning())]
     Device {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The code.
         code: ErrorCode,
-        /// What was going on.
+        /// Step in progress.
         during: &'static str,
     },
 }
@@ -111,9 +111,9 @@ impl Diagnose for ExchangeError {
 /// The last frame that was received from a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LastReceived {
-    /// What it was.
+    /// Function of the frame.
     pub function: Function,
-    /// How long before the error, ms.
+    /// Time before the error, ms.
     pub ago_ms: u64,
 }
 
@@ -132,10 +132,10 @@ impl fmt::Display for Received {
     }
 }
 
-/// What is wrong with an answer of several frames.
+/// Errors in an answer of several frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Incomplete {
-    /// The first frame is not what it must be.
+    /// The first frame is not valid.
     #[error("it began with {len} bytes instead of {need}")]
     Start {
         /// Bytes that came.
@@ -148,7 +148,7 @@ pub enum Incomplete {
     Silence {
         /// Whole strings.
         complete: u32,
-        /// How many there should be.
+        /// Number of announced strings.
         of: u32,
     },
     /// A frame that fits nowhere.
@@ -163,7 +163,7 @@ pub enum Incomplete {
     /// More strings than can be.
     #[error("it announces {strings} strings; is the byte order right?")]
     TooMany {
-        /// How many.
+        /// Number of strings.
         strings: u32,
     },
     /// Counts that are small numbers in the other order of bytes.
@@ -171,15 +171,15 @@ pub enum Incomplete {
         "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
     )]
     ByteOrder {
-        /// How many.
+        /// Number of strings.
         strings: u32,
     },
     /// Packages of a buffer are missing.
     #[error("{missing} of {of} packages are missing")]
     Packages {
-        /// How many.
+        /// Number of missing packages.
         missing: u32,
-        /// How many there should be.
+        /// Number of expected packages.
         of: u32,
     },
 }

@@ -5,7 +5,7 @@ use crate::master::error::words::{MEASURE_ORDER, other_order};
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Endian;
 
-/// Why a board is not the one that is meant.
+/// Reasons why a board is not the intended one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentityError {
@@ -20,7 +20,7 @@ pub enum IdentityError {
     /// Another board than the one that was named.
     #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
     WrongBoard {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The flash number that was named.
         wanted: u16,
@@ -44,7 +44,7 @@ pub enum IdentityError {
         board: u8,
         /// The flash numbers of those that answered to it; twice the same one when they cannot be distinguished.
         found: Vec<u16>,
-        /// Nobody answers to it any more.
+        /// `true` if no board answers to it any more.
         given_back: bool,
     },
 }
@@ -94,13 +94,13 @@ impl fmt::Display for Sharing<'_> {
     }
 }
 
-/// What makes two boards take one number, and what helps.
+/// Cause of a shared number, and the remedy.
 pub(crate) const SHARED_CAUSE: (&str, &str) = (
     "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
     "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
      check the init wires",
 );
 
-/// What helps against a number that is another one in the data.
+/// Remedy if the data contain another number.
 pub(crate) const OTHER_PROTOCOL: &str =
     "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`";

@@ -3,18 +3,18 @@ use crate::master::error::words::Boards;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Function;
 
-/// Why this PC did not begin a procedure, or ended it.
+/// Reasons why this PC did not begin a procedure, or ended it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MasterError {
     /// A competing master: another PC is on the bus (D-08).
     #[error("another PC is on the bus: {} to {to} was received {ago_ms} ms ago", function.name())]
     CompetingMaster {
-        /// What it sent.
+        /// Function that it sent.
         function: Function,
         /// To which number.
         to: u8,
-        /// When, ms.
+        /// Time since then, ms.
         ago_ms: u64,
     },
     /// The procedure needs a board that is at work for another one.
@@ -25,7 +25,7 @@ pub enum MasterError {
         /// The other procedure.
         with: &'static str,
     },
-    /// The caller reports that the bus is gone, see [`Master::abandon`](crate::master::Master::abandon).
+    /// The caller reports that the bus is lost, see [`Master::abandon`](crate::master::Master::abandon).
     #[error("the bus failed: {reason}")]
     Bus {
         /// The driver's error.

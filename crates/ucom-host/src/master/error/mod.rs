@@ -1,5 +1,5 @@
-//! What can go wrong, with the facts, the kind of failure and the command that helps: one small error an operation, and the
-//! one of a procedure, which is any of them.
+//! Errors with the facts, the kind of failure and the next command: one small error per operation, and the error of a
+//! procedure, which is any of them.
 mod address;
 mod exchange;
 mod identity;

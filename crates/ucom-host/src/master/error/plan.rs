@@ -1,8 +1,8 @@
-//! Why an update cannot be planned.
+//! Reasons why an update cannot be planned.
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Plan;
 
-/// Why nobody knows which boards an update is for.
+/// Reasons why the boards of an update are not known.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
     /// No board.
@@ -11,7 +11,7 @@ pub enum TargetError {
     /// A board twice.
     #[error("board {board} is named twice")]
     Twice {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
 }
@@ -22,7 +22,7 @@ impl Diagnose for TargetError {
     }
 }
 
-/// Why an update cannot be planned.
+/// Reasons why an update cannot be planned.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
     /// An image without bytes.
@@ -31,13 +31,13 @@ pub enum PlanError {
     /// Half a word.
     #[error("the image has {bytes} bytes: not whole words")]
     HalfWord {
-        /// Its length.
+        /// Length.
         bytes: usize,
     },
     /// Another image than the one that the user named by its Program ID.
     #[error("the image has Program ID 0x{image:04X}, not 0x{expected:04X}")]
     OtherProgram {
-        /// Of the image.
+        /// Program ID of the image.
         image: u16,
         /// The one that was named.
         expected: u16,
@@ -66,7 +66,7 @@ impl Diagnose for PlanError {
     }
 }
 
-/// Why `prog.plan` and a second image do not fit.
+/// Reasons why `prog.plan` and a second image do not fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SecondImageError {
     /// The plan needs one.

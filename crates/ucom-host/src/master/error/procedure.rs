@@ -1,4 +1,4 @@
-//! What can go wrong in a procedure, with the facts in it, the kind of failure and the command that helps.
+//! Errors of a procedure, with the facts, the kind of failure and the next command.
 use crate::master::error::address::AddressError;
 use crate::master::error::exchange::ExchangeError;
 use crate::master::error::identity::IdentityError;
@@ -9,7 +9,7 @@ use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
 use host_kit::{Diagnose, Diagnosis, Facts};
 
-/// Why a procedure did not do what was asked. The kind of an update that failed is that of its report, see
+/// Reasons why a procedure failed. The kind of a failed update is that of its report, see
 /// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(transparent)]
@@ -27,7 +27,7 @@ pub enum Error {
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// Nobody knows which boards an update is for.
+    /// The boards for an update are not known.
     Target(#[from] TargetError),
     /// An update cannot be planned.
     Plan(#[from] PlanError),

@@ -3,7 +3,7 @@ use crate::master::error::words::Boards;
 use crate::master::load::LoadForecast;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Why control loops keep something from being done, or cannot run themselves.
+/// Reasons why control loops prevent an action, or cannot run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunningError {
@@ -13,19 +13,19 @@ pub enum RunningError {
         /// Their numbers.
         boards: Vec<u8>,
     },
-    /// Control loops run, and what was asked for could stop them where they are, or worse.
+    /// Control loops run, and the request could stop the boards at any position, or worse.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
         /// Their numbers.
         boards: Vec<u8>,
     },
-    /// The bus would be too busy.
+    /// The bus load would be too high.
     #[error("{0}")]
     Load(LoadForecast),
-    /// A board that was being started, or had been, is gone; by `on_lost` all were stopped (D-51).
+    /// A board that was being started, or had been started, is lost; by `on_lost` all were stopped (D-51).
     #[error("board {board} was lost while boards were started: all are stopped")]
     Lost {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
 }

@@ -3,18 +3,18 @@ use core::fmt;
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Why a signal cannot be read or written.
+/// Reasons why a signal cannot be read or written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalError {
     /// No signal of that name.
     #[error("board {board} has no {kind} `{name}`{}", Near(near))]
     NoSignal {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// `CI`, `SO` or `PAR`.
         kind: &'static str,
-        /// What was asked for.
+        /// Requested name.
         name: String,
         /// Names like it.
         near: Vec<String>,
@@ -22,9 +22,9 @@ pub enum SignalError {
     /// No application is on the board, or it is not started.
     #[error("board {board}: {}", if *valid { "its application is not started" } else { "it has no valid application" })]
     NoApplication {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// It has one, but it is not running.
+        /// `true` if the board has an application that is not running.
         valid: bool,
     },
     /// A board describes itself otherwise than was known when values for it were chosen (D-36).
@@ -32,7 +32,7 @@ pub enum SignalError {
         "board {board}: its inputs, outputs and parameters are not those that were known under its program"
     )]
     StaleNames {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
 }

@@ -2,11 +2,11 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Status;
 
-/// Why a board is not in the state that was asked for.
+/// Reasons why a board is not in the requested state.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StatusError {
-    /// A status was set and is not what was set.
+    /// The status that was read back differs from the one that was set.
     #[error(
         "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
         status,
@@ -14,25 +14,25 @@ pub enum StatusError {
         mask
     )]
     StatusNotTaken {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// Bits that were to change.
+        /// Bits to change.
         mask: Status,
-        /// What they were to be.
+        /// Their wanted values.
         wanted: Status,
         /// The status that was read.
         status: Status,
-        /// How often it was set.
+        /// Number of tries.
         tries: u32,
     },
     /// A state was not reached.
     #[error("board {board}: {what} not within {waited_ms} ms; status {status}")]
     NotReached {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// What was waited for.
+        /// State that was waited for.
         what: &'static str,
-        /// How long, ms.
+        /// Time waited, ms.
         waited_ms: u64,
         /// The last status.
         status: Status,
@@ -40,11 +40,11 @@ pub enum StatusError {
     /// Flags were sent and others came back.
     #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
     AdminRefused {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// What was sent.
+        /// Flags that were sent.
         wanted: ucom::Admin,
-        /// Its text.
+        /// Flags that came back.
         is: ucom::Admin,
     },
 }

@@ -3,7 +3,7 @@ use core::fmt;
 
 use ucom::profile::Endian;
 
-/// What helps against a wrong byte order.
+/// Remedy for a wrong byte order.
 pub(crate) const MEASURE_ORDER: &str =
     "`ucom probe --out FILE` measures it and writes a profile for --profile";
 

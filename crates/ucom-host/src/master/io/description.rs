@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::master::error::SignalError;
 use ucom::{BoardInfo, Dimensions};
 
-/// Which of the three buffers.
+/// Kind of buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Controller inputs.
@@ -27,20 +27,20 @@ impl Kind {
     }
 }
 
-/// What a description is kept under: Program ID and flash date (D-36), and the board, because one image can serve boards
-/// whose applications differ.
+/// Key of a description: Program ID and flash date (D-36), and the board, because one image can serve boards with
+/// different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
-    /// Of the board.
+    /// Flash number of the board.
     pub flash_number: u16,
     /// Checksum of its program.
     pub program_id: u16,
-    /// When that was written, encoded.
+    /// Date of that program, encoded.
     pub date: u16,
 }
 
 impl DescriptionKey {
-    /// Of a board's answer to PC_INFO.
+    /// Returns the key for a board's answer to PC_INFO.
     pub const fn of(info: &BoardInfo) -> Self {
         Self { flash_number: info.flash_number, program_id: info.program_id, date: info.date }
     }
@@ -60,7 +60,7 @@ pub struct IoDescription {
 }
 
 impl IoDescription {
-    /// How many of each.
+    /// Returns the number of signals of each kind.
     pub fn dimensions(&self) -> Dimensions {
         let count = |list: &[String]| u16::try_from(list.len()).unwrap_or(u16::MAX);
         Dimensions { ci: count(&self.ci), so: count(&self.so), par: count(&self.par) }
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Place of a signal: by its text, in any case when only one fits, with or without the unit in brackets behind it, or by
-    /// its number (`#3` or `3`).
+    /// Returns the place of a signal: by its text, in any letter case if only one fits, with or without the unit in brackets
+    /// at its end, or by its number (`#3` or `3`).
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
@@ -100,7 +100,7 @@ impl IoDescription {
     }
 }
 
-/// A text without the unit in brackets behind it.
+/// Returns a text without the unit in brackets at its end.
 pub fn short(text: &str) -> &str {
     text.split_once(" [").map_or(text, |(name, _)| name).trim()
 }

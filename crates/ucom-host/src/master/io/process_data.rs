@@ -1,4 +1,4 @@
-//! What is known of the buffers of a board.
+//! Buffers of a board, as far as they are known.
 
 use std::collections::BTreeSet;
 
@@ -17,7 +17,7 @@ pub(crate) struct ProcessData {
     pub ci: Vec<u16>,
     /// Places of them that were set or read since its application started; others are not known.
     pub ci_known: BTreeSet<u16>,
-    /// When they are sent again; `None`: not at all.
+    /// Time of the next repetition; `None`: no repetition.
     pub repeat: Option<u64>,
     pub par: Shadow,
     pub so: SnapshotAssembler,

@@ -5,7 +5,7 @@ pub enum ParValue {
     /// Never written since the application started.
     #[default]
     Unknown,
-    /// Written and not confirmed: there is no confirmation.
+    /// Written; the protocol has no confirmation.
     Assumed(u16),
 }
 
@@ -35,7 +35,7 @@ impl Shadow {
         &self.values
     }
 
-    /// How many there are.
+    /// Returns the number of parameters.
     pub(crate) fn len(&self) -> u16 {
         self.values.len() as u16
     }

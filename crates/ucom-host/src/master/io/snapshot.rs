@@ -8,7 +8,7 @@ pub struct Snapshot {
     pub time_us: u64,
     /// Words in the order of the buffer.
     pub words: Vec<u16>,
-    /// Snapshots with gaps since the last whole one.
+    /// Snapshots with gaps since the last complete one.
     pub incomplete_before: u64,
 }
 
@@ -28,7 +28,7 @@ pub struct SnapshotAssembler {
 }
 
 impl SnapshotAssembler {
-    /// For a buffer of so many words.
+    /// Creates an assembler for a buffer of `dimension` words.
     pub fn new(dimension: u16) -> Self {
         Self { words: vec![0; dimension.into()], ..Default::default() }
     }
@@ -88,7 +88,7 @@ mod tests {
         Packages::new(&words).collect()
     }
 
-    /// D-33: a gap makes no snapshot, and the next whole one reports it.
+    /// D-33: incomplete snapshots are not reported, but counted in the next complete one.
     #[test]
     fn d33_gaps_are_counted_and_never_shown() {
         for lost in 0..3 {

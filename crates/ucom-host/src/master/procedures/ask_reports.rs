@@ -14,7 +14,7 @@ pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
     collect_reports(link, link.times().report_ask, reports).await;
 }
 
-/// Who reports within `window` µs.
+/// Collects the reports that come within `window` µs.
 pub(crate) async fn collect_reports(link: &Link, window: u64, reports: &mut Reports) {
     let until = link.now() + window;
     while let Some(received) = link.next(until).await {

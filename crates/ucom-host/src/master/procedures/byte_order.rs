@@ -1,10 +1,10 @@
-//! Whether boards send the bytes of a word in the other order than the profile has (D-10): what shows without asking more.
+//! Detection of boards with the other byte order than the profile has (D-10), as far as it needs no further questions.
 use crate::master::engine::Link;
 use crate::master::error::IdentityError;
 use crate::master::procedures::ask_reports::ask_reports;
 use crate::master::reports::{BoardSeen, Reports};
 
-/// Whether flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
+/// Returns `true` if flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
 pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
     let fits = |byte: u16| reports.ids.contains(&(byte as u8));
     let only_exchanged = |number: u16| !fits(number) && fits(number >> 8);
@@ -12,8 +12,7 @@ pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
         && flash_numbers.iter().all(|number| only_exchanged(*number) || number >> 8 == number & 0xFF)
 }
 
-/// Refuses boards whose words come in the other order. Boards are asked for reports only where a flash number has a high byte,
-/// which most have not.
+/// Refuses boards whose words come in the other order. Boards are asked for reports only if a flash number has a high byte, which is rare.
 pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), IdentityError> {
     if flash_numbers.iter().all(|number| *number < 0x100) {
         return Ok(());

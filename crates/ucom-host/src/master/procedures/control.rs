@@ -18,7 +18,7 @@ pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Err
     Ok(Outcome::Info(seen))
 }
 
-/// PC_SETSTATUS with read-back. What takes longer than one answer is waited for.
+/// Sends PC_SETSTATUS and reads it back. Waits for changes that take longer than one answer.
 pub(crate) async fn set_status_procedure(
     link: Link,
     board: u8,
@@ -34,7 +34,7 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // As PC_START: the application needs its time.
+        // Like PC_START: the application needs its time.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -56,7 +56,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // It cannot answer any more: what the rules require (D-22).
+                // The board cannot answer any more: return the state that the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -105,7 +105,7 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
         None => link.broadcast_number(),
     };
     link.become_master(force).await?;
-    // Whether there is such a board: a frame to nobody would look like a reset without an answer.
+    // Checks that the board exists: without a board the frame would look like a reset without an answer.
     let before = match board {
         Some(board) => {
             let before = confirmed(&link, board).await?.info;
@@ -198,7 +198,7 @@ pub(crate) async fn enter_exloader(
         (result, _) => result?,
     };
     if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
-        // One damaged answer is not another board.
+        // A single damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -210,7 +210,7 @@ pub(crate) async fn enter_exloader(
     set_status(link, board, Status::PROG, Status::PROG).await
 }
 
-/// How long an exloader may take to come up.
+/// Longest time for an exloader to start.
 const EXLOADER_WAIT: u64 = 3_000 * MS;
 
 async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, Error> {
@@ -218,8 +218,8 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
     wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
 }
 
-/// PC_XRESET until it is taken. It has no answer: a board that answers PC_INFO and has not left its application did not
-/// receive it. One that is silent reboots, or has lost its number, and is not disturbed.
+/// Sends PC_XRESET until the board takes it. The command has no answer: a board that answers PC_INFO and has not left
+/// its application did not receive it. A silent board reboots, or has lost its number, and is not disturbed.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -252,7 +252,7 @@ pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSee
     start_from(link, before).await
 }
 
-/// The same for a board that has just been asked who it is.
+/// Starts the application of a board whose identity has just been read.
 pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSeen, Error> {
     let board = before.number;
     let to = link.board(board)?;
@@ -265,7 +265,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // Before it leaves: whoever cancels this must know of it.
+        // Set before the frame leaves, so that a cancel knows of it.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -309,10 +309,10 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// The flags to change from: those the board sent last, else what its status shows with outputs off (D-37).
+/// Returns the flags to change from: the flags that the board sent last, else those of its status with outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
-    // What ends something waits for nothing.
+    // A command that ends something does not wait.
     if !ends {
         one_board_each(link, &[board]).await?;
     }

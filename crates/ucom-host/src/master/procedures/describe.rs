@@ -12,7 +12,7 @@ use ucom::{
 /// Most strings that a description may announce: 1365 boards' worth of words would not fit on any bus.
 const MAX_STRINGS: u32 = 4096;
 
-/// What is collected of one answer.
+/// Collected parts of one answer.
 struct Collector {
     dimensions: Option<Dimensions>,
     strings: Vec<String>,
@@ -60,7 +60,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Why it is no description: perhaps only read in the wrong order of bytes.
+    /// Returns the problem of the answer: perhaps only the wrong byte order.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -81,7 +81,7 @@ impl Collector {
     }
 }
 
-/// One try; `None`: no frame came.
+/// Tries once; `None`: no frame came.
 async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescription, Incomplete>>, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::DumpIo).await;
@@ -153,7 +153,7 @@ pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Resul
     Ok(description)
 }
 
-/// Buffers of the right size for what is described.
+/// Sizes the buffers for the description.
 fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescription) {
     let d = description.dimensions();
     link.with(|core| {
@@ -183,7 +183,7 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // Each try stands alone: a board may have changed its values.
+        // The tries are independent: a board may have changed its values.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;

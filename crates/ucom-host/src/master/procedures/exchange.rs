@@ -7,14 +7,14 @@ use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, St
 /// Requests whose repetition has no further effect are sent once and repeated twice.
 pub(crate) const TRIES: u32 = 3;
 
-/// What one PC_INFO brought.
+/// Result of one PC_INFO.
 #[derive(Debug)]
 pub(crate) enum Answer {
-    /// Nothing.
+    /// No frame.
     Silence,
-    /// Something that is no answer.
+    /// Frames that are not a valid answer.
     Broken(Incomplete),
-    /// The numbers; the description only when it came whole.
+    /// Numbers; the description only if it came whole.
     Info(BoardInfo, Option<String>),
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct InfoCollector {
 }
 
 impl InfoCollector {
-    /// Takes a frame; `Err`: this is no answer at all.
+    /// Takes a frame; `Err`: the frame is not an answer.
     pub(crate) fn push(&mut self, at: u64, payload: &Payload, link: &Link) -> Result<(), Incomplete> {
         let profile = link.profile();
         if self.info.is_none() {
@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// One PC_INFO, not repeated. The mailbox must listen to DSP_INFO.
+/// Sends one PC_INFO, not repeated. The mailbox must listen to DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;
@@ -90,7 +90,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// Keeps what a board reported.
+/// Stores a board's report.
 pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&str>) {
     link.with(|core| {
         let now = core.now;
@@ -118,10 +118,10 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
     });
 }
 
-/// PC_INFO with the description, asked up to three times.
+/// Sends PC_INFO with the description, up to three times.
 ///
-/// A description that never comes whole does not make the numbers useless: they are given without it. A number that is
-/// not the board's own is an error at once (D-24).
+/// If the description never comes whole, the numbers are still valid: they are returned without it. A number that is not
+/// the board's own is an error at once (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
@@ -138,7 +138,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     let mut mismatch = None;
     for tries in 0..TRIES {
         if tries > 0 {
-            // What is left of a truncated answer must not mix with the next one.
+            // The remainder of a truncated answer must not mix with the next one.
             link.quiet(link.times().gap).await;
         }
         match ask_info(link, board).await {
@@ -148,7 +148,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // One damaged frame may contain anything; a board sends it again.
+            // A single damaged frame may contain anything; a board sends the data again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -185,7 +185,7 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
     Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
-/// What does not change from one answer to the next.
+/// Returns the fields that do not change from one answer to the next.
 pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
@@ -226,8 +226,8 @@ pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// A board's error does not end it: those of a bad bus are only to be logged, and come exactly where the request itself was
-/// lost. It is reported when nothing came of all tries.
+/// A board's error does not end the exchange: errors of a bad bus are only to be logged, and come exactly when the request
+/// itself was lost. The error is reported if all tries fail.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -245,7 +245,7 @@ async fn ask_admin(
         while let Some(received) = link.next(until).await {
             match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // What the board sent of its own accord before the request reached it.
+                // Flags that the board sent of its own accord before the request reached it.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

@@ -2,7 +2,7 @@
 //!
 //! PC_INIT(n) is taken by the one board without a number whose incoming pin is active; its outgoing pin, raised by this
 //! PC after the number is confirmed, enables the next board. PC_INIT is never repeated without asking PC_INFO first:
-//! a board that raises its pin by itself would otherwise let its neighbour take the same number.
+//! otherwise a board that raises its pin by itself would let its neighbour take the same number.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -17,7 +17,7 @@ use crate::master::reports::{BoardSeen, InitFinding, InitOptions, InitReport, Ou
 use std::collections::BTreeSet;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Numbers the whole chain.
+/// Numbers all boards of the chain.
 pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Error> {
     link.become_master(options.force).await?;
     let mut report = InitReport::default();
@@ -41,7 +41,7 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// A board that did not receive the reset has kept its number, and runs on with inputs that nobody repeats: it is stopped.
+/// Stops boards that did not receive the reset: such a board has kept its number, and runs on with inputs that are no longer repeated.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;
@@ -52,12 +52,13 @@ async fn stop_unreset(link: &Link, report: &mut InitReport) {
     }
 }
 
-/// By itself a board starts its application after a reset where it is to, and never its control loop.
+/// Returns `true` if the board runs on after a reset. By itself a board starts only its application, if
+/// ASTART is set, never its control loop.
 fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
-/// PC_RESET to all and their reports. When nobody reports although boards are there, the reset was lost: once more.
+/// Sends PC_RESET to all and collects their reports. If no board reports although boards are there, the reset was lost and is repeated.
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
         link.listen(0, &REPORTS);
@@ -79,7 +80,7 @@ async fn reset_all(link: &Link, reports: &mut Reports) {
     }
 }
 
-/// Gives a number to the next board of the chain; `None`: nobody took it.
+/// Gives a number to the next board of the chain; `None`: no board took it.
 async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error> {
     if !take_number(link, number, false).await? {
         return Ok(None);
@@ -89,13 +90,13 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     // Raised also when the board reports that it did so itself: harmless, and the read-back is needed anyway.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
-        // One of the two answers was damaged, or two boards have this number.
+        // Either answer was damaged, or two boards have this number.
         return confirmed(link, number).await.map(Some);
     }
     Ok(Some(BoardSeen { info: raised, ..seen }))
 }
 
-/// Compares what was numbered with what reported and with the inventory.
+/// Compares the numbered boards with the reports and with the inventory.
 async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     let low = |seen: &BoardSeen| seen.info.flash_number as u8;
     let reached: BTreeSet<u8> = report.boards.iter().map(low).collect();

@@ -1,4 +1,4 @@
-//! Whether this PC may be the master of the bus (D-08).
+//! Mastership of the bus (D-08).
 use crate::master::engine::{Core, Link, MS, Session};
 use crate::master::error::{Error, MasterError};
 use crate::master::procedures::exchange::numbers;

@@ -1,4 +1,4 @@
-//! Whether each number belongs to one board, asked before something is changed (D-24).
+//! Check that each number belongs to one board, before a change (D-24).
 use std::collections::BTreeMap;
 
 use crate::master::engine::{Link, MS, Open};
@@ -6,24 +6,24 @@ use crate::master::error::IdentityError;
 use crate::master::procedures::exchange::TRIES;
 use ucom::{Function, ToBoard};
 
-/// So old an answer to PC_INFO may be and still show who has a number, µs.
+/// Age up to which an answer to PC_INFO shows the holder of a number, µs.
 const FRESH: u64 = 2_000 * MS;
 /// Between two questions, µs: the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Sees that each of these numbers belongs to one board: nobody else answers PC_INFO within the time that a board may take. A
-/// number that nobody answers to is not refused.
+/// Checks that each of these numbers belongs to one board: no other board answers PC_INFO within the time that a board may
+/// take. A number without an answer is not refused.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // What was waited for here is as old as the driver is late.
+        // Answers that came during this wait are as old as the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
         for board in boards {
-            // Nobody can be asked under a number that no board has.
+            // Numbers that no board can have are skipped.
             let Ok(to) = link.board(*board) else { continue };
             match link.with(|core| core.holders.open(*board, core.fired, patience, oldest)) {
                 Open::Nothing => {}
@@ -55,7 +55,7 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Ide
     }
 }
 
-/// The same for every number.
+/// Checks every number.
 pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), IdentityError> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let asked = match link.profile().broadcast_number() {
@@ -72,8 +72,8 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until nobody can answer any more what these boards (by bit) were asked last: whoever shares a number with one of
-/// them may come late.
+/// Waits until the last questions to these boards (by bit) cannot be answered any more: a board that shares a number with
+/// one of them may answer late.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;
     if let Some(asked_at) = link.with(|core| core.holders.last_asked(boards)) {

@@ -1,4 +1,4 @@
-//! PC_SETSTATUS as the formula has it, value bits outside the mask included (D-22): for whoever knows why.
+//! PC_SETSTATUS exactly by the formula, value bits outside the mask included (D-22): for experts.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;
@@ -6,7 +6,7 @@ use crate::master::procedures::one_board::one_board_each;
 use crate::master::reports::{Outcome, RawStatus, expected_status};
 use ucom::{Status, ToBoard};
 
-/// One frame, to one board or to all, and what it did. `seen` are the boards to look at.
+/// Sends one frame to one board or to all and reports its effect. `seen` are the boards to read.
 pub(crate) async fn raw_status(
     link: Link,
     to: Option<u8>,
@@ -29,7 +29,7 @@ pub(crate) async fn raw_status(
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
-    // Never repeated: it is to do what it stands for, once.
+    // Never repeated: the frame shall take effect once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;
     let mut boards = Vec::new();

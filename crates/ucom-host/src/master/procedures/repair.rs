@@ -1,4 +1,4 @@
-//! One board gets its number back while the others keep theirs (section on initialisation: D-21, D-24).
+//! Returns a lost number to one board while the others keep theirs (section on initialisation: D-21, D-24).
 //!
 //! PC_INIT(n) is taken by *every* board without a number whose incoming pin is active. So for that moment no outgoing pin
 //! but the one before board n may be on, and the first board, whose incoming pin is always active, must have its number.
@@ -50,7 +50,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // Whoever took it must not keep it, or the next command means the wrong board.
+        // A board that took it must not keep it, or the next command reaches the wrong board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give number {number} back"));
@@ -67,14 +67,15 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
 
 /// No outgoing pin on but that of the board before `number`, which is.
 ///
-/// Every number gets the command three times, whether it answers or not: a board may be alive with its answers lost. Who answers is read back.
+/// Every number gets the command three times, with or without an answer: a board may be alive with its answers lost. Boards that answer are
+/// read back.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // Only a board with a number holds its pin; without it nobody could take this one.
+        // Only a board with a number holds its pin; without it no board could take this number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -98,7 +99,7 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
     Ok(())
 }
 
-/// The flash numbers of all boards that answer to this number. One that shows up only once is a damaged answer.
+/// Returns the flash numbers of all boards that answer to this number. A flash number seen only once is a damaged answer.
 async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut seen: BTreeMap<u16, u32> = BTreeMap::new();
     for round in 1..=ROUNDS {
@@ -113,7 +114,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// One PC_INFO, and the flash number of every answer to it, not only of the first.
+/// Sends one PC_INFO and returns the flash number of every answer to it, not only of the first.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -135,14 +136,14 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(found)
 }
 
-/// A number that two boards took: nobody keeps it.
+/// Withdraws a number that two boards took from both.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
     let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
     Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
-/// Takes a number from whoever has it; `true`: nobody answers to it any more.
+/// Takes a number from its board; `true`: no board answers to it any more.
 async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     let to = link.board(number)?;
     for _ in 0..TRIES {
@@ -169,7 +170,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // It is well: nothing is changed but its pin, which must be on.
+        // The board is well: only its pin is changed, which must be on.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

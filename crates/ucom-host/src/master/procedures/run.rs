@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use ucom::profile::OnLost;
 use ucom::{Admin, BoardInfo, Dimensions, Status};
 
-/// A run ends with every board running, or with every board as far as it was found: idle, started, or running. A board that
-/// was found running goes on with what it was given until then: inputs and parameters of the user, none but these.
+/// Runs boards. The run ends with every board running, or with every board in its previous state: idle, started, or
+/// running. A board that was running before goes on with its previous values: inputs and parameters of the user, and no others.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
@@ -35,12 +35,12 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     result.map(Outcome::Running)
 }
 
-/// What a run has begun on a board, and takes back when it fails.
+/// Start of a board by a run, to be undone if the run fails.
 struct Begun {
     board: u8,
-    /// How far it is stopped then, so that it is as far as it was found.
+    /// Level of the stop that returns the board to its previous state.
     back: Option<StopLevel>,
-    /// Its loop ran already.
+    /// `true` if its loop was running already.
     ran: bool,
 }
 
@@ -59,7 +59,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // First everything that can be refused, and as much of it as is known before anything is started: names, load.
+    // First all checks that can refuse the run, as far as their data are known before anything is started: names, load.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -71,7 +71,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
     }
     one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
     for (plan, seen) in options.boards.iter().zip(found) {
-        // What does not run yet is stopped as far as it was; what runs is not ours to stop.
+        // A board that did not run is stopped to its previous state; a running board is not stopped.
         let status = seen.info.status;
         let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
             (false, _) => Some(StopLevel::Application),
@@ -81,7 +81,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
-        // What is to be written was chosen by the names that were known.
+        // The values to write were chosen by the known names.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
             return Err(SignalError::StaleNames { board: plan.board }.into());
         }
@@ -103,7 +103,7 @@ fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
     link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
 }
 
-/// One more board is described: its names must be those that are meant, and the load bearable.
+/// Adds a described board: checks its names and the bus load.
 fn add(
     link: &Link,
     options: &RunOptions,
@@ -130,8 +130,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // Only this PC itself can know what was sent to a board that runs; what another one sent is not overwritten by initial
-    // values unasked.
+    // Only this PC itself can know the values that were sent to a running board; values of another PC are not overwritten
+    // by initial values unless requested.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
@@ -154,7 +154,7 @@ async fn start_loop(
         let index = description.find(board, Kind::Par, &setting.name)?;
         link.with(|core| core.send_parameter(board, index, setting.value));
     }
-    // Nothing may start before its values have left.
+    // No board may start before its values have left.
     link.flush().await;
     let flags = mca_start(link, board).await?;
     if begun.back.is_none() && !flags.active && options.active {
@@ -171,7 +171,7 @@ async fn start_loop(
     change_flags(link, board, AdminChange { active: Some(true), ..running }).await
 }
 
-/// Where the loss of one board stops all, none is started after it.
+/// If the loss of one board stops all, no board is started after it.
 fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
     let lost = |core: &mut Core, number: u8| {
         core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)
@@ -204,7 +204,7 @@ fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecas
                 let known = Dimensions { ci: data.ci.len() as u16, so, par: 0 };
                 all.entry(number).or_insert(known);
             } else if board.so_at.is_some() {
-                // Its size is not known here: at least one package each way.
+                // The size of the board is not known here: at least one package each way.
                 all.entry(number).or_insert(Dimensions { ci: 1, so: 1, par: 0 });
             }
         }

@@ -1,4 +1,4 @@
-//! Who is there, without changing anything: PC_REPORT to all and PC_INFO to each number, no reset (5.4).
+//! Scan without any change: PC_REPORT to all and PC_INFO to each number, no reset (5.4).
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -12,16 +12,16 @@ use std::collections::BTreeSet;
 use ucom::Sequence;
 use ucom::profile::Endian;
 
-/// The whole scan. Nothing but `PC_REPORT` and `PC_INFO` is sent (P-1).
+/// Scans the bus. Sends only `PC_REPORT` and `PC_INFO` (P-1).
 pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     let mut report = ScanReport::default();
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // What is in doubt is asked again; what is certain is found below.
+    // Doubtful numbers are asked again; confirmed shared numbers are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // Who answered but did not report may have been missed.
+    // A board that answered but did not report may have been missed.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };
@@ -62,7 +62,7 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
 
 fn judge(report: &mut ScanReport, endian: Endian) {
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // What would follow from it is none of the chain's faults.
+        // Findings that result from the byte order are not faults of the chain.
         report.findings.retain(|finding| !matches!(finding, ScanFinding::NoDescription { .. }));
         report.findings.push(ScanFinding::ByteOrder { endian });
         return;

@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// A board that was commanded to start and does not show it yet may do so any time until `start.timeout` has passed: it is
-/// commanded to stop whatever its status is, and read again then.
+/// A board that was commanded to start and does not show it yet may do so any time until `start.timeout` has passed: the
+/// procedure commands it to stop in any state, and reads it again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;
@@ -62,13 +62,13 @@ async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<Board
     Ok(now)
 }
 
-/// The stop of a board that does not answer PC_INFO: it may run all the same. What it knows of flags is not read first.
+/// Stops a board that does not answer PC_INFO: it may run all the same. Its flags are not read first.
 async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
     let run = flags.run && level == StopLevel::Outputs;
     link.with(|core| core.stop_inputs(board));
-    // No answer is what is expected here.
+    // No answer is expected here.
     let _ = admin(link, board, Admin { run, active: false, ..flags }).await;
     for _ in 0..TRIES {
         link.send(to, ToBoard::Admin(Admin { run, active: false, ..flags })).await;

@@ -1,4 +1,4 @@
-//! PC_INFO to many numbers at once, and what each shows.
+//! PC_INFO to many numbers at once, and the result for each.
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::master::engine::{Link, Received};
@@ -10,7 +10,7 @@ use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 /// Between two requests of a round, µs: the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2_000;
 
-/// What is known of one number.
+/// Knowledge about one number.
 #[derive(Default)]
 pub(crate) struct Slot {
     /// Answers with the same identity so far.
@@ -97,12 +97,12 @@ pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, S
 fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: &Received) {
     if let FromBoard::Info(payload) = received.message {
         let collector = collectors.entry(received.from).or_default();
-        // What is no first frame leaves the collector empty: the next round asks again.
+        // Any other frame than a first one leaves the collector empty: the next round asks again.
         let _ = collector.push(received.at, &payload, link);
     }
 }
 
-/// The status that each of these numbers shows last; an error where its answers contradict each other.
+/// Returns the last status of each of these numbers; an error if its answers contradict each other.
 pub(crate) async fn statuses(
     link: &Link,
     numbers: &[Sequence],
@@ -118,7 +118,8 @@ pub(crate) async fn statuses(
     slots.into_iter().map(status).collect()
 }
 
-/// Status of every board that answers, all asked at once, and twice, because one frame can be lost; a board that sends sensor outputs runs, whatever its status is.
+/// Returns the status of every board that answers. All are asked at once, and twice, because a frame can be lost; a board that sends
+/// sensor outputs counts as running, for any status.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());

@@ -5,8 +5,8 @@ use crate::master::procedures::exchange::TRIES;
 use crate::master::procedures::exchange::{Answer, ask_info};
 use ucom::{ErrorCode, FromBoard, Function, Status, ToBoard};
 
-/// PC_INIT until the board acknowledges or answers PC_INFO, at most three times. `lower`: the board's own pin goes down
-/// before it is repeated, as a board that raises it by itself would let its neighbour take the number as well.
+/// Sends PC_INIT until the board acknowledges or answers PC_INFO, at most three times. `lower`: lowers the board's own
+/// pin before a repetition, because a board that raises its pin by itself would let its neighbour take the number as well.
 pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<bool, Error> {
     let to = link.board(number)?;
     let nobody = link.profile().unnumbered().number();
@@ -38,8 +38,8 @@ pub(crate) async fn take_number(link: &Link, number: u8, lower: bool) -> Result<
         if acknowledged {
             return Ok(true);
         }
-        // The acknowledge may have been lost: never repeat PC_INIT blindly. Half an answer is enough: somebody has this
-        // number, and who it is will be asked again.
+        // The acknowledgement may have been lost: never repeat PC_INIT blindly. Half an answer is enough: it shows that a
+        // board has this number; its identity is asked later.
         link.listen(1 << number, &[Function::DspInfo]);
         if !matches!(ask_info(link, number).await?, Answer::Silence) {
             return Ok(true);

@@ -7,7 +7,7 @@ use crate::master::procedures::{
 use crate::master::procedures::{control, describe, init, one_board, raw_status, repair, run, scan, stop};
 use crate::master::reports::{Outcome, Request};
 
-/// A procedure under way.
+/// Procedure in progress.
 pub(crate) type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Error>> + Send>>;
 
 /// The procedure of a request.

@@ -1,16 +1,16 @@
-//! What the conformance tests may do, and how each ended.
+//! Options and results of the conformance tests.
 use crate::master::error::Error;
 use crate::master::reports::update::UpdateImage;
 use host_kit::{Diagnose, ErrorKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What the tests may do.
+/// Permissions and selection of the tests.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConformanceOptions {
     /// The boards; empty: all that answer.
     pub boards: Vec<u8>,
-    /// Reset and number the chain anew, set and clear status bits.
+    /// Permission to reset and renumber the chain, and to set and clear status bits.
     pub init: bool,
     /// Start applications and control loops, outputs safe.
     pub run: bool,
@@ -23,16 +23,16 @@ pub struct ConformanceOptions {
 }
 
 impl ConformanceOptions {
-    /// Whether tests are allowed that change something on a board.
+    /// Returns `true` if tests are allowed that change a board.
     pub fn changes(&self) -> bool {
         self.init || self.run || self.program.is_some()
     }
 }
 
-/// What one board is programmed with.
+/// Program for one board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConformanceProgram {
-    /// Its number.
+    /// Board number.
     pub board: u8,
     /// The flash number that it must have; the header of the image names it, so that no other board takes it.
     pub flash_number: u16,
@@ -42,28 +42,28 @@ pub struct ConformanceProgram {
     pub date: u16,
 }
 
-/// How a test ended.
+/// Result of a test.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase", tag = "verdict", content = "why")]
 pub enum Verdict {
-    /// The board does what was expected.
+    /// The board behaves as expected.
     Pass,
-    /// It does not; what came instead.
+    /// Failed; the actual result.
     Fail(String),
     /// Not done; why.
     Skipped(String),
 }
 
-/// One test of one board, or of the chain.
+/// Test of one board, or of the chain.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceTest {
-    /// Its name, as `D-T10`.
+    /// Name, as `D-T10`.
     pub id: &'static str,
-    /// The board; `None`: the chain as a whole.
+    /// Board; `None`: the whole chain.
     pub board: Option<u8>,
-    /// What was expected.
+    /// Expected result.
     pub expected: &'static str,
-    /// How it ended.
+    /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,
     /// The option that would have allowed it; `None`: it was allowed.
@@ -75,7 +75,7 @@ pub struct ConformanceTest {
 }
 
 impl ConformanceTest {
-    /// What was tested, in words: `board 3`, or `chain`.
+    /// Returns the subject in words: `board 3`, or `chain`.
     pub fn subject(&self) -> String {
         self.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
     }
@@ -86,9 +86,9 @@ impl ConformanceTest {
 pub struct ConformanceReport {
     /// In the order in which they were done.
     pub tests: Vec<ConformanceTest>,
-    /// What is not as it was found, and the command that helps.
+    /// Differences from the state before, and the remedy.
     pub left: Vec<String>,
-    /// Why the tests ended before the last one; those that were left are skipped.
+    /// Error that ended the tests before the last one; the remaining tests are skipped.
     #[serde(skip)]
     pub error: Option<Error>,
 }
@@ -122,8 +122,8 @@ impl ConformanceReport {
         by_option
     }
 
-    /// What kind of failure it is: that of the error that ended the tests; of the board when a test failed, or a board is not
-    /// as it was found. `None`: every test was passed.
+    /// Returns the kind of failure: of the error that ended the tests; `Device` if a test failed, or a board is not in its
+    /// previous state. `None`: every test passed.
     pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {
             Some(error) => Some(error.kind()),

@@ -27,14 +27,14 @@ impl AdminChange {
         }
     }
 
-    /// Whether it only ends something that moves: such a change is neither delayed nor refused.
+    /// Returns `true` if the change only ends motion: such a change is neither delayed nor refused.
     pub fn only_ends(&self) -> bool {
         let sets = [self.run, self.active, self.debug, self.global_debug].contains(&Some(true));
         !sets && (self.run == Some(false) || self.active == Some(false))
     }
 }
 
-/// How far to stop.
+/// Level of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopLevel {
     /// Outputs off, the control loop runs on.

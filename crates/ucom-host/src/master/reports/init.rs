@@ -1,4 +1,4 @@
-//! How a chain is numbered, and what came of it.
+//! Options and results of numbering a chain.
 use crate::master::counted::counted;
 use crate::master::error::{Error, MEASURE_ORDER, other_order};
 use crate::master::reports::scan::Reports;
@@ -6,7 +6,7 @@ use crate::master::reports::seen::BoardSeen;
 use host_kit::ErrorKind;
 use ucom::profile::Endian;
 
-/// How to number a chain.
+/// Options for numbering a chain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitOptions {
     /// Flash numbers by position, from an inventory: another order is a finding.
@@ -15,24 +15,24 @@ pub struct InitOptions {
     pub force: bool,
 }
 
-/// What an init brought about.
+/// Result of an init.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitReport {
-    /// Who reported after the reset.
+    /// Boards that reported after the reset.
     pub reports: Reports,
     /// Boards in the order of the chain.
     pub boards: Vec<BoardSeen>,
-    /// What is wrong; empty: ok.
+    /// Problems; empty: ok.
     pub findings: Vec<InitFinding>,
 }
 
 impl InitReport {
-    /// Every board that is there has a number, and nothing is odd.
+    /// Returns `true` if every board on the bus has a number, and there is no finding.
     pub fn is_ok(&self) -> bool {
         self.findings.is_empty()
     }
 
-    /// What kind of failure it is; `None`: ok.
+    /// Returns the kind of failure; `None`: ok.
     pub fn failure(&self) -> Option<ErrorKind> {
         match self.findings.as_slice() {
             [] => None,
@@ -46,7 +46,7 @@ impl InitReport {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InitFinding {
-    /// Nobody reported and nobody took number 1.
+    /// No board reported or took number 1.
     #[error(
         "no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`"
     )]
@@ -83,15 +83,15 @@ pub enum InitFinding {
     /// A board that did not report.
     #[error("board {board} took a number but did not report")]
     NotReported {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
     /// A board that ran on: it did not receive the reset.
     #[error("board {board} did not receive PC_RESET and ran on: {}", if *stopped { "it was stopped" } else { "it may still run" })]
     NotReset {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// It has confirmed since that its application is stopped.
+        /// `true` if the board has since confirmed that its application is stopped.
         stopped: bool,
     },
     /// Two boards with one flash number.
@@ -99,7 +99,7 @@ pub enum InitFinding {
     DuplicateFlash {
         /// The number.
         flash_number: u16,
-        /// One board.
+        /// First board.
         first: u8,
         /// The other.
         second: u8,
@@ -116,20 +116,20 @@ pub enum InitFinding {
         /// On the wire.
         found: u16,
     },
-    /// The inventory has a board where the chain has ended.
+    /// The inventory has a board after the end of the chain.
     #[error("board {board} (flash number 0x{expected:04X}) of the inventory is missing")]
     Missing {
-        /// Its position.
+        /// Position.
         board: u8,
-        /// Its flash number.
+        /// Flash number of the board.
         expected: u16,
     },
     /// A board that was refused: the chain is numbered up to the one before it.
     #[error("position {board}: {error}")]
     Refused {
-        /// Its position.
+        /// Position.
         board: u8,
-        /// Why.
+        /// Reason.
         error: Error,
     },
     /// Two flash ids that share an identifier.

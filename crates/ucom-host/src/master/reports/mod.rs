@@ -1,4 +1,4 @@
-//! What goes in and comes out: requests with their options, outcomes with their reports and findings. Nothing here sends or
+//! Data in and out: requests with their options, outcomes with their reports and findings. This module neither sends nor
 //! waits.
 mod conformance;
 mod flags;

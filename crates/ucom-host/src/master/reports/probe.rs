@@ -1,4 +1,4 @@
-//! What a probe may do, and what it measured.
+//! Options and results of a probe.
 use std::sync::Arc;
 
 use serde::Serialize;
@@ -6,10 +6,10 @@ use ucom::Profile;
 
 use crate::master::reports::init::InitReport;
 
-/// What a probe may do.
+/// Permissions of a probe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// Reset and number the chain anew: shows whether boards raise their pin by themselves.
+    /// Permission to reset and renumber the chain: shows if boards raise their pin by themselves.
     pub init: bool,
     /// Start a control loop, outputs inactive: shows which heartbeats count.
     pub alive: bool,
@@ -19,16 +19,16 @@ pub struct ProbeOptions {
     pub force: bool,
 }
 
-/// One unknown and what was found out.
+/// Unknown property and its measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ProbeRow {
     /// Key of the profile.
     pub key: &'static str,
-    /// What is unknown.
+    /// Unknown property.
     pub unknown: &'static str,
-    /// What the published description has about it.
+    /// Statement of the published description.
     pub published: &'static str,
-    /// What was observed.
+    /// Observation.
     pub observed: String,
     /// The value in the profile.
     pub decision: String,
@@ -36,10 +36,10 @@ pub struct ProbeRow {
     pub measured: bool,
 }
 
-/// What a probe found.
+/// Result of a probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeReport {
-    /// The profile with what was measured; the master goes on with the one that it had.
+    /// Profile with the measured values; the master keeps its own profile.
     pub profile: Profile,
     /// Statement, observation and decision.
     pub rows: Vec<ProbeRow>,
@@ -47,12 +47,12 @@ pub struct ProbeReport {
     pub boards: Vec<u8>,
     /// Different UCoM ids in reports: boards with and without a number.
     pub reports: usize,
-    /// The new numbers, where it was to give some.
+    /// New numbers, if the probe assigned some.
     pub init: Option<InitReport>,
 }
 
 impl ProbeReport {
-    /// The table as text for people.
+    /// Returns the table as text for display.
     pub fn table(&self) -> String {
         let mut text = String::new();
         for row in &self.rows {

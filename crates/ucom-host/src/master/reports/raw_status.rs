@@ -1,21 +1,21 @@
-//! What PC_SETSTATUS makes of the status of a board (D-22).
+//! Effect of PC_SETSTATUS on the status of a board (D-22).
 use ucom::{BoardInfo, Status};
 
-/// What one PC_SETSTATUS brought about on one board.
+/// Effect of one PC_SETSTATUS on one board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawStatus {
-    /// Its number.
+    /// Board number.
     pub board: u8,
     /// The status before.
     pub before: BoardInfo,
-    /// What the formula and the rules behind it make of it.
+    /// Status by the formula and the rules.
     pub expected: Status,
     /// The status afterwards; `None`: the board does not answer under its number any more.
     pub after: Option<BoardInfo>,
 }
 
 impl RawStatus {
-    /// Whether the board did what the rules require: without INIT it has forgotten its number, and is silent.
+    /// Returns `true` if the board did as the rules require: without INIT it has forgotten its number, and is silent.
     pub fn as_expected(&self) -> bool {
         match self.after {
             Some(after) => after.status == self.expected,
@@ -24,13 +24,13 @@ impl RawStatus {
     }
 }
 
-/// What the status of a board becomes by the rules (D-22).
+/// Returns the next status of a board by the rules (D-22).
 pub fn expected_status(before: &BoardInfo, mask: u8, value: u8) -> Status {
     let old = before.status;
     let new = old.set(mask, value);
     let kept = new & Status::ASTART;
     if !new.has(Status::INIT) || !old.has(Status::INIT) {
-        // The number is gone, and with it application, PROG and pin.
+        // The board loses its number, and with it application, PROG and pin.
         return kept | Status::EXLRUN | (old & Status::IPINIT);
     }
     let started = new.has(Status::MSTART) && (old.has(Status::MSTART) || before.has_application());
@@ -91,7 +91,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// D-22: the status is what a board makes of it, whatever the two bytes are.
+        /// D-22: the expected status is the status of a simulated board, for any two bytes.
         #[test]
         fn d22_what_is_expected_is_what_a_board_does(mask: u8, value: u8, application: bool, started: bool, history in prop::collection::vec((any::<u8>(), any::<u8>()), 0..3)) {
             let history: Vec<(u8, u8)> = history.into_iter().map(|(m, v)| (m & !0x08, v & !0x40)).collect();

@@ -1,4 +1,4 @@
-//! What a master can be asked to do, and what comes of it.
+//! Requests to a master, and their outcomes.
 use crate::master::io::IoDescription;
 use crate::master::reports::conformance::{ConformanceOptions, ConformanceReport};
 use crate::master::reports::flags::{AdminChange, StopLevel};
@@ -19,13 +19,13 @@ pub struct ProcedureId(pub(crate) u64);
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// Who is there; changes nothing.
+    /// Lists the boards; changes nothing.
     Scan,
-    /// Numbers for the whole chain.
+    /// Assigns numbers to the whole chain.
     Init(InitOptions),
     /// Gives one board its number back.
     Repair {
-        /// Its number.
+        /// Board number.
         board: u8,
         /// The flash number that must stand there.
         flash_number: u16,
@@ -48,11 +48,11 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// One PC_SETSTATUS as the formula has it, value bits outside the mask included; never repeated.
+    /// Sends one PC_SETSTATUS exactly by the formula, value bits outside the mask included; never repeated.
     RawStatus {
         /// The board it goes to; `None`: all at once.
         board: Option<u8>,
-        /// The boards to look at before and after.
+        /// Boards to read before and after.
         seen: Vec<u8>,
         /// First byte.
         mask: u8,
@@ -86,7 +86,7 @@ pub enum Request {
     Stop {
         /// The board.
         board: u8,
-        /// How far.
+        /// Level of the stop.
         level: StopLevel,
         /// See above.
         force: bool,
@@ -95,7 +95,7 @@ pub enum Request {
     Admin {
         /// The board.
         board: u8,
-        /// What changes.
+        /// Change.
         change: AdminChange,
         /// See above.
         force: bool,
@@ -106,7 +106,7 @@ pub enum Request {
     Describe {
         /// The board.
         board: u8,
-        /// Read it anew although it is known.
+        /// Read it again although it is known.
         fresh: bool,
     },
     /// MCA_DUMP_CI; changes nothing.
@@ -114,16 +114,16 @@ pub enum Request {
         /// The board.
         board: u8,
     },
-    /// The whole way to a running control loop.
+    /// Runs boards: all steps to a running control loop.
     Run(RunOptions),
-    /// Measures what a board reads otherwise.
+    /// Measures properties in which a board differs from the profile.
     Probe(ProbeOptions),
-    /// Whether boards follow the protocol page.
+    /// Tests that boards follow the protocol page.
     Conformance(ConformanceOptions),
 }
 
 impl Request {
-    /// Its name.
+    /// Returns the name of the request.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Scan => "scan",
@@ -145,8 +145,8 @@ impl Request {
         }
     }
 
-    /// Whether two boards with one number do not end it: a stop stops both, and must not wait; the others find them
-    /// themselves and report more.
+    /// Returns `true` if two boards with one number do not end the request: a stop stops both, and must not wait;
+    /// the others find them themselves and report more.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
@@ -178,58 +178,58 @@ impl Request {
     }
 }
 
-/// What a procedure brought about.
+/// Outcome of a procedure.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// Of [`Request::Scan`].
+    /// Outcome of [`Request::Scan`].
     Scan(ScanReport),
-    /// Of [`Request::Init`]; look at [`InitReport::findings`].
+    /// Outcome of [`Request::Init`]; see [`InitReport::findings`].
     Init(InitReport),
-    /// Of [`Request::Repair`].
+    /// Outcome of [`Request::Repair`].
     Repaired(BoardSeen),
-    /// Of [`Request::Info`].
+    /// Outcome of [`Request::Info`].
     Info(BoardSeen),
-    /// Of [`Request::SetStatus`], [`Request::XReset`] and [`Request::Stop`].
+    /// Outcome of [`Request::SetStatus`], [`Request::XReset`] and [`Request::Stop`].
     Status {
         /// The board.
         board: u8,
-        /// As read back.
+        /// Board info as read back.
         info: BoardInfo,
     },
-    /// Of [`Request::Reset`].
+    /// Outcome of [`Request::Reset`].
     Reset(Reports),
-    /// Of [`Request::Start`].
+    /// Outcome of [`Request::Start`].
     Started(BoardSeen),
-    /// Of [`Request::Admin`].
+    /// Outcome of [`Request::Admin`].
     Admin {
         /// The board.
         board: u8,
-        /// Its flags now.
+        /// Present flags.
         admin: Admin,
     },
-    /// Of [`Request::Update`]; look at each board's result.
+    /// Outcome of [`Request::Update`]; see each board's result.
     Update(UpdateReport),
-    /// Of [`Request::Describe`].
+    /// Outcome of [`Request::Describe`].
     Description {
         /// The board.
         board: u8,
-        /// Its text.
+        /// Description.
         description: IoDescription,
     },
-    /// Of [`Request::InitialInputs`].
+    /// Outcome of [`Request::InitialInputs`].
     InitialInputs {
         /// The board.
         board: u8,
         /// The words.
         values: Vec<u16>,
     },
-    /// Of [`Request::Run`].
+    /// Outcome of [`Request::Run`].
     Running(RunReport),
-    /// Of [`Request::Probe`].
+    /// Outcome of [`Request::Probe`].
     Probe(ProbeReport),
-    /// Of [`Request::RawStatus`].
+    /// Outcome of [`Request::RawStatus`].
     RawStatus(Vec<RawStatus>),
-    /// Of [`Request::Conformance`]; look at each verdict, and at what ended the tests.
+    /// Outcome of [`Request::Conformance`]; see each verdict, and the error that ended the tests.
     Conformance(ConformanceReport),
 }

@@ -1,4 +1,4 @@
-//! Which boards run with which values.
+//! Boards to run, and their values.
 use crate::master::load::LoadForecast;
 use ucom::Admin;
 
@@ -11,10 +11,10 @@ pub struct Setting {
     pub value: u16,
 }
 
-/// What a board gets before its control loop starts.
+/// Values that a board gets before its control loop starts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunBoard {
-    /// Its number.
+    /// Board number.
     pub board: u8,
     /// Inputs that differ from the board's initial ones.
     pub ci: Vec<Setting>,
@@ -22,18 +22,18 @@ pub struct RunBoard {
     pub par: Vec<Setting>,
 }
 
-/// Which boards to run, and how far.
+/// Boards to run, and options.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunOptions {
     /// The boards.
     pub boards: Vec<RunBoard>,
     /// Enable the outputs at the end.
     pub active: bool,
-    /// Also when the bus would be too busy or another PC is on it.
+    /// Also if the bus load would be too high or another PC is on the bus.
     pub force: bool,
 }
 
-/// What runs now.
+/// Running boards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunReport {
     /// Flags of each board.

@@ -1,4 +1,4 @@
-//! Who reports, who has a number, and what is odd about it.
+//! Boards that report, boards with a number, and findings about them.
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::master::error::{Error, IdentityError, MEASURE_ORDER, other_order};
@@ -9,9 +9,9 @@ use ucom::profile::Endian;
 /// Reports of boards after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers: what distinguishes boards.
+    /// Low bytes of the flash numbers, which distinguish boards.
     pub ids: BTreeSet<u8>,
-    /// How many frames each sent.
+    /// Number of frames from each board.
     pub frames: BTreeMap<u8, u32>,
     /// Those whose identifier has another id than the data, under `report.mode = flash7`.
     pub disagree: BTreeSet<u8>,
@@ -36,14 +36,14 @@ impl Reports {
     }
 }
 
-/// What a scan found.
+/// Result of a scan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ScanReport {
-    /// Who reported.
+    /// Boards that reported.
     pub reports: Reports,
     /// Boards with a number.
     pub boards: Vec<BoardSeen>,
-    /// What is worth a word.
+    /// Findings.
     pub findings: Vec<ScanFinding>,
 }
 
@@ -59,13 +59,13 @@ pub enum ScanFinding {
     /// A board with a number that did not report.
     #[error("board {board} has a number but did not report")]
     NotReported {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
     /// Two numbers, one flash number.
     #[error("boards {first} and {second} have the same flash number 0x{flash_number:04X}")]
     SameFlash {
-        /// One board.
+        /// First board.
         first: u8,
         /// The other.
         second: u8,
@@ -95,7 +95,7 @@ pub enum ScanFinding {
     /// Answers that contradict each other.
     #[error("the answers of board {board} contradict each other: two boards may have this number")]
     Contradicts {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
     /// Two boards have one number (D-24).
@@ -111,15 +111,15 @@ pub enum ScanFinding {
     /// A status that cannot be.
     #[error("board {board}: {problem}")]
     Status {
-        /// Its number.
+        /// Board number.
         board: u8,
-        /// Why not.
+        /// Reason.
         problem: &'static str,
     },
     /// The description never came whole.
     #[error("the description of board {board} never came whole")]
     NoDescription {
-        /// Its number.
+        /// Board number.
         board: u8,
     },
 }
@@ -129,7 +129,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// As the error that other commands end with, where they refuse to work with such a chain.
+    /// Returns the error of other commands that refuse to work with such a chain.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

@@ -4,10 +4,10 @@ use ucom::BoardInfo;
 /// A board as it answered PC_INFO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardSeen {
-    /// Its number.
+    /// Board number.
     pub number: u8,
     /// The numbers.
     pub info: BoardInfo,
-    /// Its description; `None`: it never came whole.
+    /// Description; `None`: it never came whole.
     pub description: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! What words mean, and back (D-11).
+//! Conversion of words to values and back (D-11).
 use proptest::prelude::*;
 
 use super::*;
@@ -29,7 +29,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
     assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
 }
 
-/// Where a table was given that does not know the program, numbers mean nothing.
+/// With a table that does not know the program, numbers have no meaning.
 #[test]
 fn d11_without_meaning_only_the_word_itself_is_taken() {
     let signal = Signal { raw_only: true, ..Signal::bare(&Profile::default()) };
@@ -46,7 +46,7 @@ fn d11_scale_offset_and_unit() {
     assert_eq!(word(&angle, "-15.504 deg"), Ok(-1550_i16 as u16));
     assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
     assert_eq!(angle.json(1550), json!(15.5));
-    // It could be the word, or a value in the unit.
+    // The number could be the word, or a value in the unit.
     let message = word(&angle, "15").unwrap_err().to_string();
     assert_eq!(message, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
     assert!(word(&angle, "0").is_err());
@@ -59,7 +59,7 @@ fn d11_scale_offset_and_unit() {
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
     assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
-    // It would be the word where the table is missing; without a unit there is only the word to be given.
+    // The number would be the word if the table is missing; without a unit only the word can be given.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table scales it and names no unit") && message.contains("0x0000"),
@@ -78,7 +78,7 @@ fn d11_limits_of_the_table_hold_for_every_form() {
     assert!(word(&signal, "0x03E9").is_err() && word(&signal, "-0.01A").is_err());
 }
 
-/// No value beyond a limit is taken, and no word beyond it is sent, whatever the steps are.
+/// No value beyond a limit is taken, and no word beyond it is sent, for any step size.
 #[test]
 fn d11_rounding_never_leaves_the_limits() {
     let coarse = Signal { max: Some(150.0), ..signal(SignalType::Int16, 100.0, 0.0, "mA") };
@@ -92,7 +92,7 @@ fn d11_rounding_never_leaves_the_limits() {
     );
     let down = Signal { min: Some(-150.0), ..signal(SignalType::Int16, -100.0, 0.0, "A") };
     assert_eq!((word(&down, "-150A"), word(&down, "-151A").is_err()), (Ok(1), true));
-    // What fractions lose is no violation.
+    // Rounding errors of fractions are not violations.
     let tenths = Signal { max: Some(0.3), ..signal(SignalType::Int16, 0.1, 0.0, "A") };
     assert_eq!((word(&tenths, "0.3A"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
     let odd = Signal { min: Some(-0.125), max: Some(3276.65), ..signal(SignalType::Int16, 0.1, 0.0, "") };
@@ -147,7 +147,7 @@ proptest! {
         }
     }
 
-    /// What is shown of a word gives that word again.
+    /// The displayed text of a word gives that word again.
     #[test]
     fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {
         let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];

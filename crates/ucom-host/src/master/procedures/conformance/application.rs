@@ -160,7 +160,7 @@ pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     Ok(result)
 }
 
-/// No heartbeats for so long after a last one.
+/// Sends no heartbeats for `us` µs after a last one.
 async fn pause(bench: &mut Bench<'_>, us: u64) {
     bench.heartbeats(false);
     bench.heartbeats(true);

@@ -77,7 +77,7 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
     Ok(verdict(pass, &came))
 }
 
-/// Whether the application of a board is up.
+/// Checks that the application of a board is started.
 async fn up(bench: &mut Bench<'_>, board: u8) -> Option<Verdict> {
     match bench.info(board).await {
         Some(info) if info.status.has(Status::MSTART) => None,
@@ -94,8 +94,8 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // With data it is a board's answer, never a request (D-12). Nobody but the board itself may send so under its number, so
-    // it must not be about to.
+    // With data the frame is a board's answer, never a request (D-12). Only the board itself may send it under its number,
+    // so no answer of the board may be pending.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {

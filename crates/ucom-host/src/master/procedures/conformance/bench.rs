@@ -1,4 +1,4 @@
-//! Frames out, frames in, and what was sent and came.
+//! Sends and receives frames of a test, and keeps both for the report.
 
 use crate::master::engine::{Forget, Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, SignalError};
@@ -12,14 +12,14 @@ const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
 /// Most frames of one test that are kept.
 const KEPT: usize = 64;
 
-/// How the boards were before the first test.
+/// State of the boards before the first test.
 pub(super) struct Found {
     pub boards: Vec<BoardSeen>,
-    /// A board that nobody tests could take a number.
+    /// `true` if a board outside the tests could take a number.
     pub strangers: bool,
 }
 
-/// One conversation.
+/// Conversation of one test.
 pub(super) struct Bench<'a> {
     pub link: &'a Link,
     pub options: &'a ConformanceOptions,
@@ -37,12 +37,12 @@ impl<'a> Bench<'a> {
         self.link.profile()
     }
 
-    /// What was sent and what came.
+    /// Returns the sent and the received frames.
     pub fn log(self) -> (Vec<String>, Vec<String>) {
         (self.sent, self.came)
     }
 
-    /// Sends a frame; what came before is forgotten.
+    /// Sends a frame; forgets frames received before.
     pub async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -60,7 +60,7 @@ impl<'a> Bench<'a> {
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
     }
 
-    /// The same with everything, and with its time.
+    /// Like `hear`, for all functions, with the time of each frame.
     pub async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
         let until = self.link.now() + us;
         let mut all = Vec::new();
@@ -109,7 +109,7 @@ impl<'a> Bench<'a> {
         None
     }
 
-    /// Whether the status bits of a board are so; the pins and autostart are left out.
+    /// Checks that the status bits of a board match; the pins and autostart are left out.
     pub async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
         let mask = !(Status::IPINIT | Status::OPINIT | Status::ASTART);
         match self.info(board).await {
@@ -162,7 +162,7 @@ pub(super) fn list(frames: &[Frame]) -> String {
     }
 }
 
-/// Passed, or failed with what came.
+/// Returns a pass, or a failure with the received frames.
 pub(super) fn verdict(pass: bool, came: &[Frame]) -> Verdict {
     if pass { Verdict::Pass } else { Verdict::Fail(list(came)) }
 }

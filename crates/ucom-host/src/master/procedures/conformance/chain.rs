@@ -1,4 +1,4 @@
-//! Tests that number the chain anew, and of the status byte.
+//! Tests that renumber the chain, and tests of the status byte.
 use crate::master::engine::MS;
 use crate::master::error::Error;
 use crate::master::procedures::conformance::ask::{expected_reports, only_reports};
@@ -50,7 +50,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
             return Ok(Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came))));
         }
     }
-    // By broadcast, too: a board without a number does not take it (D-04, D-06).
+    // Also by broadcast: a board without a number does not take it (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
     Ok(verdict(came.is_empty(), &came))
@@ -70,7 +70,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
         if !pass {
             return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
-        // Nobody else is enabled yet.
+        // No later board is enabled yet.
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;
@@ -94,7 +94,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
     Ok(Verdict::Pass)
 }
 
-/// One PC_SETSTATUS, and the status afterwards.
+/// Sends one PC_SETSTATUS and returns the status afterwards.
 async fn set(bench: &mut Bench<'_>, board: u8, mask: u8, value: u8) -> Option<Status> {
     bench.send(Function::SetStatus, board, &[mask, value]).await;
     bench.receive(10 * MS).await;
@@ -133,7 +133,7 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// The numbers must be new: the reset in it gives `first.number` to whoever is first on the wire.
+/// The numbers must be new: the reset in this test gives `first.number` to the first board on the wire.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("there is no such board".into()));

@@ -1,9 +1,9 @@
-//! Whether boards follow the protocol page: the acceptance tests of the board side, against boards that are there.
+//! Acceptance tests of the board side, against real boards: do they follow the protocol page?
 //!
-//! By default only what changes nothing is asked. More is allowed by
-//! [`ConformanceOptions`](crate::master::conformance::ConformanceOptions): a new address assignment,
-//! running applications with safe outputs, programming. Each test is a short conversation in frames of its own making, so that
-//! the procedures of this crate are not their own judges.
+//! By default the tests only ask questions that change nothing.
+//! [`ConformanceOptions`](crate::master::conformance::ConformanceOptions) allows more: a new address assignment, running
+//! applications with safe outputs, programming. Each test is a short conversation in frames of its own making, so that the
+//! procedures of this crate are not their own judges.
 
 mod application;
 mod ask;

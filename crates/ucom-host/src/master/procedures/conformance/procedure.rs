@@ -1,4 +1,4 @@
-//! The tests as a whole: which boards are there, every test that is allowed, and all as it was found.
+//! Sequence of the tests: identifies the boards, runs every allowed test, and restores the boards.
 use crate::master::engine::Link;
 use crate::master::error::{AddressError, Error, ExchangeError, IdentityError, MasterError, RunningError};
 use crate::master::procedures::ask_reports::ask_reports;
@@ -43,7 +43,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
     Ok(Outcome::Conformance(report))
 }
 
-/// Which boards are there, and whether the tests may be done with them. Changes nothing.
+/// Identifies the boards and checks that the tests may run on them. Changes nothing.
 async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error> {
     let mut boards = Vec::new();
     let asked: Vec<u8> = match options.boards.is_empty() {
@@ -90,7 +90,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Whether who reports is who has a number, each with a flash id of its own.
+/// Returns the number of reports, and `true` if the reports match the numbered boards, each with a flash id of its own.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

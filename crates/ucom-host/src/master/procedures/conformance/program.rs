@@ -7,7 +7,7 @@ use crate::master::reports::{ConformanceProgram, Verdict};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, Frame, Function, Header, checksum, data_block};
 
-/// Why these tests do not fit the profile.
+/// Returns the reason why these tests do not fit the profile.
 fn unfit(bench: &Bench<'_>) -> Option<Verdict> {
     let profile = bench.profile();
     let fits = profile.prog_plan == Plan::VerifyWrite && profile.prog_header == HeaderForm::V1;
@@ -27,7 +27,7 @@ fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header
     }
 }
 
-/// One block, frames as far apart as the profile requires.
+/// Sends one block, with the frame gap of the profile.
 async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     for data in block.chunks(8) {
         bench.send(Function::Prog, board, data).await;
@@ -116,7 +116,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     ];
     for (what, code, case) in cases {
         enter_exloader(bench.link, board, flash).await?;
-        // A transfer that was given up is forgotten.
+        // A cancelled transfer is forgotten.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
         bench.receive(20 * MS).await;
@@ -144,7 +144,7 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
         Case::Pause => {
             bench.send(Function::Prog, board, &[0x43; 8]).await;
             bench.link.sleep(300 * MS).await;
-            // Boards may look at the pause only when the next frame comes; what came in it counts as well.
+            // Boards may evaluate the pause only when the next frame comes; frames received in the pause count as well.
             bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
             bench.link.flush().await;
         }
@@ -168,7 +168,7 @@ fn next_frame(board: u8) -> Frame {
     Frame::of(Function::Prog, number, [0x43; 8].into())
 }
 
-/// What is sent.
+/// Program data of a test.
 enum Case {
     Short,
     Pause,

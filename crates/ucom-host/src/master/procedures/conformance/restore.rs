@@ -9,7 +9,7 @@ use crate::master::procedures::repair::repair;
 use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
 use ucom::{Admin, BoardInfo, Status, ToBoard};
 
-/// Numbers for the chain anew; every board must have the one that it had.
+/// Renumbers the chain; every board must have its previous number.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     // This PC is the master of the bus already.
     let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
@@ -27,8 +27,8 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     Ok(())
 }
 
-/// All boards, after the tests. What cannot be put back is reported in `left`, and does not keep the others from it. `at`: the
-/// board whose test was given up.
+/// Restores all boards after the tests. Failures are reported in `left` and do not keep the other boards from being restored.
+/// `at`: the board whose test was ended early.
 pub(super) async fn put_all_back(
     link: &Link,
     found: &Found,
@@ -54,7 +54,7 @@ pub(super) async fn put_all_back(
     Ok(())
 }
 
-/// One board: its loop ended, ASTART, PROG and its application as they were.
+/// Restores one board: ends its loop, then sets ASTART, PROG and its application as they were.
 pub(super) async fn put_back(
     link: &Link,
     before: &BoardSeen,
@@ -67,7 +67,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // It may be about to start by itself, or PC_START may have been the last command that it received.
+    // The board may be about to start by itself, or PC_START may have been the last command that it received.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;
@@ -90,7 +90,7 @@ pub(super) async fn put_back(
         }
         return Ok(());
     }
-    // Off first: what was begun of a transfer is forgotten.
+    // Off first: this discards a transfer that was begun.
     set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
     if was.has(Status::PROG) {
         set_status(link, n, Status::PROG, Status::PROG).await?;
@@ -98,7 +98,7 @@ pub(super) async fn put_back(
     Ok(())
 }
 
-/// The board answers, and it is the one that it was. One that erases its memory is silent for long, one that has rebooted
+/// Checks that the board answers and is the same one. A board that erases its memory is silent for long, a rebooted board
 /// has lost its number.
 async fn answering(
     link: &Link,
@@ -112,7 +112,7 @@ async fn answering(
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
         Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
-            // It may run all the same.
+            // The board may run all the same.
             halt(link, n).await?;
             repair(link, n, before.info.flash_number).await?.info
         }

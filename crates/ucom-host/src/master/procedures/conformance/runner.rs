@@ -8,19 +8,19 @@ use crate::master::procedures::exchange::set_status;
 use crate::master::reports::{ConformanceOptions, ConformanceReport, ConformanceTest, Verdict};
 use ucom::Status;
 
-/// A test, and the board it is of; `None`: the chain as a whole.
+/// Test and its board; `None`: the whole chain.
 type Planned = (&'static Test, Option<u8>);
 
-/// The tests under way.
+/// State of the running tests.
 pub(super) struct Runner<'a> {
     link: &'a Link,
     options: &'a ConformanceOptions,
-    /// What is to be as it was.
+    /// State to restore.
     found: &'a Found,
     pub report: ConformanceReport,
     /// Boards may be without their numbers.
     pub unnumbered: bool,
-    /// The board whose test is under way.
+    /// Board of the running test.
     pub at: Option<u8>,
 }
 
@@ -126,7 +126,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// What was not done, because the tests ended before.
+    /// Records the tests that were skipped because the run ended before.
     pub fn skip_rest(&mut self, why: &str) {
         for (test, board) in self.planned() {
             if self.report.tests.iter().any(|t| t.id == test.id && t.board == board) {

@@ -1,4 +1,4 @@
-//! Every test once: what it is called, what must be allowed, whom it is of, what it expects, how it is done.
+//! Table of all tests: name, required permission, scope, expectation, and function.
 use core::pin::Pin;
 
 use crate::master::error::Error;
@@ -6,16 +6,16 @@ use crate::master::procedures::conformance::bench::Bench;
 use crate::master::procedures::conformance::{application, ask, chain, program};
 use crate::master::reports::{ConformanceOptions, Verdict};
 
-/// What a test does to boards, and so what must be allowed.
+/// Effect of a test on boards, which decides the permission that it needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
-    /// It changes nothing.
+    /// The test changes nothing.
     Ask,
-    /// It resets and numbers boards, or sets bits of their status.
+    /// The test resets and numbers boards, or sets bits of their status.
     Init,
-    /// It starts the application and its control loop.
+    /// The test starts the application and its control loop.
     Run,
-    /// It writes a program.
+    /// The test writes a program.
     Program,
 }
 
@@ -34,9 +34,9 @@ impl Level {
 /// Whom a test is of.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scope {
-    /// The chain as a whole.
+    /// The whole chain.
     Chain,
-    /// The same; boards may be without their numbers before and after it.
+    /// Like `Chain`; boards may be without their numbers before and after the test.
     Numbers,
     /// Each board.
     Board,
@@ -46,11 +46,11 @@ pub(super) enum Scope {
     Programmed,
 }
 
-/// The conversation of a test with a board; with the chain as a whole the number means nothing.
+/// Conversation of a test with a board; for a test of the whole chain the number has no meaning.
 pub(super) type Talk =
     for<'a> fn(&'a mut Bench<'_>, u8) -> Pin<Box<dyn Future<Output = Result<Verdict, Error>> + Send + 'a>>;
 
-/// How a test is done.
+/// Function of a test.
 pub(super) enum Run {
     /// By a conversation.
     Talk(Talk),
@@ -63,7 +63,7 @@ pub(super) struct Test {
     pub id: &'static str,
     pub level: Level,
     pub scope: Scope,
-    /// What it expects, in words.
+    /// Expectation of the test, in words.
     pub expects: &'static str,
     pub run: Run,
 }

@@ -1,4 +1,4 @@
-//! From what was received to a profile: what decides is reported, what does not is kept.
+//! Derives a profile from the received frames: decisive observations are reported, for the others the profile keeps its values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -64,7 +64,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// A row; `value`: what was measured.
+    /// Adds a row; `value`: the measured value.
     fn add(
         &mut self,
         key: &'static str,
@@ -254,7 +254,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
 }
 
-/// Which heartbeats kept a control loop running: broadcast ones, those to its number.
+/// Judges which heartbeats kept a control loop running: broadcast ones, or those to its number.
 pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     let mut rows = Rows { rows: core::mem::take(&mut report.rows), profile: report.profile };
     let mode = match (broadcast, unicast) {

@@ -1,4 +1,4 @@
-//! The questions of a probe. Answers are kept as raw payloads: how to read them is what is being asked.
+//! Questions of a probe. Answers are kept as raw payloads, because their interpretation is what the probe measures.
 
 use crate::master::engine::{Core, Link, MS, Times};
 use crate::master::error::{Error, MasterError, RunningError};
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// How often each board is asked: one lost frame must not decide.
+/// Number of questions to each board: one lost frame must not decide.
 const ROUNDS: usize = 3;
 
-/// What a probe found, or why it ended. The session goes on with the profile that it had, and no board is left started or running that
-/// was not: whatever ended the probe.
+/// Returns the findings of a probe, or the error that ended it. The session keeps its profile, and the probe leaves no board started
+/// or running that was not before, however it ends.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
     let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
@@ -35,7 +35,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     result.map(Outcome::Probe)
 }
 
-/// What ends control loops, or keeps heartbeats from them, is not begun while some run.
+/// Refuses steps that end control loops, or withhold heartbeats from them, while loops run.
 fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     let running = |core: &mut Core| {
         let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
@@ -55,7 +55,7 @@ async fn measure(
     begun: &mut Option<(u8, StopLevel)>,
 ) -> Result<ProbeReport, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
-    // Everything is to be received raw, so nothing may be refused for its length.
+    // All frames shall be received raw, so no frame may be refused for its length.
     use_profile(link, Profile { dlc_strict: false, ..seen.before });
     seen.reports = all_reports(link).await;
     let mut numbered = None;
@@ -63,7 +63,7 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // The chain as a whole; what the base profile reads wrong is judged below.
+        // The whole chain; values that the base profile reads wrong are judged below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -137,7 +137,7 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     reports
 }
 
-/// PC_RESET, PC_INIT to the first board, and whether its status shows OPINIT at once; `None`: nobody took the number.
+/// Sends PC_RESET, then PC_INIT to the first board; returns `true` if its status shows OPINIT at once; `None`: no board took the number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Reset).await;
@@ -155,7 +155,7 @@ async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     Ok(status.map(|status| status.has(Status::OPINIT)))
 }
 
-/// PC_INFO with so many bytes of padding to some numbers; the frames of each answer until 100 ms of silence.
+/// Sends PC_INFO with `padding` bytes to some numbers; returns the frames of each answer until 100 ms of silence.
 async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8, Vec<Payload>> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let mut answers: BTreeMap<u8, Vec<Payload>> = BTreeMap::new();
@@ -198,7 +198,7 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     offsets
 }
 
-/// Whether a control loop goes on with broadcast heartbeats only, and with those to its number only.
+/// Checks if a control loop keeps running with broadcast heartbeats only, and with unicast heartbeats only.
 async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
     start_application(link, board).await?;
     let mut held = [false; 2];

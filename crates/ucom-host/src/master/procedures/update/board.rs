@@ -1,4 +1,4 @@
-//! One board: attempts, each from its exloader to the read-back (U-4 to U-10).
+//! Update of one board: attempts, each from its exloader to the read-back (U-4 to U-10).
 use crate::master::engine::{Event, Link};
 use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
@@ -9,7 +9,7 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::{UpdateFailure, UpdateOutcome, UpdatePlan};
 use ucom::{BoardInfo, ErrorCode, Status, ToBoard};
 
-/// Whether the board shows what the plan shall bring about.
+/// Returns `true` if the board shows the program of the plan.
 pub(super) fn has(known: &BoardInfo, plan: &UpdatePlan) -> bool {
     known.has_application() && plan.expected.is_some_and(|expected| expected.is(known))
 }
@@ -18,7 +18,7 @@ pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
     confirmed(link, board).await.is_ok_and(|seen| has(&seen.info, plan))
 }
 
-/// One board, from attempt number `first` on.
+/// Updates one board, from attempt number `first` on.
 pub(super) async fn one(
     link: &Link,
     session: &mut UpdateSession,
@@ -62,7 +62,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
-        // One damaged answer is not another board.
+        // A single damaged answer is not another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -74,7 +74,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
     }
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
-        // Whoever took the XRESET must not take the program data of another board's update.
+        // A board that took the XRESET must not take the program data of another board's update.
         leave_programming(link, board).await;
     }
     entered.map(drop)
@@ -86,7 +86,7 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// One attempt with one board; `Some`: it failed in a way that another attempt may heal (the result shows how).
+/// Makes one attempt with one board; `Some`: it failed in a way that another attempt may heal (the result shows how).
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -107,7 +107,7 @@ async fn attempt(
     judge(link, session, board, plan, number, broken.first().map(|(_, b)| *b)).await
 }
 
-/// Read-back, or what an early end means.
+/// Judges the result by a read-back, or by the early end.
 pub(super) async fn judge(
     link: &Link,
     session: &mut UpdateSession,
@@ -138,8 +138,8 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not take what comes next for the rest of this transfer. It gets the command while it still counts as at
-    // work: a cancel in this moment sends the command, too.
+    // The board must not take the following frames as the rest of this transfer. The command is sent while the board still
+    // counts as in progress: a cancel in this moment sends the command, too.
     leave_programming(link, board).await;
     // Another board that has taken the number since complains of program data, or takes them out of turn.
     if let Err(error) = one_board_each(link, &[board]).await {
@@ -160,7 +160,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
         // The board reported that it is done; only the read-back is missing.
         Err(e) => return session.fail_with(board, e),
     };
-    // Whoever shares the number was written, too, or is what has just answered.
+    // A board that shares the number was written, too, or is the one that has just answered.
     if let Err(error) = one_board_each(link, &[board]).await {
         return session.fail_with(board, error.into());
     }
@@ -180,7 +180,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
             return session.fail(board, failure);
         }
-        // Nobody knows what the board must show; it must show an application at least, and not run another one.
+        // The expected program is not known; the board must at least show an application, and not run another one.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
         None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };

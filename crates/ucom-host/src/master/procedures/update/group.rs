@@ -10,9 +10,9 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// All open boards at once by broadcast; those that fall behind get attempts of their own.
+/// Updates all open boards at once by broadcast; boards that fall out of the group get attempts of their own.
 ///
-/// Where the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
+/// If the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
@@ -65,8 +65,8 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Whether a board whose READY was lost has gone on with the others and is done: then it is verified. Otherwise what it shows of
-/// its flash is kept in the session. One that had this program before proves nothing by having it.
+/// Checks if a board whose READY was lost has continued with the others and is done: then verifies it. Otherwise keeps its
+/// answer about the flash in the session. A board that had this program before proves nothing by showing it.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));

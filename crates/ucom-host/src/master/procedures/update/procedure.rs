@@ -1,4 +1,4 @@
-//! The update as a whole: checks U-1 to U-3, then boards one by one or as a group; what is left when it is ended early.
+//! Sequence of an update: checks U-1 to U-3, then boards one by one or as a group; cleans up after an early end.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError, MasterError, RunningError, TargetError};
@@ -43,12 +43,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     }
     match end {
         Ok(()) => {}
-        // Asked once more: what was still to be undone is not.
+        // A second cancel: the remaining clean-up is skipped.
         Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // Nothing can be sent any more, but what is known of the boards is still worth reporting.
+        // No frame can be sent any more, but the known state of the boards is still worth reporting.
         Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -74,12 +74,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
 /// boards have one number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
-        // PC_START may have been taken already: what this update has started it stops again.
+        // PC_START may have been taken already: the update stops boards that it has started.
         if session.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok()
         {
             session.starting = None;
         }
-        // Best effort: what the board does not take now, its own time limit and the next XRESET undo.
+        // Best effort: if the board does not take the command now, its own time limit and the next XRESET end the mode.
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
             link.note(format!("board {board} did not confirm that it left programming"));
         }
@@ -120,8 +120,8 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// Boards that were found in programming mode and are still to be taken out of it when the update is ended early: they are, where
-/// this PC is the master already; else they are named, as nothing may be sent to them (D-08).
+/// Takes boards that were found in programming mode out of it when the update ends early, if this PC is the master already; else
+/// names them, because nothing may be sent to them (D-08).
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
@@ -168,7 +168,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08, in a dry run as well: what it reports must be what would happen.
+    // D-08, in a dry run as well: its report must show what an update would do.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -208,7 +208,7 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
 
 /// U-3 and D-62: the outcome of a board that needs no transfer; `None`: it is written.
 ///
-/// PC_INFO shows Program ID and date of program memory. It covers neither the load address nor any other image.
+/// PC_INFO shows Program ID and date of program memory. The answer covers neither the load address nor any other image.
 fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
     let options = &session.options;
     let expected = session.plan(link, None).ok()?.expected?;
@@ -225,7 +225,7 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // Another program has been on the board since where it shows something else than after that update.
+    // Another program has been on the board since, if it shows something else than after that update.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }
@@ -264,7 +264,7 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             if known.status.has(Status::PROG) && !session.options.dry_run {
                 session.programming.push(board);
             }
-            // What nothing proves is started only for a user who accepts that.
+            // An unproven program is started only if the user accepts that.
             let trusted = proven || session.options.accept_unverified;
             if session.options.start && trusted && !session.options.dry_run {
                 session.to_start.push(board);

@@ -7,17 +7,17 @@ use host_kit::{Diagnose, ErrorKind};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 
-/// How far the memory of a board has changed. It only grows, but for [`UpdateSession::proved_untouched`].
+/// Extent of the change to a board's memory. The stage only grows, except in [`UpdateSession::proved_untouched`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
-    /// It has what it had.
+    /// Unchanged.
     #[default]
     Untouched,
     /// Frames that erase went past it while it may have listened.
     MaybeErased,
-    /// It was commanded to erase.
+    /// The board was commanded to erase.
     Erased,
-    /// It reported that it is done.
+    /// The board reported that it is done.
     Written,
     /// PC_INFO showed the program.
     Verified,
@@ -49,7 +49,7 @@ impl UpdateSession {
         self.results.iter_mut().find(|r| r.board == board)
     }
 
-    /// The board is at work, beside others of its group.
+    /// Marks the board as in progress, together with others of its group.
     pub fn begin(&mut self, board: u8) {
         if !self.active.contains(&board) {
             self.active.push(board);
@@ -60,7 +60,7 @@ impl UpdateSession {
         self.stages.get(&board).copied().unwrap_or_default()
     }
 
-    /// Something of the old application is, or may be, gone.
+    /// Returns `true` if the old application is erased or may be, in whole or in part.
     pub fn may_be_erased(&self, board: u8) -> bool {
         self.stage(board) > Stage::Untouched
     }
@@ -70,7 +70,7 @@ impl UpdateSession {
         *known = stage.max(*known);
     }
 
-    /// PC_INFO shows what it showed before: the frames that might have erased the board did not.
+    /// Records that PC_INFO shows the state before the update: the frames that might have erased the board did not.
     pub fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
@@ -112,7 +112,7 @@ impl UpdateSession {
         self.end(board, outcome, Some(failure));
     }
 
-    /// An error of a step, named by what it left behind.
+    /// Records an error of a step, named by the state that it left.
     pub fn fail_with(&mut self, board: u8, error: Error) {
         let (kind, error) = (error.kind(), Box::new(error));
         let failure = match self.stage(board) {
@@ -180,12 +180,12 @@ impl UpdateSession {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.flash_number)
     }
 
-    /// What the board showed before the update.
+    /// Returns the board's state before the update.
     pub fn before(&self, board: u8) -> Option<BoardInfo> {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.before)
     }
 
-    /// What is sent to a board, or to a group.
+    /// Returns the data to send to a board, or to a group.
     pub fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
         let named = board.and_then(|b| self.flash_number(b)).filter(|_| self.options.name_target);
         Ok(UpdatePlan::new(&self.options, named.unwrap_or(Header::ANY_BOARD), &link.profile())?)

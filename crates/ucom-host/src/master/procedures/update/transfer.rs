@@ -1,9 +1,9 @@
-//! One attempt: both cycles, block by block, each block answered before the next one (U-5).
+//! Update attempt: both cycles, block by block, each block answered before the next one (U-5).
 use crate::master::engine::{Event, Link, MS};
 use crate::master::reports::update::{Progress, UpdatePlan};
 use ucom::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
 
-/// Why an attempt ended early, for one board.
+/// Reasons why an attempt ended early, for one board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Broken {
     Device {
@@ -16,15 +16,15 @@ pub(super) enum Broken {
         block: usize,
         waited_ms: u64,
     },
-    /// Nothing came after the very last block: PC_INFO must show it (U-9).
+    /// No answer came after the very last block: PC_INFO must show the result (U-9).
     NoFinish {
         waited_ms: u64,
     },
 }
 
 impl Broken {
-    /// The board drops what follows (D-43): it reported an error of programming. After any other one, as after silence, it
-    /// may go on listening.
+    /// Returns `true` if the board drops the following frames (D-43): it reported an error of programming. After any other
+    /// error, as after silence, the board may go on listening.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -32,7 +32,7 @@ impl Broken {
     }
 }
 
-/// Boards that take part in an attempt, and what became of them.
+/// Boards that take part in an attempt, and their state.
 pub(super) struct Attempt<'a> {
     pub link: &'a Link,
     pub plan: &'a UpdatePlan,
@@ -41,11 +41,11 @@ pub(super) struct Attempt<'a> {
     pub boards: Vec<u8>,
     pub number: u32,
     pub gap_us: u64,
-    /// When the transfer began, µs.
+    /// Time at which the transfer began, µs.
     pub since: u64,
 }
 
-/// How the boards of an attempt came out.
+/// Results of the boards of an attempt.
 #[derive(Debug, Default)]
 pub(super) struct Transferred {
     pub finished: Vec<u8>,
@@ -84,7 +84,7 @@ impl Attempt<'_> {
         out
     }
 
-    /// The eight frames of a block; what came before the last one left is no answer to it.
+    /// Sends the eight frames of a block; a frame that came before the last one left is not an answer to it.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;
@@ -108,7 +108,7 @@ impl Attempt<'_> {
                 continue;
             }
             match received.message {
-                // A READY after the very last block is none of ours to judge: FINISHED must follow.
+                // A READY after the very last block is ignored: FINISHED must follow.
                 FromBoard::Ready if !last => waiting.retain(|b| *b != received.from),
                 FromBoard::ProgFinished if last => waiting.retain(|b| *b != received.from),
                 FromBoard::Error(code) => {

@@ -1,10 +1,10 @@
-//! Why a board was not updated, with the facts, the kind and what helps.
+//! Reasons why a board was not updated, with the facts, the kind and the remedy.
 use crate::master::error::Error;
 use crate::master::reports::update::outcome::UpdateOutcome;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::{ErrorCode, Status};
 
-/// Why a board was not updated.
+/// Reasons why a board was not updated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UpdateFailure {
     /// A check refused it; nothing was erased.
@@ -13,7 +13,7 @@ pub enum UpdateFailure {
     /// No answer before anything was erased.
     #[error("{0}")]
     NoAnswer(Box<Error>),
-    /// The board answered, but did not do what was asked, before anything was erased.
+    /// The board answered, but did not carry out the request, before anything was erased.
     #[error("{0}")]
     Reported(Box<Error>),
     /// The board reported an error.
@@ -25,7 +25,7 @@ pub enum UpdateFailure {
         cycle: u32,
         /// From 0, the header's block.
         block: usize,
-        /// How many.
+        /// Number of attempts.
         attempts: u32,
         /// Something was erased.
         erased: bool,
@@ -39,9 +39,9 @@ pub enum UpdateFailure {
         cycle: u32,
         /// From 0, the header's block.
         block: usize,
-        /// How long was waited, ms.
+        /// Time waited, ms.
         waited_ms: u64,
-        /// How many.
+        /// Number of attempts.
         attempts: u32,
         /// Something was erased.
         erased: bool,
@@ -56,9 +56,9 @@ pub enum UpdateFailure {
         program_id: u16,
         /// On the board.
         date: u16,
-        /// Of the image.
+        /// Program ID of the image.
         wanted_id: u16,
-        /// Of the image; `None`: not known.
+        /// Flash date of the image; `None`: not known.
         wanted_date: Option<u16>,
     },
     /// DSP_PROGFINISHED came, and the board shows no application in its exloader.
@@ -70,7 +70,7 @@ pub enum UpdateFailure {
         program_id: u16,
         /// On the board.
         date: u16,
-        /// Of the board.
+        /// Status of the board.
         status: Status,
     },
     /// The board shows the program, but the application did not start.
@@ -88,7 +88,7 @@ pub enum UpdateFailure {
     /// The user ended it.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// What it left behind, the board's outcome.
+        /// State that the cancel left: the board's outcome.
         left: UpdateOutcome,
     },
     /// Another board of the list failed before its turn came.
@@ -106,7 +106,7 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Whatever fails or is cancelled once something may be erased is a fault.
+    /// Returns the kind; any failure or cancel after memory may have been erased is a fault.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
@@ -177,7 +177,7 @@ impl UpdateFailure {
     }
 }
 
-/// What a cancel left behind, in words.
+/// Returns the state after a cancel, in words.
 fn left_behind(outcome: UpdateOutcome) -> &'static str {
     match outcome {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",

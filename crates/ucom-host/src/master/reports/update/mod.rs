@@ -1,4 +1,4 @@
-//! Firmware update: what it is asked to do, what it sends, how it ends for each board.
+//! Firmware update: options, blocks to send, results for each board.
 mod failure;
 mod options;
 mod outcome;

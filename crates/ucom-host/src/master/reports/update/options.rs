@@ -1,4 +1,4 @@
-//! Which boards are updated with what, and how.
+//! Boards and images of an update, and its options.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -22,43 +22,43 @@ impl From<Image> for UpdateImage {
 /// A board to be updated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UpdateTarget {
-    /// Its number.
+    /// Board number.
     pub board: u8,
     /// The flash number it must have (U-1); `None`: any.
     pub flash_number: Option<u16>,
 }
 
-/// How several boards are updated.
+/// Sequence in which several boards are updated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum UpdateMode {
-    /// One after the other.
+    /// Boards are updated in sequence.
     #[default]
     OneByOne,
-    /// All at once, by broadcast; boards that fall behind are updated one by one afterwards.
+    /// All at once, by broadcast; boards that fall out of the group are updated one by one afterwards.
     Group,
 }
 
-/// What to update, and how.
+/// Boards and image of an update, and its options.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateOptions {
     /// The boards.
     pub targets: Vec<UpdateTarget>,
     /// The image.
     pub image: UpdateImage,
-    /// What the other cycle carries under the plans `exloader-app` (first), `pmem-xmem` and `raw` (second).
+    /// Image of the other cycle under the plans `exloader-app` (first), `pmem-xmem` and `raw` (second).
     pub second: Option<UpdateImage>,
-    /// Program ID that the board must show at the end, where the image does not contain it (plan `raw`, `prog.header` or
-    /// `prog.checksum` `none`); elsewhere the image must have it.
+    /// Program ID that the board must show at the end, if the image does not contain it (plan `raw`, `prog.header` or
+    /// `prog.checksum` `none`); otherwise the image must have this Program ID.
     pub expect_program_id: Option<u16>,
     /// Flash date as 16 bits, see [`DateForm`](ucom::DateForm).
     pub date: u16,
-    /// A board that shows the program with another date is up to date (U-3): the date was not asked for.
+    /// `true` if a board that shows the program with another date is up to date (U-3), because no date was requested.
     pub any_date: bool,
-    /// What is known of the boards' flash, by flash number (D-62). Boards without a record are not known.
+    /// Flash records of the boards, by flash number (D-62). Boards without a record are not known.
     pub records: BTreeMap<u16, FlashRecord>,
     /// The header names the board's flash number: another board then refuses the image.
     pub name_target: bool,
-    /// One after the other, or all at once.
+    /// In sequence, or all at once.
     pub mode: UpdateMode,
     /// Only the checks, the look for another PC among them: nothing but PC_INFO is sent.
     pub dry_run: bool,
@@ -68,8 +68,8 @@ pub struct UpdateOptions {
     pub rewrite: bool,
     /// Start the application at the end.
     pub start: bool,
-    /// An image that cannot be verified is as good as one that was: no failure (plan `raw`, `prog.header` or
-    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)). The same holds for a board that
+    /// An image that cannot be verified is as good as a verified one: no failure (plan `raw`, `prog.header` or
+    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)). This also holds for a board that
     /// shows the program, but whose flash is not known (D-62).
     pub accept_unverified: bool,
     /// Go on with the next board after one has failed.
@@ -77,7 +77,7 @@ pub struct UpdateOptions {
 }
 
 impl UpdateOptions {
-    /// One image for some boards, one after the other, with all checks.
+    /// Creates options for one image and some boards, one by one, with all checks.
     pub fn new(targets: Vec<UpdateTarget>, image: UpdateImage, date: u16) -> Self {
         Self {
             targets,

@@ -1,14 +1,14 @@
-//! How far the update of a board got.
+//! Progress of a board's update.
 use serde::Serialize;
 
-/// How far a board got.
+/// Progress of a board's update.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UpdateOutcome {
-    /// Nothing was erased: the board has what it had.
+    /// No memory was erased: the board is unchanged.
     #[default]
     NotStarted,
-    /// The user ended it before anything was erased: the board has what it had.
+    /// The user cancelled the update before anything was erased: the board is unchanged.
     Cancelled,
     /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62); nothing was
     /// sent.
@@ -17,10 +17,11 @@ pub enum UpdateOutcome {
     ProgramUpToDate,
     /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
     Incomplete,
-    /// The board may have lost what it had, and does not report it.
+    /// The old program of the board may be lost, and the board does not report it.
     Unknown,
-    /// The board reports it as written, but PC_INFO did not confirm the new Program ID and date: it showed others, nothing,
-    /// or nobody knows what to expect ([`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable)).
+    /// The board reports the program as written, but PC_INFO did not confirm the new Program ID and date: PC_INFO showed
+    /// others, did not answer, or the expected values are not known
+    /// ([`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable)).
     Written,
     /// PC_INFO shows the new Program ID and date (U-10).
     Verified,

@@ -1,4 +1,4 @@
-//! What goes over the wire: the blocks of both cycles (D-40, D-41).
+//! Content of an update: the blocks of both cycles (D-40, D-41).
 use core::fmt;
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::master::reports::update::options::{UpdateImage, UpdateOptions};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, BoardInfo, Checksum, Header, Memory, Profile, block_count, checksum, data_block};
 
-/// One cycle.
+/// Content of a cycle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Cycle {
     pub header: Option<[u8; BLOCK_LEN]>,
@@ -30,12 +30,12 @@ impl Cycle {
     }
 }
 
-/// What a board shall show at the end.
+/// Program that a board shall show at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expected {
-    /// Its Program ID.
+    /// Program ID.
     pub program_id: u16,
-    /// Its flash date; `None`: not known, because no header of ours carries it.
+    /// Flash date; `None`: not known, because no header of this tool carries it.
     pub date: Option<u16>,
 }
 
@@ -46,14 +46,14 @@ impl Expected {
     }
 }
 
-/// Why nobody knows what a board must show after the update.
+/// Reasons why the program that a board must show after the update is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
     /// Plan `raw`: the files hide their Program ID.
     RawPlan,
-    /// `prog.header` is `none`: the board makes Program ID and date by itself.
+    /// `prog.header` is `none`: the board computes Program ID and date by itself.
     NoHeader,
-    /// `prog.checksum` is `none`: Program IDs are no checksums of images.
+    /// `prog.checksum` is `none`: Program IDs are not checksums of images.
     NoChecksum,
 }
 
@@ -68,29 +68,29 @@ impl fmt::Display for Unverifiable {
 }
 
 impl Unverifiable {
-    /// How it can be verified all the same.
+    /// Returns the remedy that makes a verification possible.
     pub fn hint(&self) -> &'static str {
         "to have it verified name the Program ID that the board must show: `--expect-program-id 0x…`"
     }
 }
 
-/// One image as it is sent.
+/// Image as it is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedImage {
     /// The cycles that carry it, first and last: 1, 2 or both.
     pub cycles: (u32, u32),
-    /// Where it goes; `None`: only the file knows (plan `raw`).
+    /// Target memory; `None`: only the file knows (plan `raw`).
     pub memory: Option<Memory>,
     /// Load address, words; `None`: it is not sent.
     pub address_words: Option<u32>,
-    /// Its length, bytes.
+    /// Length, bytes.
     pub bytes: usize,
-    /// Its Program ID (D-44); `None`: hidden, or not computed.
+    /// Program ID (D-44); `None`: hidden, or not computed.
     pub program_id: Option<u16>,
 }
 
 impl Unverifiable {
-    /// Why nothing shows afterwards what a board has by this profile; `None`: something does.
+    /// Returns the reason why PC_INFO cannot verify an update by this profile; `None`: it can.
     fn by_profile(profile: &Profile) -> Option<Self> {
         match (profile.prog_plan, profile.prog_header, profile.prog_checksum) {
             (Plan::Raw, ..) => Some(Self::RawPlan),
@@ -102,7 +102,7 @@ impl Unverifiable {
 }
 
 impl UpdateImage {
-    /// Whether it can be sent: words, where files are not sent as they are.
+    /// Checks that the image can be sent: whole words, unless the plan is `raw`.
     fn check(&self, plan: Plan) -> Result<(), PlanError> {
         match self.bytes.len() {
             0 => Err(PlanError::Empty),
@@ -112,12 +112,12 @@ impl UpdateImage {
     }
 }
 
-/// Whether updates by this profile send a header, which carries Program ID and flash date (D-41).
+/// Returns `true` if updates by this profile send a header, which carries Program ID and flash date (D-41).
 pub fn has_header(profile: &Profile) -> bool {
     profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
 }
 
-/// What each cycle carries, and to which memory.
+/// Returns the image and the memory of each cycle.
 fn parts<'a>(
     plan: Plan,
     image: &'a UpdateImage,
@@ -133,22 +133,22 @@ fn parts<'a>(
     })
 }
 
-/// What a board gets, and what it shall show afterwards.
+/// Data that a board gets, and the program that it shall show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
-    /// What was given, the image first.
+    /// Given images, the main image first.
     pub images: Vec<PlannedImage>,
-    /// What the board shows at the end; `None`: nobody knows.
+    /// Program that the board shows at the end; `None`: not known.
     pub expected: Option<Expected>,
-    /// Why nobody knows.
+    /// Reason why it is not known.
     pub unverifiable: Option<Unverifiable>,
     /// The first cycle that may erase flash, 1 or 2: before it nothing is lost.
     pub erases_from: u32,
 }
 
 impl UpdatePlan {
-    /// For a board, `target` in the header.
+    /// Creates the plan for a board, `target` in the header.
     pub fn new(options: &UpdateOptions, target: u16, profile: &Profile) -> Result<Self, PlanError> {
         let plan = profile.prog_plan;
         let image = &options.image;
@@ -160,7 +160,7 @@ impl UpdatePlan {
         let erases_from = match plan {
             // The first cycle only checks, or fills RAM: the application in flash stays valid.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
-            // The first cycle writes program flash; what raw files make a board do only their makers know.
+            // The first cycle writes program flash; the effect of raw files is known only to their makers.
             Plan::PmemXmem | Plan::Raw => 1,
         };
         let unverifiable = Unverifiable::by_profile(profile);
@@ -211,7 +211,7 @@ impl UpdatePlan {
         Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
     }
 
-    /// Program ID that the board shall show; `None`: nobody knows.
+    /// Returns the Program ID that the board shall show; `None`: not known.
     pub fn program_id(&self) -> Option<u16> {
         self.expected.map(|expected| expected.program_id)
     }

@@ -1,4 +1,4 @@
-//! How an update ended, named, with the kind of failure.
+//! Results of an update, with the kind of failure.
 use crate::date_text;
 use crate::master::reports::update::failure::UpdateFailure;
 use crate::master::reports::update::outcome::UpdateOutcome;
@@ -6,25 +6,25 @@ use crate::master::reports::update::plan::{PlannedImage, Unverifiable, has_heade
 use host_kit::{Diagnose, ErrorKind};
 use ucom::{BoardInfo, Profile};
 
-/// What became of one board.
+/// Result of one board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateResult {
-    /// Its number.
+    /// Board number.
     pub board: u8,
-    /// Its flash number, when it answered.
+    /// Flash number, if the board answered.
     pub flash_number: Option<u16>,
-    /// What PC_INFO showed before.
+    /// PC_INFO before the update.
     pub before: Option<BoardInfo>,
-    /// What PC_INFO showed after the board reported that it is done.
+    /// PC_INFO after the board reported that it is done.
     pub after: Option<BoardInfo>,
-    /// How far it got.
+    /// Progress of the update.
     pub outcome: UpdateOutcome,
     /// PC_INFO shows the Program ID and date of the image, and this tool wrote exactly this image to this address: now, or
     /// earlier by the flash record.
     pub verified: bool,
     /// Attempts that were made.
     pub attempts: u32,
-    /// Why it failed.
+    /// Reason of the failure.
     pub failure: Option<UpdateFailure>,
     /// From XRESET to the last answer, µs.
     pub time_us: u64,
@@ -46,20 +46,20 @@ impl UpdateResult {
     }
 }
 
-/// What became of all boards.
+/// Results of all boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UpdateReport {
     /// In the order of the list.
     pub boards: Vec<UpdateResult>,
-    /// Nothing was sent but questions.
+    /// `true` if only questions were sent.
     pub dry_run: bool,
-    /// Program ID that the boards shall show; `None`: nobody knows it.
+    /// Program ID that the boards shall show; `None`: not known.
     pub program_id: Option<u16>,
-    /// Why nobody knows it: what was written could not be verified then.
+    /// Reason why it is not known: the written program could then not be verified.
     pub unverifiable: Option<Unverifiable>,
-    /// What was written and could not be verified counts as done.
+    /// `true` if written but unverified programs count as done.
     pub accept_unverified: bool,
-    /// What was sent, the image first.
+    /// Sent images, the main image first.
     pub images: Vec<PlannedImage>,
     /// Flash date of the image.
     pub date: u16,
@@ -68,7 +68,7 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
-    /// What kind of failure it is: the gravest of any board. `None`: all is done.
+    /// Returns the kind of failure: the gravest of any board. `None`: all is done.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
@@ -80,7 +80,7 @@ impl UpdateReport {
         kinds.chain(unproven).max()
     }
 
-    /// What a report without a failed board ends with, and what helps: something is not proven.
+    /// Returns the final message and the remedy for a report without a failed board if something is not proven.
     pub fn unproven(&self) -> (String, &'static str) {
         let is_shown = |b: &&UpdateResult| b.outcome == UpdateOutcome::ProgramUpToDate;
         let boards: Vec<String> = self.boards.iter().filter(is_shown).map(|b| b.board.to_string()).collect();
@@ -102,13 +102,13 @@ impl UpdateReport {
         is_shown.then(|| format!("flashed {}", date_text(profile, before.date)))
     }
 
-    /// The outcome of a board in words: `up-to-date (flashed 2026-11-25)` where the board keeps another date (U-3).
+    /// Returns the outcome of a board in words: `up-to-date (flashed 2026-11-25)` if the board keeps another date (U-3).
     pub fn outcome_words(&self, result: &UpdateResult, profile: &Profile) -> String {
         let name = result.outcome.name();
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
     }
 
-    /// What the outcome goes by, of a board that shows the program already; `None`: of any other.
+    /// Returns the evidence for a board that shows the program already; `None` for any other board.
     pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let same = match self.flashed(result, profile) {
             Some(flashed) => format!("same Program ID, {flashed}"),
@@ -122,7 +122,7 @@ impl UpdateReport {
     }
 }
 
-/// How far an update is.
+/// Progress of an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// The boards that get the image now.

@@ -1,7 +1,8 @@
-//! What later steps need, made at the lowest priority while the steps before them wait.
+//! Builds for later steps, made at the lowest priority while earlier steps wait.
 //!
-//! Most tests wait: for a line as slow as a real one, for leases that lapse. What they leave of the processors builds the boards' programs,
-//! the emulator and the Python package. A build that fails says so in the step that needs it, which asks for the same and finds it made or not.
+//! Most tests wait: for a line as slow as a real one, for leases that lapse. The free processor time is used to build the boards'
+//! programs, the emulator and the Python package. A failed build is reported in the step that needs it, because that step runs the same
+//! build.
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::JoinHandle;
 
@@ -9,14 +10,14 @@ use anyhow::Result;
 
 use crate::{book, emulate, firmware, package, python, shell, web};
 
-/// What is being made.
+/// Build in the background.
 pub struct Ahead {
     workspace_is_built: Option<Sender<()>>,
     making: Option<JoinHandle<()>>,
 }
 
 impl Ahead {
-    /// Begins with what takes longest.
+    /// Begins with the slowest builds.
     pub fn begin() -> Self {
         let (sender, receiver) = mpsc::channel();
         let make = move || shell::in_background(|| drop(make(&receiver)));
@@ -38,7 +39,7 @@ impl Drop for Ahead {
         // If the workspace was not built, this ends the thread's wait for it.
         self.workspace_is_built = None;
         if let Some(thread) = self.making.take() {
-            // A panic of it is none of the checks'.
+            // A panic of the thread does not concern the checks.
             let _ = thread.join();
         }
     }

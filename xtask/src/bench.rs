@@ -1,4 +1,4 @@
-//! `cargo xtask bench`: figures beside their anchors, all measured in the same run on the same machine.
+//! `cargo xtask bench`: figures and their anchors, all measured in the same run on the same machine.
 mod load;
 mod table;
 mod tracking;
@@ -15,7 +15,7 @@ use load::{Load, OTHERS_MAX};
 use crate::python;
 use crate::shell::{self, cargo, command, root, run};
 
-/// Pinocchio's inverse dynamics where the absolute targets were set, built alike, ns.
+/// Pinocchio's inverse dynamics on the machine on which the absolute targets were set, in an equal build, ns.
 const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 
 /// Figures by name.
@@ -36,7 +36,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let frames = work.join("ucom-frames.log");
     let kernels = dynamics_program(&work)?;
     let rounds = if quick { 1 } else { 5 };
-    // What builds does so now, so that nothing is built between the programs that are compared.
+    // All builds are done first, so that no build runs between the programs that are compared.
     let mut skipped = Vec::new();
     anchors(&work, &kernels, 0, &mut skipped)?;
     for Example { package, name, .. } in EXAMPLES {
@@ -98,8 +98,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(if missed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the better of two measurements of a figure: other programs, which come and go, can only make it worse. Of a time or a size
-/// that is the smaller one, of a throughput the greater.
+/// Keeps the better of two measurements of a figure, because other programs can only make it worse: of a time or a size the smaller
+/// one, of a throughput the greater.
 fn keep_best(figures: &mut Figures, samples: Figures) {
     for (name, value) in samples {
         let throughput = ["_gb_s", "_frames_s"].iter().any(|end| name.ends_with(end));
@@ -108,7 +108,7 @@ fn keep_best(figures: &mut Figures, samples: Figures) {
     }
 }
 
-/// The timing program of jtc-dynamics, copied away: other crates have an example of that name too.
+/// Returns the timing program of jtc-dynamics, copied, because other crates have an example of that name, too.
 fn dynamics_program(work: &Path) -> Result<PathBuf> {
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
@@ -121,7 +121,7 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
 pub struct Failed(Vec<(&'static [&'static str], String)>);
 
 impl Failed {
-    /// Measures; where that fails it notes the cause and returns no figure.
+    /// Measures; if that fails, notes the cause and returns no figure.
     fn attempt(
         &mut self,
         figures: &'static [&'static str],
@@ -138,7 +138,7 @@ impl Failed {
         self.0.push((figures, why));
     }
 
-    /// Why there is no figure of this name: the cause in one line.
+    /// Returns the reason why this figure is missing: the cause in one line.
     pub fn why(&self, figure: &str) -> Option<&str> {
         let (_, why) = self.0.iter().find(|(names, _)| names.iter().any(|name| figure.starts_with(name)))?;
         why.lines().map(str::trim).rfind(|line| !line.is_empty())
@@ -153,11 +153,11 @@ impl Failed {
 /// The figures of the anchors.
 const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
 
-/// A program with which a crate measures itself.
+/// Program with which a crate measures itself.
 struct Example {
     package: &'static str,
     name: &'static str,
-    /// How the names of its figures begin.
+    /// Beginnings of the names of its figures.
     figures: &'static [&'static str],
 }
 
@@ -173,7 +173,7 @@ const EXAMPLES: [Example; 4] = [
 ];
 
 impl Example {
-    /// Its figures. The UCoM frames that it read go to `frames`, too.
+    /// Measures its figures. The UCoM frames that it read go to `frames`, too.
     fn measure(&self, frames: &Path) -> Result<Figures> {
         let Self { package, name, .. } = *self;
         let mut example =
@@ -209,7 +209,7 @@ fn planned() -> Result<Figures> {
     object(&shell::read(&mut script)?)
 }
 
-/// How soon a Stop is on the line of an agent, under each load.
+/// Measures the time until a Stop is on the line of an agent, under each load.
 fn stops(quick: bool, failed: &mut Failed) -> Figures {
     const LOADS: [(&str, &[&str]); 3] = [
         ("idle", &["stop.idle_", "bare.idle_"]),

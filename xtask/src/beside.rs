@@ -1,4 +1,4 @@
-//! Programs that run beside each other: most of ours wait for what takes its time, and use little of a processor.
+//! Runs programs in parallel; most of them wait and use little processor time.
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read as _, Seek as _};
@@ -12,13 +12,13 @@ use anyhow::Result;
 
 use crate::shell::Scratch;
 
-/// What a program printed, and how it ended.
+/// Output and result of a program.
 pub struct Ended {
     /// On both of its outputs.
     pub output: String,
     /// With exit code 0.
     pub passed: bool,
-    /// How long it took.
+    /// Duration.
     pub seconds: f64,
 }
 

@@ -1,4 +1,4 @@
-//! `cargo xtask book`: docs/ as a book of HTML; and what of it every test run checks without making it.
+//! `cargo xtask book`: docs/ as a book of HTML, and checks of it that every test run performs without building it.
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -17,7 +17,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Cargo for the program that makes the book: a workspace of its own, as whoever builds the project does not build mdbook.
+/// Returns cargo for the program that makes the book: a separate workspace, so that a build of the project does not build mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
@@ -121,7 +121,7 @@ fn anchors(page: &str) -> BTreeSet<String> {
     names
 }
 
-/// What tests do with a block of commands.
+/// Treatment of a block of commands by tests.
 #[derive(Debug, PartialEq, Eq)]
 enum Block {
     Run,

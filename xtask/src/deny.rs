@@ -1,7 +1,6 @@
-//! deny.toml, the file of cargo-deny: licences, sources and bans, held against what cargo resolves.
+//! deny.toml, the file of cargo-deny: licences, sources and bans, compared with cargo's resolution.
 //!
-//! cargo-deny itself takes minutes to install, which every test run would pay; `cargo xtask dist` runs it. What is checked here comes from the
-//! same file.
+//! cargo-deny itself takes minutes to install, a cost for every test run; `cargo xtask dist` runs it. The checks here read the same file.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -15,13 +14,13 @@ use crate::shell::{self, root, run};
 /// The version of cargo-deny that reads deny.toml in a release.
 const CARGO_DENY: &str = "0.20.2";
 
-/// Workspaces of which something is shipped.
+/// Workspaces with shipped parts.
 const SHIPPED: [&str; 2] = ["Cargo.toml", "firmware/Cargo.toml"];
 /// All lock files: sources are checked in each.
 const LOCKS: [&str; 5] =
     ["Cargo.lock", "firmware/Cargo.lock", "emulator/Cargo.lock", "fuzz/Cargo.lock", "book/Cargo.lock"];
 
-/// An error that lists what deny.toml does not allow.
+/// Returns an error that lists the violations of deny.toml.
 pub fn check() -> Result<()> {
     let rules: Table =
         toml::from_str(&std::fs::read_to_string(root().join("deny.toml"))?).context("deny.toml")?;
@@ -64,7 +63,7 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
-/// Runs cargo-deny itself, installed below the folder of what is built when it is not there.
+/// Runs cargo-deny itself; installs it below the build folder if it is missing.
 pub fn with_cargo_deny() -> Result<()> {
     let folder = shell::target().join("tools");
     let program = folder.join("bin/cargo-deny");
@@ -83,7 +82,7 @@ pub fn with_cargo_deny() -> Result<()> {
         run(install.arg(&folder))?;
     }
     for manifest in SHIPPED {
-        // It looks at the sources for every target, of which builds for this computer have fetched a part.
+        // cargo-deny reads the sources for every target; builds for this computer have fetched only a part of them.
         run(&mut shell::cargo(&["fetch", "--quiet", "--locked", "--manifest-path", manifest]))?;
         let mut deny = shell::command(&program);
         deny.args(["--offline", "--manifest-path", manifest, "--config"]).arg(root().join("deny.toml"));
@@ -121,7 +120,7 @@ fn licence(rules: &Table, found: &Crate) -> Result<()> {
     Ok(())
 }
 
-/// Why a crate may not be used at all.
+/// Returns the reason why a crate may not be used at all.
 fn banned(rules: &Table, name: &str) -> Option<String> {
     let bans = rules.get("bans")?.get("deny")?.as_array()?;
     let ban = bans.iter().find(|ban| ban.get("crate").and_then(Value::as_str) == Some(name))?;

@@ -20,7 +20,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            // Comments, and further lines of a value, are no names.
+            // Comments, and further lines of a value, are not names.
             let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());
@@ -38,7 +38,7 @@ fn documented(page: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// An error that lists what the page does not have, or has too much.
+/// Returns an error that lists missing and surplus entries of the page.
 pub fn check() -> Result<()> {
     let page =
         std::fs::read_to_string(root().join("docs/dependencies.md")).context("docs/dependencies.md")?;

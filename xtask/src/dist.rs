@@ -1,4 +1,4 @@
-//! `cargo xtask dist`: the files of a release, and that they are what they should be.
+//! `cargo xtask dist`: the files of a release, and checks of them.
 mod check;
 mod chroot;
 mod dashboard;
@@ -53,7 +53,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes all files of a release into a folder that has nothing else; what had to be left out, and why.
+/// Makes all files of a release into a folder without other files; returns the parts that had to be left out, with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;
@@ -113,7 +113,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
             }
         }
     }
-    // Nothing is written before all of it is there: what broke off leaves an empty folder.
+    // No file is written before all are ready: a failed run leaves an empty folder.
     for Made { name, bytes } in made {
         std::fs::write(out.join(&name), bytes).with_context(|| name.clone())?;
     }

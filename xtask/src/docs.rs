@@ -22,7 +22,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         cargo(&["test", "--release", "--package", "jtc-core", "--test", "suite", "reactions::"]);
     run(reactions.env("UPDATE_DOCS", "1"))?;
     println!("wrote the table of reactions of docs/safety.md");
-    // One after the other: they write the same page.
+    // In sequence: both write the same page.
     let drawn =
         ["test", "--release", "--package", "jtc-core", "--lib", "--", "the_diagram_is", "--test-threads=1"];
     let mut drawn = cargo(&drawn);

@@ -12,7 +12,7 @@ use crate::{firmware, python, size};
 /// Figures of the boards' programs, kept in the repository so that a change to them is a decision.
 const FIGURES: &str = "docs/board-figures.txt";
 
-/// `arguments`: `--update`, or `--serial PATH` and what the emulator itself understands.
+/// `arguments`: `--update`, or `--serial PATH` and arguments of the emulator itself.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     if arguments.iter().any(|a| a.starts_with("--serial")) {
         return live(arguments);
@@ -25,7 +25,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(tally.finish())
 }
 
-/// The steps, as a part of `cargo xtask test` too.
+/// Runs the steps, as a part of `cargo xtask test`, too.
 pub fn steps(tally: &mut Tally, update: bool) {
     tally.step("board: lints, every unsafe block explained", || firmware::lints().map(|()| Outcome::Passed));
     tally.step("board: tests of what needs no hardware", firmware::tests);
@@ -51,7 +51,7 @@ fn install_tools() -> Result<()> {
     Ok(())
 }
 
-/// Where bindgen looks for the library on Debian, or where LIBCLANG_PATH leads it.
+/// Returns `true` if bindgen can find the library: at the places of Debian, or by LIBCLANG_PATH.
 fn has_libclang() -> bool {
     let entries = |place: &Path| std::fs::read_dir(place).into_iter().flatten().flatten();
     let of_llvm = entries(Path::new("/usr/lib")).map(|entry| entry.path().join("lib"));
@@ -65,7 +65,7 @@ fn has_libclang() -> bool {
     std::env::var_os("LIBCLANG_PATH").is_some() || places.into_iter().any(found)
 }
 
-/// Cargo in `emulator/`. What it takes from `crates/` has other features there than in the workspace: its warnings are errors, too.
+/// Returns cargo in `emulator/`. Crates from `crates/` have other features there than in the workspace: their warnings are errors, too.
 fn cargo(arguments: &[&str]) -> Command {
     let mut cargo = shell::cargo(arguments);
     cargo.current_dir(shell::root().join("emulator"));
@@ -115,7 +115,7 @@ fn driving() -> Result<Outcome> {
     run(script.env("PYTHONDONTWRITEBYTECODE", "1")).map(|()| Outcome::Passed)
 }
 
-/// Measures, prints, and compares with what is kept.
+/// Measures, prints, and compares with the stored figures.
 fn figures(update: bool) -> Result<()> {
     install_tools()?;
     let mut text = String::new();
@@ -148,8 +148,8 @@ fn compare(kept: &Path, text: &str) -> Result<()> {
     bail!("the figures are not those of {FIGURES}; if that is meant: cargo xtask emulate --update")
 }
 
-/// What is the same in every build. How late an interrupt begins depends on when bytes meet ticks, to the nanosecond; the program
-/// that measures it compares it with its limit.
+/// Returns the lines that are equal in every build. The begin of an interrupt depends on when bytes meet ticks, to the
+/// nanosecond; the program that measures it compares it with its limit.
 fn lasting(text: &str) -> impl Iterator<Item = &str> {
     let lines = text.lines().filter(|line| !line.contains("interrupts are masked"));
     lines.map(|line| line.split(", begins at most").next().unwrap_or_default())

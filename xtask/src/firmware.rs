@@ -11,14 +11,14 @@ use crate::shell::{self, run};
 use crate::suite::count_results;
 use crate::tally::{Counts, Outcome};
 
-/// What the board's code is compiled for.
+/// Target for which the board's code is compiled.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// The boards, by the feature that selects each.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// What runs at the priority of the tick. The second is the one place to which the tick jumps through a register: it wakes
-/// the links.
+/// Functions that run at the priority of the tick. The second is the one place to which the tick jumps through a register:
+/// it wakes the links.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
 /// A memory of the chip: name, first address, bytes.
@@ -33,7 +33,7 @@ const REGIONS: [(&str, u64, u64); 8] = [
     ("SRAM4", 0x3800_0000, 64 * 1024),
 ];
 
-/// Adds the compiler's target for the board where rustup manages the toolchain.
+/// Adds the compiler's target for the board if rustup manages the toolchain.
 pub fn add_target() -> Result<()> {
     // A toolchain that is not rustup's brings its own targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
@@ -55,17 +55,17 @@ fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
     Ok(cargo)
 }
 
-/// Where the boards' programs are.
+/// Returns the build folder of the boards' programs.
 pub fn directory() -> PathBuf {
     shell::target().join("firmware")
 }
 
-/// Where the program of a board is once it is built.
+/// Returns the path of a board's program after its build.
 pub fn elf(board: &str) -> PathBuf {
     directory().join(format!("{board}.elf"))
 }
 
-/// Builds the ELF of a board and says where it is.
+/// Builds the ELF of a board and returns its path.
 pub fn build(board: &str) -> Result<PathBuf> {
     add_target()?;
     run(&mut cargo_for(board, "build")?)?;
@@ -78,8 +78,8 @@ pub fn build(board: &str) -> Result<PathBuf> {
 /// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program for the fastest lines, which tests need beside those that are flashed. It has a directory
-/// of its own, so that neither build makes the other stale.
+/// Builds the first board's program for the fastest lines, which tests need in addition to the flashed programs. It has a
+/// directory of its own, so that neither build makes the other stale.
 pub fn build_fast() -> Result<PathBuf> {
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
@@ -106,7 +106,7 @@ pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
             add(section.address(), section.size())?;
         }
     }
-    // Initial values of .data lie in flash too.
+    // Initial values of .data are in flash, too.
     for segment in file.segments() {
         let (_, in_file) = segment.file_range();
         if in_file > 0 && segment.address() >= 0x2000_0000 {
@@ -116,7 +116,7 @@ pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     Ok(used.into_iter().filter(|(_, bytes, _)| *bytes > 0).collect())
 }
 
-/// Everything that is checked about a board's ELF; prints what it found.
+/// Runs all checks of a board's ELF and prints the results.
 pub fn check(board: &str, elf: &Path) -> Result<()> {
     for (name, bytes, size) in used(elf)? {
         println!("{board}: {name}: {bytes} of {size} B");

@@ -1,4 +1,4 @@
-//! Every chore of the workspace behind one command: `cargo xtask help`.
+//! One command for all chores of the workspace: `cargo xtask help`.
 #![forbid(unsafe_code)]
 
 mod ahead;

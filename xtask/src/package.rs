@@ -1,4 +1,5 @@
-//! The Python package: its wheel is built, installed where nothing else is, and tested there; not the source tree, which lacks the compiled part.
+//! The Python package: its wheel is built, installed in an empty environment, and tested there; not the source tree, which lacks the
+//! compiled part.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -9,17 +10,17 @@ use crate::shell::{self, Scratch, root, run};
 use crate::suite;
 use crate::tally::{self, Counts, Outcome, Tally};
 
-/// What builds it and what its tests need.
+/// Requirements of its build and its tests.
 const REQUIREMENTS: &str = "requirements-package.txt";
 
-/// What a newcomer's environment runs: the lines of the README, as far as they need nothing but the package.
+/// Program for a new environment: the lines of the README that need only the package.
 const FIRST_LINES: &str = "import openjtc\n\
     with openjtc.connect('sim:', speed=None) as robot:\n    \
         run = robot.move([0, 30, -60, 0, 30, 0], degrees=True)\n    \
         print(run)\n    \
         assert run.outcome == 'finished' and run._repr_html_().startswith('<iframe')\n";
 
-/// Where the wheel is put.
+/// Returns the folder of the wheel.
 fn wheels() -> PathBuf {
     shell::target().join("wheels")
 }
@@ -31,7 +32,7 @@ fn is_own(path: &Path) -> bool {
     })
 }
 
-/// Builds the wheel for this computer, of what the tests have compiled; the ones of a release are made by `cargo xtask dist`.
+/// Builds the wheel for this computer from the files that the tests have compiled; `cargo xtask dist` makes the wheels of a release.
 pub fn build() -> Result<PathBuf> {
     let python = python::environment(REQUIREMENTS)?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -69,7 +70,7 @@ pub fn steps(tally: &mut Tally) {
     });
 }
 
-/// As on a computer on which there is nothing but Python.
+/// Tests the wheel as on a computer with only Python.
 fn fresh(wheel: &Path) -> Result<()> {
     let scratch = Scratch::new("fresh-python")?;
     let environment = scratch.path().join("environment");

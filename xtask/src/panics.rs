@@ -1,8 +1,8 @@
 //! No panic can be reached from the control tick: a walk over the calls of the linked program.
 //!
-//! What the compiler left in is what counts, so the ELF is read and not the source. From each root every branch that leaves its
-//! function is followed; a function whose address is formed in code that was reached counts as called. Calls through a register
-//! are listed: where they lead is not known here.
+//! Only the compiled code counts, so the ELF is read and not the source. From each root every branch that leaves its function
+//! is followed; a function whose address is formed in code that was reached counts as called. Calls through a register are
+//! listed, because their targets are not known here.
 
 mod thumb;
 
@@ -27,7 +27,7 @@ const PANICS: [&str; 8] = [
     "len_mismatch_fail",
 ];
 
-/// What can be reached from the roots.
+/// Result of a walk from the roots.
 #[derive(Debug)]
 pub struct Report {
     /// Functions reached, roots included.
@@ -36,7 +36,7 @@ pub struct Report {
     pub instructions: usize,
     /// Calls and jumps through a register: function and address.
     pub indirect: Vec<String>,
-    /// A way to each place that panics or traps: function names with the address where each is left, and what is reached.
+    /// A way to each place that panics or traps: function names with the address at which each is left, and the place reached.
     pub paths: Vec<String>,
 }
 
@@ -62,7 +62,7 @@ impl fmt::Display for Report {
 
 /// The ways from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
 ///
-/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line behind an address.
+/// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line of an address.
 pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
     // Each reached function with the function it was reached from and the address of the branch.
@@ -100,7 +100,7 @@ pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     Ok(report)
 }
 
-/// How a function was reached.
+/// Returns the chain of calls to a function.
 fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32) -> String {
     let name = &program.functions[&at].name;
     match from.get(&at) {
@@ -109,10 +109,10 @@ fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32)
     }
 }
 
-/// What a place in a function leads to.
+/// Target of a place in a function.
 enum End {
     Function(u32),
-    /// An address where no function is.
+    /// An address without a function.
     Nowhere(u32),
     Indirect,
     Trap,
@@ -131,7 +131,7 @@ struct Program<'a> {
     functions: BTreeMap<u32, Function>,
     /// Executable sections: first address and bytes.
     sections: Vec<(u32, &'a [u8])>,
-    /// Where data in the code begins (true) and where code goes on (false).
+    /// Addresses at which data in the code begins (true) and at which code goes on (false).
     data: BTreeMap<u32, bool>,
 }
 
@@ -263,7 +263,7 @@ impl<'a> Program<'a> {
                             }
                         }
                     }
-                    // Behind a call that does not return a trap is never executed.
+                    // After a call that does not return a trap is never executed.
                     Flow::Trap if !after_call => found(address, End::Trap),
                     Flow::Trap | Flow::Other => {}
                 }

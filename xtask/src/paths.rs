@@ -1,18 +1,18 @@
-//! Folders of this computer whose paths compilers write into what they make, and what stands there instead.
+//! Folders of this computer whose paths compilers write into their output, and the names that replace them.
 use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 
 use crate::shell;
 
-/// Where cargo keeps the sources of dependencies.
+/// Returns the folder in which cargo keeps the sources of dependencies.
 fn cargo_home() -> PathBuf {
     std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .unwrap_or_else(|| PathBuf::from(std::env::var_os("HOME").unwrap_or_default()).join(".cargo"))
 }
 
-/// The folders with what stands for each. The later ones count first.
+/// Returns the folders with the name for each. Later entries have priority.
 pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     let mut folders = vec![
         (shell::root().to_owned(), "openjtc"),
@@ -26,7 +26,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
             path.display()
         );
     }
-    // A checkout behind a link has two names.
+    // A checkout reached through a link has two names.
     for at in 0..folders.len() {
         let (path, name) = folders[at].clone();
         if let Ok(real) = path.canonicalize()
@@ -38,7 +38,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(folders)
 }
 
-/// For cargo's `--config`: the switches by which the compiler for `triple` writes none of these paths.
+/// Returns the switches for cargo's `--config` by which the compiler for `triple` writes none of these paths.
 pub fn remapped(triple: &str) -> Result<String> {
     let flags = folders()?.into_iter();
     let flags: Vec<String> =

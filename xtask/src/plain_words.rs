@@ -1,4 +1,4 @@
-//! `cargo xtask plain-words`: marks of sentences that a reader has to read twice, counted in comments, messages, help and documents.
+//! `cargo xtask plain-words`: marks of sentences that are hard to read, counted in comments, messages, help and documents.
 //!
 //! The counts are kept for each part of the project, and may only fall. CONTRIBUTING.md says how to write instead.
 mod marks;
@@ -18,7 +18,7 @@ use crate::shell::{self, files, root};
 const KEPT: &str = "xtask/plain-words.txt";
 /// Files with prose.
 const EXTENSIONS: [&str; 7] = ["rs", "py", "pyi", "md", "toml", "ts", "svelte"];
-/// A record of what was, and files that another project wrote or a command writes.
+/// A record of the past, and files that another project wrote or a command writes.
 const EXCLUDED: [&str; 3] = ["CHANGELOG.md", "Cargo.toml", "api-types.ts"];
 
 /// A mark in a file.

@@ -1,5 +1,4 @@
-//! `cargo xtask prove`: what takes hours and therefore is no part of `cargo xtask test`. What was found stands in
-//! docs/evidence.md.
+//! `cargo xtask prove`: checks that take hours and are therefore not in `cargo xtask test`. Their results are in docs/evidence.md.
 mod changes;
 mod evidence;
 mod fuzz;

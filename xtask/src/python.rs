@@ -1,4 +1,4 @@
-//! Independent references in Python: a virtual environment made by itself, and the checks that run in it.
+//! Independent references in Python: a virtual environment, made automatically, and the checks that run in it.
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,9 +12,10 @@ use crate::suite;
 use crate::tally::{Outcome, Tally};
 use crate::web;
 
-/// The interpreter of a virtual environment with the packages of references/`requirements`, made when it is not there yet.
+/// Returns the interpreter of a virtual environment with the packages of references/`requirements`; makes the environment
+/// if it does not exist.
 pub fn environment(requirements: &str) -> Result<PathBuf> {
-    // Whoever asks while it is being made waits for it.
+    // A second caller waits while the environment is being made.
     static MAKING: Mutex<()> = Mutex::new(());
     let _making = MAKING.lock().unwrap_or_else(PoisonError::into_inner);
     let list = root().join("references").join(requirements);
@@ -45,19 +46,19 @@ pub fn environment(requirements: &str) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// `pip install` of this interpreter's environment; what to install follows.
+/// Returns `pip install` of this interpreter's environment; the caller adds the packages.
 pub fn pip_install(python: &Path) -> Command {
     let mut install = command(python);
     install.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
     install
 }
 
-/// Where robot descriptions of other people are kept, for all environments.
+/// Returns the folder of third-party robot descriptions, for all environments.
 pub fn robots() -> PathBuf {
     shell::target().join("robots")
 }
 
-/// What a check is called with.
+/// Arguments of a check.
 struct Check {
     /// Below references/.
     script: &'static str,
@@ -98,7 +99,7 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// A step for each reference; `demo` is where the demo left its files.
+/// Runs a step for each reference; `demo` is the folder of the demo's files.
 pub fn checks(tally: &mut Tally, demo: &Path) {
     let mut python = None;
     tally.step("Python environment of the references", || {
@@ -156,7 +157,7 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     }
 }
 
-/// What runs beside others.
+/// Checks that run in parallel.
 enum Beside {
     Reference(&'static Check),
     /// The dashboard, used in a browser.
@@ -173,7 +174,7 @@ impl Beside {
 }
 
 impl Check {
-    /// `None` where the demo did not leave its files at `demo`.
+    /// Runs the check; `None` if the demo did not leave its files at `demo`.
     fn run(&self, (python, demo): (&Path, &Path), log: &Path) -> Result<Option<Ended>> {
         if !self.demo_files.iter().all(|name| demo.join(name).exists()) {
             return Ok(None);

@@ -12,7 +12,7 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
-/// Where cargo puts what it builds.
+/// Returns cargo's target directory.
 pub fn target() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(directory) => root().join(directory),
@@ -42,7 +42,7 @@ pub fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
-/// Returns the processor time of all programs that have ended so far, with what they ran; `None` where the system has no `/proc`.
+/// Returns the processor time of all programs that have ended so far, with their child processes; `None` if the system has no `/proc`.
 ///
 /// The programs of [`in_background`] count when they end.
 pub fn processor_seconds() -> Option<f64> {
@@ -69,11 +69,11 @@ fn announce(command: &Command) {
 }
 
 thread_local! {
-    /// What this thread runs is in nobody's way, and prints nothing.
+    /// `true` if programs of this thread run in the background: at the lowest priority, and without output.
     static IN_BACKGROUND: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whatever `body` runs with [`run`] or [`read`] runs at the lowest priority, and prints nothing.
+/// Runs `body`; its programs started by [`run`] or [`read`] run at the lowest priority, and print nothing.
 pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
     IN_BACKGROUND.set(true);
     let done = body();
@@ -81,7 +81,7 @@ pub fn in_background<T>(body: impl FnOnce() -> T) -> T {
     done
 }
 
-/// The same command at a lower priority: 19 is the lowest.
+/// Returns the command with a lower priority: 19 is the lowest.
 pub fn nice(command: &Command, by: u8) -> Command {
     let mut nice = Command::new("nice");
     nice.args(["-n", &by.to_string()]).arg(command.get_program()).args(command.get_args());
@@ -114,7 +114,7 @@ pub fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Run, show each line of its standard output as it comes and hand it to `line` too.
+/// Runs a command, shows each line of its standard output as it comes and passes it to `line`, too.
 pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     announce(command);
     let mut child = command
@@ -153,7 +153,7 @@ pub fn read(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// Whether a program can be started at all; its output is dropped.
+/// Returns `true` if a program can be started at all; its output is dropped.
 pub fn works(command: &mut Command) -> bool {
     command
         .stdin(Stdio::null())
@@ -186,14 +186,14 @@ pub fn apt_install(packages: &[&str]) -> Result<()> {
 pub struct Scratch(PathBuf);
 
 impl Scratch {
-    /// Made fresh; `name` is what it is for.
+    /// Makes a new folder; `name` is its purpose.
     pub fn new(name: &str) -> Result<Self> {
         let path = std::env::temp_dir().join(format!("openjtc-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).with_context(|| format!("cannot create {}", path.display()))?;
         Ok(Self(path))
     }
 
-    /// Where it is.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         &self.0
     }
@@ -242,14 +242,14 @@ pub fn option(arguments: &mut Vec<String>, name: &str) -> Result<Option<String>>
     Ok(Some(arguments.remove(at)))
 }
 
-/// Whether `--name` is given; removed from `arguments`.
+/// Returns `true` if `--name` is given; removes it from `arguments`.
 pub fn flag(arguments: &mut Vec<String>, name: &str) -> bool {
     let before = arguments.len();
     arguments.retain(|a| a != name);
     arguments.len() != before
 }
 
-/// An error when arguments are left that nobody understood.
+/// Returns an error if unknown arguments are left.
 pub fn nothing_left(arguments: &[String]) -> Result<()> {
     match arguments.first() {
         Some(argument) => bail!("unknown argument `{argument}`; see `cargo xtask help`"),

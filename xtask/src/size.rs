@@ -7,7 +7,7 @@ use crate::shell;
 use crate::{firmware, suite};
 
 /// Bytes that the controller may take with its trajectory: 432 000 of points, and 40 KiB of the board's fast memory for all else, the
-/// stored arm included. The receive buffers of 60 000 bytes come beside it.
+/// stored arm included. The receive buffers of 60 000 bytes come in addition.
 pub const LIMIT: u64 = 432_000 + 40 * 1024;
 
 /// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.

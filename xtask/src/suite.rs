@@ -1,8 +1,8 @@
-//! The tests of the workspace: cargo builds them, and their programs run beside each other.
+//! The tests of the workspace: cargo builds them, and their programs run in parallel.
 //!
-//! Cargo runs one test program after the other, and many of ours wait for what takes its time on a real line: leases that lapse, boards
-//! that are silent. They use little of a processor, so several run at once. The tests of a crate are linked into one program, `suite`, which
-//! is run once for each of its files: no test then shares a process with more than those of its own file.
+//! Cargo runs one test program after the other, and many of ours wait in real time: for leases that lapse, for boards that are silent.
+//! These programs use little of a processor, so several run at once. The tests of a crate are linked into one program, `suite`, which
+//! runs once for each of its files: no test then shares a process with more than those of its own file.
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::num::NonZero;
@@ -15,13 +15,13 @@ use crate::beside::{self, Ended};
 use crate::shell::{self, cargo, run_lines};
 use crate::tally::{self, Counts, Outcome};
 
-/// The tests of one file of a crate, or all of a program that is no `suite`.
+/// Tests of one file of a crate, or all tests of a program other than `suite`.
 struct Program {
     package: PathBuf,
     executable: PathBuf,
-    /// Of the program, and of the file within it.
+    /// Names of the program, and of the file within it.
     name: String,
-    /// All, if there are none.
+    /// Selected tests; empty: all.
     tests: Vec<String>,
 }
 
@@ -104,14 +104,14 @@ fn files(list: &str) -> BTreeMap<&str, Vec<String>> {
     files
 }
 
-/// Tests of one program of boards that run at once, for each processor: they wait for nearly all of their time. Of others one runs, which
-/// is usual: a simulated controller needs a good part of a processor, and is late when it does not get that.
+/// Tests of one program of boards that run at once, for each processor: these tests wait for nearly all of their time. Of others one
+/// runs, which is usual: a simulated controller needs a good part of a processor, and is late without it.
 const BOARD_TESTS_FOR_A_PROCESSOR: usize = 2;
-/// What `env` of the GNU tools is given to begin a program that heeds these signals.
+/// Argument of the GNU tools' `env` for a program that shall handle these signals.
 const HEEDING: &str = "--default-signal=HUP,INT,QUIT";
 
-/// Runs all of them, and prints of each what it printed once it has ended. Names those that failed, and adds what these printed of their
-/// failures to `printed`.
+/// Runs all programs, and prints the output of each when it has ended. Returns the names of the failed ones, and adds their failure
+/// messages to `printed`.
 fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) -> Result<Vec<String>> {
     let mut failures = Vec::new();
     let ended = |program: Program, ended: Result<Ended>| {
@@ -128,10 +128,11 @@ fn run_all(programs: Vec<Program>, counts: &mut Counts, printed: &mut String) ->
             }
             Err(error) => failures.push(format!("{name}, which cannot be run: {error:#}")),
         }
-        // Whoever reads this through a pipe sees how far it is.
+        // A reader of a pipe sees the progress.
         std::io::stdout().flush().ok();
     };
-    // A run behind `nohup` or in the background of a script ignores signals that tests send to what they start, and it inherits that.
+    // A run under `nohup` or in the background of a script ignores signals that tests send to their programs, and the programs
+    // inherit this.
     let heeds_signals = shell::works(shell::command("env").args([HEEDING, "true"]));
     let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
     let threads = (BOARD_TESTS_FOR_A_PROCESSOR * processors).to_string();

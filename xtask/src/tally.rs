@@ -6,9 +6,9 @@ use anyhow::Result;
 
 use crate::shell;
 
-/// What a step came to.
+/// Outcome of a step.
 pub enum Outcome {
-    /// One check, passed.
+    /// A single check, passed.
     Passed,
     /// Numbers of several tests, and the output of those that failed.
     Counted(Counts, String),
@@ -39,17 +39,17 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Of all steps, run those with `only` in their title.
+    /// Creates a tally that runs the steps with `only` in their title; `None`: all steps.
     pub fn new(only: Option<String>) -> Self {
         Self { only, ..Self::default() }
     }
 
-    /// A step with this title is run.
+    /// Returns `true` if a step with this title shall run.
     pub fn wants(&self, title: &str) -> bool {
         self.only.as_ref().is_none_or(|only| title.contains(only))
     }
 
-    /// Run a step under its heading; an error is reported and counted, and the next step runs all the same.
+    /// Runs a step under its heading; an error is reported and counted, and the next step still runs.
     pub fn step(&mut self, title: &str, body: impl FnOnce() -> Result<Outcome>) {
         if !self.wants(title) {
             return;
@@ -101,7 +101,7 @@ impl Tally {
         self.counts.passed_alone += programs;
     }
 
-    /// What failed and what was skipped once more, then the closing line.
+    /// Prints the failed and skipped steps once more, then the closing line.
     pub fn finish(self) -> ExitCode {
         println!();
         for skip in &self.skips {

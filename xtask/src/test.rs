@@ -78,7 +78,7 @@ fn passed(result: Result<()>) -> Result<Outcome> {
     result.map(|()| Outcome::Passed)
 }
 
-/// What git sees as changed; `None` outside a checkout.
+/// Returns git's list of changes; `None` outside a checkout.
 fn tree() -> Option<String> {
     shell::read(shell::command("git").args(["status", "--porcelain"])).ok()
 }
@@ -98,7 +98,7 @@ fn board_builds() -> Result<()> {
     Ok(())
 }
 
-/// The newcomer's command, into a directory of its own; what it wrote is looked at.
+/// Runs the newcomer's command, into a directory of its own, and checks its output.
 fn demo(out: &Path) -> Result<()> {
     let mut demo = shell::command(suite::programs()?.join("jtc"));
     let text = shell::read(demo.args(["demo", "--speed", "max", "--json", "--out"]).arg(out))?;

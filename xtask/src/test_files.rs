@@ -1,4 +1,5 @@
-//! Every file with tests belongs to a program: the tests of a crate are one program, and cargo finds no file beside it by itself.
+//! Checks that every file with tests belongs to a program: the tests of a crate are one program, and cargo does not find other
+//! files by itself.
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +19,7 @@ fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     Ok(Some(roots.collect()))
 }
 
-/// The files that may declare the module of which `file` is the source, and its name.
+/// Returns the files that may declare the module with the source `file`, and its name.
 fn parents(file: &Path, tests: &Path, programs: &[PathBuf]) -> Option<(Vec<PathBuf>, String)> {
     let is_folder = file.file_name()? == "mod.rs";
     let module = if is_folder { file.parent()? } else { file };

@@ -1,6 +1,6 @@
-//! The dashboard: its source is checked, built anew and compared with what the agents carry, and used in a browser.
+//! The dashboard: its source is checked, rebuilt and compared with the files that the agents carry, and used in a browser.
 //!
-//! Whoever builds the programs needs none of that: the built files are in the repository.
+//! A build of the programs needs none of these steps: the built files are in the repository.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -11,10 +11,10 @@ use crate::python;
 use crate::shell::{self, Scratch, run};
 use crate::tally::{self, Counts, Outcome, Tally};
 
-/// Where Debian puts the browser.
+/// Path of Debian's browser.
 pub const BROWSER: &str = "/usr/bin/chromium";
 
-/// `program` of Node.js in `web/`: that of the references' environment, so that none has to be there.
+/// Returns `program` of Node.js in `web/`: from the references' environment, so that no Node.js has to be installed.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -25,7 +25,7 @@ fn command(program: &str) -> Result<Command> {
     Ok(command)
 }
 
-/// Installs what the lock file names, from the package registry.
+/// Installs the packages of the lock file, from the package registry.
 fn install() -> Result<()> {
     let stamp = shell::root().join("web/node_modules/.package-lock.json");
     let lock = shell::root().join("web/package-lock.json");
@@ -90,12 +90,12 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Debian's browser, installed where it is not there and this user may.
+/// Installs Debian's browser if it is missing and this user may install it.
 pub fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }
 
-/// Uses it in a browser, with the released programs; what it printed. `None`: there is no browser here, nor can one be installed.
+/// Uses the dashboard in a browser, with the released programs; returns the output. `None`: no browser is installed, and none can be.
 pub fn browser(log: &Path) -> Result<Option<Ended>> {
     if install_browser().is_err() {
         return Ok(None);
@@ -105,7 +105,7 @@ pub fn browser(log: &Path) -> Result<Option<Ended>> {
     let mut npm = command("npm")?;
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
-    // It draws in 3D without the hardware for it: what runs beside it and watches a clock goes first.
+    // The browser draws in 3D without the hardware for it: parallel programs that watch a clock have priority.
     beside::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 

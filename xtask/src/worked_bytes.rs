@@ -3,7 +3,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::root;
 
-/// Bytes at the start of a line, up to the first word that is no byte.
+/// Returns the bytes at the start of a line, up to the first word that is not a byte.
 fn bytes(line: &str) -> Vec<u8> {
     line.split_whitespace()
         .take_while(|word| word.len() == 2)

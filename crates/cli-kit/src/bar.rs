@@ -1,4 +1,4 @@
-//! Progress bars on stderr. What else is printed meanwhile stands above the bar, which leaves no piece of itself behind.
+//! Progress bars on stderr. Other output stands above the bar, which leaves no traces.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
@@ -7,10 +7,10 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, WeakProgressBar}
 
 use crate::view::LEAST;
 
-/// The bar that was made last.
+/// The last bar that was created.
 static LAST: Mutex<Option<WeakProgressBar>> = Mutex::new(None);
 
-/// Prints while no bar is on the terminal; it is drawn again afterwards.
+/// Prints while the bar is hidden; the bar is drawn again afterwards.
 pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     let bar = LAST.lock().unwrap_or_else(PoisonError::into_inner).as_ref().and_then(WeakProgressBar::upgrade);
     match bar.filter(|bar| !bar.is_finished()) {
@@ -19,7 +19,7 @@ pub(crate) fn suspended<T>(print: impl FnOnce() -> T) -> T {
     }
 }
 
-/// Stderr for whoever writes whole lines by itself beside a bar.
+/// Stderr for code that writes whole lines next to a bar.
 #[derive(Debug)]
 pub struct Stderr;
 
@@ -33,7 +33,7 @@ impl Write for Stderr {
     }
 }
 
-/// Columns of the terminal on stderr; none where it is no terminal.
+/// Returns the columns of the terminal on stderr; `None` if stderr is not a terminal.
 pub(crate) fn stderr_width() -> Option<u16> {
     std::io::stderr()
         .is_terminal()
@@ -42,7 +42,8 @@ pub(crate) fn stderr_width() -> Option<u16> {
         .map(|(columns, _)| columns)
 }
 
-/// Bars are drawn: stderr is a terminal with room for them. Otherwise the size that it has, where it is a terminal.
+/// Returns `Ok` if stderr is a terminal with room for bars. Otherwise the error is the size of the terminal, if stderr
+/// is one.
 pub fn draws_bars() -> Result<(), Option<(u16, u16)>> {
     if !std::io::stderr().is_terminal() {
         return Err(None);
@@ -63,21 +64,21 @@ fn made(total: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Counts steps.
+/// Creates a bar that counts steps.
 pub(crate) fn of_steps(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{msg:8} {wide_bar:.cyan/dim} {pos:>5}/{len} {elapsed:>5}");
     bar.set_message(what.to_owned());
     bar
 }
 
-/// Counts bytes; words of its owner below it, so that there is room for them on narrow terminals.
+/// Creates a bar that counts bytes, with the text of its owner below it, so that it fits on narrow terminals.
 pub(crate) fn of_bytes(total: u64, what: &str) -> ProgressBar {
     let bar = made(total, "{prefix:9} {wide_bar:.cyan/dim} {bytes:>9} of {total_bytes}\n  {msg}");
     bar.set_prefix(what.to_owned());
     bar
 }
 
-/// Counts milliseconds of a motion.
+/// Creates a bar that counts milliseconds of a motion.
 pub(crate) fn of_motion(total_ms: u64, what: &str, keys: &str) -> ProgressBar {
     let below = if keys.is_empty() { "" } else { "\n{prefix}" };
     let of = total_ms as f64 * 1e-3;

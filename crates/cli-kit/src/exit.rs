@@ -1,4 +1,4 @@
-//! Exit codes: what scripts may rely on.
+//! Exit codes, as scripts may rely on them.
 use host_kit::ErrorKind;
 
 /// A device reported an error.
@@ -12,7 +12,7 @@ pub const REFUSED: u8 = 4;
 /// A fault while running.
 pub const FAULT: u8 = 5;
 
-/// The exit code of a kind of failure.
+/// Returns the exit code of a kind of failure.
 pub const fn of(kind: ErrorKind) -> u8 {
     match kind {
         ErrorKind::Usage => USAGE,

@@ -1,7 +1,8 @@
-//! Keys from the terminal one by one. The terminal is put back as it was however the command ends.
+//! Single keys from the terminal. The terminal is restored after any end of the command.
 //!
-//! Ctrl-C stays a signal. Ctrl-Z is switched off meanwhile, because a command that sleeps would leave a machine running that nobody
-//! follows, and so is Ctrl-S, which would hold the command at its next word with the stop key unread.
+//! Ctrl-C stays a signal. Ctrl-Z is disabled meanwhile, because a suspended command would leave a machine running
+//! without supervision. Ctrl-S is disabled because it would block the command at its next output, with the stop key
+//! unread.
 
 /// A key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,13 +29,13 @@ pub enum Key {
     Escape,
 }
 
-/// The keys of what a terminal has sent; the rest may be the begin of one.
+/// Returns the keys in the bytes of a terminal; the rest may be the start of a key.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);
     while let [first, more @ ..] = rest {
         if *first != 0x1B {
-            // Signs beyond ASCII are no keys here; each of their bytes would be a wrong one.
+            // Characters beyond ASCII are not keys here; each of their bytes would give a wrong key.
             if first.is_ascii() {
                 keys.push(Key::Char(char::from(*first)));
             }
@@ -84,25 +85,25 @@ mod terminal {
 
     use super::{Key, parse};
 
-    /// How the terminal was before keys were read.
+    /// State of the terminal before keys were read.
     static BEFORE: Mutex<Option<Termios>> = Mutex::new(None);
 
-    /// Puts the terminal back as it was. Does nothing the second time.
+    /// Restores the terminal. A second call has no effect.
     pub fn restore() {
         if let Some(before) = BEFORE.lock().unwrap_or_else(PoisonError::into_inner).take() {
             let _ = tcsetattr(stdin(), OptionalActions::Now, &before);
         }
     }
 
-    /// Keys from stdin, where it is a terminal of which this process has the foreground.
+    /// Keys from stdin, if stdin is a terminal with this process in the foreground.
     pub struct Keys {
-        /// The begin of a key.
+        /// Start of a key.
         begun: Vec<u8>,
         gone: bool,
     }
 
     impl Keys {
-        /// From now on keys come one by one and are not shown; none when there is no terminal to press them at.
+        /// Starts to read single keys without echo; `None` without a terminal.
         pub fn listen() -> Option<Self> {
             if !std::io::stdin().is_terminal() {
                 return None;
@@ -124,7 +125,7 @@ mod terminal {
             Some(keys)
         }
 
-        /// Keys pressed since the last look.
+        /// Returns the keys pressed since the last call.
         pub fn pressed(&mut self) -> Vec<Key> {
             let input = stdin();
             let mut ready = [PollFd::new(&input, PollFlags::IN)];
@@ -135,7 +136,7 @@ mod terminal {
                 return Vec::new();
             }
             if !matches!(waited, Ok(1..)) {
-                // The rest of a longer key would have come with its begin.
+                // The rest of a longer key would have arrived with its start.
                 return if std::mem::take(&mut self.begun).is_empty() {
                     Vec::new()
                 } else {
@@ -150,7 +151,7 @@ mod terminal {
             keys
         }
 
-        /// The terminal has hung up: no key will come any more.
+        /// Returns `true` if the terminal has hung up: no further key will arrive.
         pub fn gone(&self) -> bool {
             self.gone
         }
@@ -175,19 +176,19 @@ mod console {
 
     use super::Key;
 
-    /// A console needs no other mode for single keys: nothing to put back.
+    /// A console needs no other mode for single keys, so there is no mode to restore.
     pub fn restore() {}
 
     /// Keys from the console.
     pub struct Keys(());
 
     impl Keys {
-        /// None when there is no console to press them at.
+        /// Returns `None` without a console.
         pub fn listen() -> Option<Self> {
             std::io::stdin().is_terminal().then_some(Self(()))
         }
 
-        /// Keys pressed since the last look.
+        /// Returns the keys pressed since the last call.
         pub fn pressed(&mut self) -> Vec<Key> {
             let mut keys = Vec::new();
             while event::poll(Duration::ZERO).unwrap_or(false) {
@@ -211,7 +212,7 @@ mod console {
             keys
         }
 
-        /// A console does not hang up before its processes end.
+        /// Returns `false`: a console does not hang up before its processes end.
         pub fn gone(&self) -> bool {
             false
         }
@@ -232,7 +233,7 @@ mod tests {
         assert_eq!(keys(b"\x1BOA\x1B[6~\x1B[1~"), (vec![Key::Up, Key::PageDown, Key::Home], &b""[..]));
         assert_eq!(keys(b"x\x1B[5"), (vec![Key::Char('x')], &b"\x1B[5"[..]));
         assert_eq!(keys(b"\x1B"), (vec![], &b"\x1B"[..]));
-        // A key that is not known, and a letter that is not ASCII, are none.
+        // An unknown key, and a letter that is not ASCII, are ignored.
         assert_eq!(keys("\x1B[15~\u{e9}s".as_bytes()), (vec![Key::Char('s')], &b""[..]));
     }
 }

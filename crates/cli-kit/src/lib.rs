@@ -1,5 +1,4 @@
-//! What the commands `jtc` and `ucom` share: how they print, draw live views, read keys, make their pages, receive Ctrl-C, and are
-//! tried by tests.
+//! Shared parts of the commands `jtc` and `ucom`: output, live views, keys, help pages, Ctrl-C, and test support.
 #![forbid(unsafe_code)]
 
 mod bar;

@@ -1,4 +1,4 @@
-//! Lines that are printed by a thread: a reader that does not read (`ucom run --json | less`) must not hold what they are about.
+//! Lines printed by a thread: a blocked reader (`ucom run --json | less`) must not block the control loop.
 
 use std::collections::VecDeque;
 use std::io::Write;
@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 use crate::bar::Stderr;
 use crate::stdout;
 
-/// Most lines that wait.
+/// Largest number of waiting lines.
 const WAITING: usize = 1000;
-/// At the end, a reader that takes nothing for so long is not waited for.
+/// Longest wait for a blocked reader at the end.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// A queue of lines and the thread that prints them.
@@ -29,11 +29,11 @@ struct Shared {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<String>,
-    /// One has been taken and is not written yet.
+    /// A line has been taken and is not written yet.
     writing: bool,
     written: u64,
     dropped: u64,
-    /// The reader has gone.
+    /// The reader has disconnected.
     gone: bool,
     closed: bool,
 }
@@ -45,12 +45,12 @@ impl Shared {
 }
 
 impl Lines {
-    /// To stdout.
+    /// Prints to stdout.
     pub fn stdout() -> std::io::Result<Self> {
         Self::to(std::io::stdout(), true)
     }
 
-    /// To stderr, above a bar that is there.
+    /// Prints to stderr, above a bar if there is one.
     pub fn stderr() -> std::io::Result<Self> {
         Self::to(Stderr, false)
     }
@@ -64,12 +64,12 @@ impl Lines {
         Ok(Self { shared, is_stdout, finished: false })
     }
 
-    /// Prints a line when its turn comes; drops it when too many wait.
+    /// Prints a line when its turn comes; drops the line if too many wait.
     pub fn push(&self, line: String) {
         self.add(line, WAITING);
     }
 
-    /// The same for a line that must not be dropped, of which there are few.
+    /// Like [`Self::push`], for a rare line that must not be dropped.
     pub fn push_always(&self, line: String) {
         self.add(line, usize::MAX);
     }
@@ -88,12 +88,12 @@ impl Lines {
         self.shared.changed.notify_all();
     }
 
-    /// The reader has gone (`ucom so | head`), or what it reads from takes no more.
+    /// Returns `true` if the reader has disconnected (`ucom so | head`), or the output accepts no more.
     pub fn gone(&self) -> bool {
         self.shared.lock().gone
     }
 
-    /// Prints what waits, as long as it is read. Returns how many lines nobody will see.
+    /// Prints the waiting lines while they are read. Returns the number of lines that stay unread.
     pub fn finish(&mut self) -> u64 {
         self.finished = true;
         let mut state = self.shared.lock();
@@ -159,7 +159,7 @@ mod tests {
 
     use super::*;
 
-    /// Takes a line only on command; an error once the other side has gone.
+    /// Takes a line only on command; fails after the other side has disconnected.
     struct Slow(SyncSender<Vec<u8>>);
 
     impl Write for Slow {
@@ -177,13 +177,13 @@ mod tests {
         (Lines::to(Slow(sender), false).unwrap(), receiver)
     }
 
-    /// Nobody reads: pushing goes on, what is too much is counted, and the end does not wait for ever.
+    /// With a blocked reader, pushing continues, excess lines are counted, and the end does not wait for ever.
     #[test]
     fn a_reader_that_does_not_read_stops_nothing() {
         let (mut lines, _reader) = slow();
         (0..3 * WAITING).for_each(|i| lines.push(i.to_string()));
         lines.push_always("end".into());
-        // One may be with the thread already.
+        // The thread may already have taken one line.
         let unseen = lines.finish();
         assert_eq!(unseen, 3 * WAITING as u64 + 1);
     }

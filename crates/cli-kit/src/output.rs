@@ -1,7 +1,8 @@
-//! Where words go: results to stdout as text or JSON, progress and logs to stderr.
+//! Output: results to stdout as text or JSON, progress and logs to stderr.
 //!
-//! With JSON, a command that takes its time prints events to stderr while it works, one object a line with the key `event`; stdout has
-//! its result alone. A reader that does not read holds no command: events wait in a queue and are dropped where too many do.
+//! With JSON, a long command prints events to stderr while it works, one object per line with the key `event`; stdout
+//! has only its result. A blocked reader does not block a command: events wait in a queue, and excess events are
+//! dropped.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -16,16 +17,16 @@ use crate::lines::Lines;
 use crate::stdout;
 use crate::{Failure, error_object};
 
-/// Events of this process that wait for their reader; none where it streams nothing.
+/// Events of this process that wait for their reader; empty if the process streams no events.
 static STREAM: OnceLock<Mutex<Stream>> = OnceLock::new();
 
-/// The lines of a stream, and when it began.
+/// Lines of a stream, and its start time.
 struct Stream {
     lines: Lines,
     began: Instant,
 }
 
-/// How a command prints.
+/// Output format of a command.
 #[derive(Clone, Copy, Debug)]
 pub struct Output {
     program: &'static str,
@@ -33,17 +34,17 @@ pub struct Output {
 }
 
 impl Output {
-    /// The program's name before what went wrong; text, or JSON objects.
+    /// Creates an output with the program's name before errors; text, or JSON objects.
     pub fn new(program: &'static str, json: bool) -> Self {
         Self { program, json }
     }
 
-    /// JSON was asked for.
+    /// Returns `true` if JSON was requested.
     pub fn is_json(&self) -> bool {
         self.json
     }
 
-    /// From now on events are printed as they happen, and notes as events, where JSON was asked for.
+    /// Starts to print events as they happen, and notes as events, if JSON was requested.
     pub fn stream(&self) -> std::io::Result<()> {
         if self.json && STREAM.get().is_none() {
             let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stderr()?, began: Instant::now() }));
@@ -51,7 +52,7 @@ impl Output {
         Ok(())
     }
 
-    /// Something that happens, with the seconds since the stream began; nothing where no stream was begun.
+    /// Prints an event, with the seconds since the stream began; does nothing without a stream.
     pub fn event(&self, name: &str, value: Value) {
         let Some(stream) = STREAM.get() else { return };
         let stream = stream.lock().unwrap_or_else(PoisonError::into_inner);
@@ -63,13 +64,13 @@ impl Output {
         stream.lines.push(event.to_string());
     }
 
-    /// Prints what still waits of a stream, as long as it is read.
+    /// Prints the waiting lines of a stream, while they are read.
     pub fn finish() {
         let Some(stream) = STREAM.get() else { return };
         stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
     }
 
-    /// A result as it is printed: `value` as one line of JSON, or the text.
+    /// Formats a result: `value` as one line of JSON, or the text.
     pub fn words(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> String {
         if self.json {
             serde_json::to_string(value)
@@ -79,14 +80,14 @@ impl Output {
         }
     }
 
-    /// Prints a result: `value` as one line of JSON, or the text, which is broken between words on a terminal.
+    /// Prints a result: `value` as one line of JSON, or the text, which is wrapped between words on a terminal.
     pub fn result(&self, value: &impl Serialize, text: impl FnOnce() -> String) {
         let width = if self.json { None } else { stdout_width() };
         let line = within(&self.words(value, text), width);
         Self::bytes(format!("{}\n", line.trim_end()).as_bytes());
     }
 
-    /// Prints a result that is a file of its own, as it is.
+    /// Prints a result that is a complete file, unchanged.
     pub fn bytes(bytes: &[u8]) {
         suspended(|| {
             let mut stdout = std::io::stdout().lock();
@@ -96,22 +97,24 @@ impl Output {
         });
     }
 
-    /// Remembers why something that was meant for stdout was lost. A reader that has gone (`… | head`) has seen what it wanted: that is no loss.
+    /// Remembers why output for stdout was lost. A reader that has disconnected (`… | head`) has read enough: that is
+    /// not a loss.
     pub fn lose(why: &std::io::Error) {
         stdout::lose(why);
     }
 
-    /// Nothing printed from now on is read: a command that only prints may end.
+    /// Returns `true` if further output has no reader: a command that only prints may end.
     pub fn gone() -> bool {
         stdout::is_gone()
     }
 
-    /// Why a result could not be printed, where that was so: the command did its work, and nobody can read of it.
+    /// Returns the reason why a result could not be printed, if that happened: the command did its work, but the user
+    /// cannot read the result.
     pub fn lost() -> Option<&'static str> {
         stdout::lost()
     }
 
-    /// One line of a log. A terminal that has gone is no reason to leave a machine alone: what cannot be printed is dropped.
+    /// Prints one line of a log. A lost terminal must not abandon a machine: unprintable text is dropped.
     pub fn note(&self, text: impl std::fmt::Display) {
         if STREAM.get().is_some() {
             self.event("note", json!({ "text": text.to_string().trim() }));
@@ -121,7 +124,8 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{text}")));
     }
 
-    /// One line of a log before the command begins: a note, or with JSON an event `note`, since the command may stream events.
+    /// Prints one line of a log before the command begins: a note, or with JSON an event `note`, because the command
+    /// may stream events.
     pub(crate) fn log(&self, text: &str) {
         if !self.json {
             return self.note(text);
@@ -130,22 +134,23 @@ impl Output {
         suspended(|| drop(writeln!(std::io::stderr().lock(), "{event}")));
     }
 
-    /// A bar on stderr; invisible where stderr is no terminal.
+    /// Creates a bar on stderr; invisible if stderr is not a terminal.
     pub fn bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_steps(total, what)
     }
 
-    /// A bar of bytes on stderr, with the words of its owner below it.
+    /// Creates a bar of bytes on stderr, with the text of its owner below it.
     pub fn bytes_bar(&self, total: u64, what: &str) -> ProgressBar {
         bar::of_bytes(total, what)
     }
 
-    /// A bar of a motion of so many milliseconds on stderr, with the words of its owner below it, and the keys below them.
+    /// Creates a bar on stderr for a motion of `total_ms` milliseconds, with the text of its owner below it, and the
+    /// keys below that.
     pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
         bar::of_motion(total_ms, what, keys)
     }
 
-    /// Prints why a command failed.
+    /// Prints the reason of a failed command.
     pub fn failure(&self, failure: &Failure) {
         if self.json {
             let _ = writeln!(std::io::stdout().lock(), "{}", json!({ "error": error_object(failure) }));
@@ -153,7 +158,7 @@ impl Output {
         self.warn(&failure.message, &failure.next.to_string());
     }
 
-    /// What is wrong and what to do next, as it is printed at the end of a command; on a terminal broken between words.
+    /// Prints an error and the next step, as at the end of a command; on a terminal the text is wrapped between words.
     pub fn warn(&self, message: &str, hint: &str) {
         let width = bar::stderr_width();
         self.note(hanging(&format!("{}: ", self.program), message, width));
@@ -163,7 +168,7 @@ impl Output {
     }
 }
 
-/// Text whose long lines are broken between words; rows of tables stay as they are.
+/// Wraps long lines between words; rows of tables stay unchanged.
 fn within(text: &str, width: Option<u16>) -> String {
     let Some(width) = width.filter(|width| *width >= 16) else { return text.to_owned() };
     let lines = text.lines().map(|line| {
@@ -179,7 +184,7 @@ fn within(text: &str, width: Option<u16>) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Text behind a head, its further lines below its first one; as it is where the width is not known.
+/// Formats text after a head, with its further lines aligned to its first one; unchanged if the width is unknown.
 fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
     let Some(room) = width.and_then(|w| w.checked_sub(head.len() as u16 + 1)).filter(|room| *room >= 16)
     else {
@@ -189,7 +194,7 @@ fn hanging(head: &str, text: &str, width: Option<u16>) -> String {
     format!("{head}{}", lines.join(&format!("\n{:1$}", "", head.len())))
 }
 
-/// A number with so many decimals; one that rounds to zero has no sign.
+/// Formats a number with `digits` decimals; a number that rounds to zero has no sign.
 pub fn figure(value: f64, digits: usize) -> String {
     let text = format!("{value:.digits$}");
     match text.strip_prefix('-') {
@@ -198,13 +203,13 @@ pub fn figure(value: f64, digits: usize) -> String {
     }
 }
 
-/// Columns of the terminal on stdout; none where it is no terminal.
+/// Returns the columns of the terminal on stdout; `None` if stdout is not a terminal.
 fn stdout_width() -> Option<u16> {
     std::io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten().map(|size| size.0)
 }
 
-/// Rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right. On a terminal that is too
-/// narrow for all columns the rest of them come below, with the first column again.
+/// Formats rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right. On a
+/// terminal that is too narrow for all columns the remaining ones follow below, with the first column again.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     table_within(head, rows, stdout_width())
 }
@@ -213,7 +218,7 @@ fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> Stri
     let text = whole_table(head, rows);
     let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     let Some(width) = width.filter(|width| usize::from(*width) < widest) else { return text };
-    // As many columns as fit beside the first one; at least one, however narrow it is.
+    // As many columns as fit next to the first one; at least one, for every width.
     for count in (2..head.len()).rev() {
         let rest: Vec<usize> = (count..head.len()).collect();
         let pick = |columns: &[usize]| {

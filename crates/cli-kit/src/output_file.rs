@@ -1,4 +1,4 @@
-//! Files that a command writes: opened before anything is sent or moved, never written over unless that was asked for.
+//! Output files of a command: opened before any frame is sent, never overwritten without a request.
 
 use std::fmt;
 use std::fs::{File, OpenOptions};
@@ -8,22 +8,22 @@ use std::sync::{Mutex, PoisonError};
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Why an output is not written.
+/// Reason why an output is not written.
 #[derive(Debug)]
 pub enum OutputError {
-    /// A file is there already, and writing over it was not asked for.
+    /// The file exists, and overwriting was not requested.
     Exists {
         /// The file.
         path: PathBuf,
     },
-    /// A file that the command reads, or another one that it writes.
+    /// The file is also an input of the command, or another output.
     SameFile {
         /// The file.
         path: PathBuf,
-        /// By its other name.
+        /// Its other name.
         other: PathBuf,
     },
-    /// The system does not open or write it.
+    /// The system cannot open or write it.
     Io {
         /// The file.
         path: PathBuf,
@@ -62,33 +62,33 @@ impl Diagnose for OutputError {
     }
 }
 
-/// Outputs that this process made and has not written yet.
+/// Outputs that this process has created and not written yet.
 static UNWRITTEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Removes outputs that were made and never written, before the process is ended without any `Drop`.
+/// Removes outputs that were created and never written, before the process ends without any `Drop`.
 pub fn abandon() {
     for path in UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
         let _ = std::fs::remove_file(path);
     }
 }
 
-/// The output at `path` is written or gone.
+/// Removes `path` from the unwritten outputs.
 fn settled(path: &Path) {
     UNWRITTEN.lock().unwrap_or_else(PoisonError::into_inner).retain(|p| p != path);
 }
 
-/// An output that is open and still empty, or still what it was. Dropped before it was written, it leaves no trace.
+/// Open output that is still empty or unchanged. If it is dropped before it is written, it leaves no trace.
 pub struct OutputFile {
     path: PathBuf,
     file: File,
-    /// It was not there before.
+    /// `true` if the file did not exist before.
     made: bool,
     written: bool,
 }
 
 impl OutputFile {
-    /// Opens `path` for writing. A file that is there is refused without `overwrite`, and one of `others` (what the command reads, and
-    /// its other outputs) always. To report that nothing was sent is left to commands that send.
+    /// Opens `path` for writing. An existing file is refused without `overwrite`, and one of `others` (inputs of the
+    /// command, and its other outputs) always. Commands that send must report themselves that nothing was sent.
     pub fn open(path: &Path, overwrite: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
@@ -102,7 +102,7 @@ impl OutputFile {
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
             Err(e) => return Err(io(e)),
         }
-        // A pipe or a device holds nothing that could be lost.
+        // A pipe or a device holds no data that could be lost.
         if !overwrite && path.is_file() {
             return Err(OutputError::Exists { path: path.to_owned() });
         }
@@ -110,24 +110,24 @@ impl OutputFile {
         Ok(Self { path: path.to_owned(), file, made: false, written: false })
     }
 
-    /// As people name it.
+    /// Returns the name for users.
     pub fn name(&self) -> String {
         self.path.display().to_string()
     }
 
-    /// Where it is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Writes all of the file.
+    /// Writes the whole file.
     pub fn write(mut self, bytes: impl AsRef<[u8]>) -> Result<(), OutputError> {
         let mut file = self.begin()?;
         let done = file.write_all(bytes.as_ref()).and_then(|()| settle(&file));
         done.map_err(|e| self.failure(e))
     }
 
-    /// A handle to write with; what was in the file goes only now. [`settle`] it at the end.
+    /// Returns a handle for writing, and discards the old content. Call [`settle`] at the end.
     pub fn begin(&mut self) -> Result<File, OutputError> {
         self.written = true;
         settled(&self.path);
@@ -143,18 +143,18 @@ impl OutputFile {
         Ok(file)
     }
 
-    /// What is at its path now was put there by other means, as by renaming a file that is whole.
+    /// Marks the output as written: other code created the file at its path, for example by renaming a complete file.
     pub fn is_written(mut self) {
         self.written = true;
         settled(&self.path);
     }
 
-    /// What was written is of no use to anyone: dropped like this, the output leaves no trace if it was not there before.
+    /// Marks the content as useless: if dropped in this state, the output leaves no trace, unless it existed before.
     pub fn is_worthless(&mut self) {
         self.written = false;
     }
 
-    /// Why writing failed.
+    /// Returns the reason why writing failed.
     pub fn failure(&self, source: io::Error) -> OutputError {
         OutputError::Io { path: self.path.clone(), source }
     }
@@ -169,17 +169,17 @@ impl Drop for OutputFile {
     }
 }
 
-/// Waits until the bytes are on the disk: a full one may show only then.
+/// Waits until the bytes are on the disk: a full disk may show only then.
 pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
 }
 
-/// Both names lead to the same file that is there.
+/// Returns `true` if both names lead to the same existing file.
 fn same(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b) || one_inode(a, b)
 }
 
-/// A file of two names (a hard link) is one file.
+/// Returns `true` for two names (hard links) of one file.
 #[cfg(unix)]
 fn one_inode(a: &Path, b: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -187,7 +187,7 @@ fn one_inode(a: &Path, b: &Path) -> bool {
     number(a).is_some_and(|n| number(b) == Some(n))
 }
 
-/// Only Unix has numbers for files that the standard library shows.
+/// The standard library has file numbers on Unix only.
 #[cfg(not(unix))]
 fn one_inode(_: &Path, _: &Path) -> bool {
     false
@@ -206,7 +206,7 @@ mod tests {
         std::fs::write(&input, "read").unwrap();
         let code =
             |result: Result<OutputFile, OutputError>| result.err().map(|e| (exit::of(e.kind()), e.code()));
-        // Commands without a port or bus send nothing whatever happens.
+        // Commands without a port or bus send no frames in any case.
         let there = OutputFile::open(&old, false, &[]).err().unwrap();
         assert!(there.to_string().ends_with("is there already"), "{there}");
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));

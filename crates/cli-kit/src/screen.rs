@@ -1,4 +1,4 @@
-//! The whole terminal as a live view: entered, drawn, and left as it was however the command ends.
+//! The whole terminal as a live view, restored after any end of the command.
 
 use std::io::{IsTerminal, Stdout, Write};
 use std::mem::ManuallyDrop;
@@ -12,10 +12,10 @@ use ratatui::{Frame, Terminal};
 
 use crate::keys::{Key, Keys};
 
-/// A view is shown.
+/// `true` while a view is shown.
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Puts the terminal back as it was, whatever changed it. Does nothing the second time; a terminal that has gone is no matter.
+/// Restores the terminal after any change. A second call has no effect; a lost terminal is ignored.
 pub fn restore_terminal() {
     if SHOWN.swap(false, Ordering::Relaxed) {
         let mut stdout = std::io::stdout();
@@ -24,16 +24,17 @@ pub fn restore_terminal() {
     crate::keys::restore();
 }
 
-/// The terminal of a view, with the keys of the person at it.
+/// Terminal of a view, with the keys of its user.
 pub struct Screen {
-    /// Never dropped: it would print, and panic where the terminal has gone.
+    /// Never dropped: it would print, and panic if the terminal is lost.
     terminal: ManuallyDrop<Terminal<CrosstermBackend<Stdout>>>,
     keys: Keys,
     gone: bool,
 }
 
 impl Screen {
-    /// Takes the terminal; `None` where stdin or stdout is none, or this process is in the background: lines are printed there.
+    /// Takes the terminal; `None` if stdin or stdout is not a terminal, or this process is in the background: the
+    /// caller then prints lines.
     pub fn take() -> std::io::Result<Option<Self>> {
         if !std::io::stdout().is_terminal() {
             return Ok(None);
@@ -53,17 +54,17 @@ impl Screen {
         Ok(Some(screen))
     }
 
-    /// Keys pressed since the last look.
+    /// Returns the keys pressed since the last call.
     pub fn pressed(&mut self) -> Vec<Key> {
         self.keys.pressed()
     }
 
-    /// Draws a picture. One that cannot be drawn is the last.
+    /// Draws a view. After a failure no further view is drawn.
     pub fn draw(&mut self, picture: impl FnOnce(&mut Frame<'_>)) {
         self.gone |= self.terminal.draw(picture).is_err();
     }
 
-    /// Nobody sees the view any more.
+    /// Returns `true` if the view has lost its terminal.
     pub fn gone(&self) -> bool {
         self.gone || self.keys.gone()
     }

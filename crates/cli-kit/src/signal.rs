@@ -1,10 +1,11 @@
-//! Ctrl-C and its kin as a flag that loops look at.
+//! Ctrl-C and similar signals as a flag that loops check.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Signals that ask a command to end: Ctrl-C, `kill`, and the end of its terminal, unless it was started to outlive that (`nohup`).
+/// Returns the signals that end a command: Ctrl-C, `kill`, and the end of its terminal, unless it was started to
+/// outlive that (`nohup`).
 fn signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     #[cfg(unix)]
@@ -14,7 +15,7 @@ fn signals() -> impl Iterator<Item = i32> {
     [SIGINT, SIGTERM].into_iter().chain(hangup)
 }
 
-/// This process was started with SIGHUP ignored, where the system reports it.
+/// Returns `true` if this process was started with SIGHUP ignored, and the system reports it.
 #[cfg(unix)]
 fn hangup_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -22,9 +23,9 @@ fn hangup_ignored() -> bool {
     mask.and_then(|digits| u64::from_str_radix(digits.trim(), 16).ok()).is_some_and(|mask| mask & 1 != 0)
 }
 
-/// How often the thread of [`Stop::listen_with`] looks.
+/// Period at which the thread of [`Stop::listen_with`] checks for signals.
 const LOOK: Duration = Duration::from_millis(10);
-/// Signals so close together are one.
+/// Time within which several signals count as one.
 const ONE_PRESS: Duration = Duration::from_millis(100);
 
 /// Set by SIGINT, SIGTERM or SIGHUP.
@@ -32,21 +33,23 @@ const ONE_PRESS: Duration = Duration::from_millis(100);
 pub struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// From now on SIGINT, SIGTERM and SIGHUP only set the flag; the second one ends the process.
+    /// Starts to listen: SIGINT, SIGTERM and SIGHUP only set the flag; the second one ends the process.
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
-            // The second Ctrl-C ends the process whatever it does: registered first, because it must see the flag of the last time.
+            // The second Ctrl-C ends the process in every state: registered first, because it must see the flag of the
+            // last time.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }
         Ok(Self(flag))
     }
 
-    /// From now on the first SIGINT, SIGTERM or SIGHUP sets the flag. The second one ends the process, whatever the rest of it does,
-    /// with the exit code that `last_words` returns and the terminal as it was; it runs in a thread of its own and may print.
+    /// Starts to listen: the first SIGINT, SIGTERM or SIGHUP sets the flag. The second one ends the process in every
+    /// state, with the exit code that `last_words` returns and with the terminal restored; `last_words` runs in a
+    /// separate thread and may print.
     ///
-    /// Signals that follow each other within 0.1 s are one: a terminal and a wrapper may both send theirs.
+    /// Signals that follow each other within 0.1 s count as one: a terminal and a wrapper may both send theirs.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
         let came = Arc::new(AtomicBool::new(false));
         for signal in signals() {
@@ -70,7 +73,7 @@ impl Stop {
         Ok(Self(asked))
     }
 
-    /// It was asked to end.
+    /// Returns `true` if a signal has requested the end.
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

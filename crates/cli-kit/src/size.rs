@@ -1,10 +1,10 @@
 //! Sizes of files and folders, as options take them.
 
-/// Bytes, as `500MB`, `2 GB`, `1GiB` or a plain number: `least` or more.
+/// Parses a number of bytes, as `500MB`, `2 GB`, `1GiB` or a plain number: `least` or more.
 ///
 /// # Errors
 ///
-/// The text is no size, or less than that; the error is for people.
+/// An error for users if the text is not a valid size, or the size is below `least`.
 pub fn size(text: &str, least: u64) -> Result<u64, String> {
     let text = text.trim();
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());

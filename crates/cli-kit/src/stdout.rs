@@ -1,17 +1,18 @@
-//! What has become of stdout: held by a reader that does not read, gone, or the reason why a result was lost.
+//! State of stdout: blocked by a reader, closed, or the reason why a result was lost.
 
 use std::io::{Error, ErrorKind};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Why the first result that was lost could not be printed. A command goes on without its output; its exit code shows it in the end.
+/// Reason why the first lost result could not be printed. A command continues without its output; its exit code shows
+/// the loss at the end.
 static LOST: OnceLock<String> = OnceLock::new();
-/// A write to stdout has failed, for whatever reason.
+/// `true` after a failed write to stdout, for any reason.
 static GONE: AtomicBool = AtomicBool::new(false);
-/// Stdout is held by a line that nobody reads.
+/// `true` while stdout is blocked by a line without a reader.
 static STUCK: AtomicBool = AtomicBool::new(false);
 
-/// A write has failed. A reader that has gone has seen what it wanted: that is no loss.
+/// Records a failed write. A reader that has disconnected has read enough: that is not a loss.
 pub(crate) fn lose(why: &Error) {
     GONE.store(true, Ordering::Relaxed);
     if why.kind() != ErrorKind::BrokenPipe {
@@ -19,22 +20,22 @@ pub(crate) fn lose(why: &Error) {
     }
 }
 
-/// A write has failed before.
+/// Returns `true` after a failed write.
 pub(crate) fn is_gone() -> bool {
     GONE.load(Ordering::Relaxed)
 }
 
-/// Why a result was lost, where one was.
+/// Returns the reason why a result was lost, if it was.
 pub(crate) fn lost() -> Option<&'static str> {
     LOST.get().map(String::as_str)
 }
 
-/// From now on whoever prints waits for a reader that does not read.
+/// Marks stdout as blocked: from now on printing code waits for a reader that does not read.
 pub(crate) fn set_stuck() {
     STUCK.store(true, Ordering::Relaxed);
 }
 
-/// Whether whoever prints to stdout now would wait for ever.
+/// Returns `true` if printing to stdout would now wait for ever.
 pub fn stdout_is_stuck() -> bool {
     STUCK.load(Ordering::Relaxed)
 }

@@ -1,4 +1,4 @@
-//! Reading the command line, with wrong usage as an answer for programs where they asked for one.
+//! Command-line parsing, with a JSON answer for wrong usage if a program requested JSON.
 
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
@@ -11,17 +11,17 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use crate::variables::{Variables, on_off};
 use crate::{Failure, Output, error_object, exit, print_within};
 
-/// A command waits no longer than this for the reader of what is printed before it begins.
+/// Longest wait of a command for the reader of text that is printed before it begins.
 const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 
-/// The command line of this process; otherwise help, version or wrong usage is printed, and the exit code is to be returned. Wrong
-/// usage is one JSON object on stdout where `--json` or its variable asks for JSON, besides the words on stderr. Variables that set
-/// an option of the command are named on stderr.
+/// Parses the command line of this process; otherwise prints help, version or wrong usage, and returns the exit code.
+/// Wrong usage is also one JSON object on stdout if `--json` or its variable requests JSON, in addition to the text on
+/// stderr. Variables that set an option of the command are named on stderr.
 pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Result<Cli, ExitCode> {
     parse_with(program, variables, &[])
 }
 
-/// Like `parse`. `meant` has words that people try as commands, each with the command to use.
+/// Like [`parse`]. `meant` lists words that users try as commands, each with the command to use.
 pub fn parse_with<Cli: Parser>(
     program: &'static str,
     variables: &Variables,
@@ -44,7 +44,7 @@ pub fn parse_with<Cli: Parser>(
             }
             let lines: Vec<String> = report.ignored.into_iter().chain(report.in_effect).collect();
             if !lines.is_empty() {
-                // A stop is not held by a stderr that nobody reads.
+                // A blocked stderr must not delay a Stop.
                 print_within(PRINT_TIMEOUT, move || lines.iter().for_each(|line| out.log(line)));
             }
             return Ok(cli);
@@ -71,7 +71,7 @@ pub fn parse_with<Cli: Parser>(
     Err(ExitCode::from(exit::USAGE))
 }
 
-/// Replaces the parser's guess by the command to use, where a word is known that is no command.
+/// Replaces the parser's guess by the command to use, if the word is known but not a command.
 fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return };
     let word = word.to_lowercase();
@@ -81,14 +81,14 @@ fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     }
 }
 
-/// The option among the words, as far as options go, or the variable with a value that means yes.
+/// Returns `true` if the words contain the option, or the variable has a value that means yes.
 fn json_is_asked<'a>(words: impl Iterator<Item = &'a OsString>, variable: Option<&OsStr>) -> bool {
     let by_variable = variable.is_some_and(|v| on_off(&v.to_string_lossy()) == Ok(true));
     let mut options = words.take_while(|word| *word != "--");
     by_variable || options.any(|word| word == "--json")
 }
 
-/// What is wrong and what helps, from the parser's words.
+/// Returns the error and the hint, from the parser's words.
 fn words(e: &clap::Error, program: &str) -> (String, String) {
     if e.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         return ("a command is missing".into(), format!("`{program} --help` lists the commands"));

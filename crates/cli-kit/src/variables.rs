@@ -1,9 +1,9 @@
-//! Environment variables that set options: the rule for on and off, a line about those that decide something, and words about those
-//! that are not read any more.
+//! Environment variables that set options: the values for on and off, a line about variables in effect, and notes about
+//! retired variables.
 //!
-//! Only options that name a place, a file or a format have a variable, and a few harmless numbers. An option that moves, resets,
-//! numbers, programs, enables outputs, sets bits, answers a question or overrules a check has none: a shell keeps a variable for
-//! commands that it was not meant for. `audit` checks this for all options of a command line.
+//! Only options that name a place, a file or a format have a variable, and a few harmless numbers. Options that move,
+//! reset, number, program, enable outputs, set bits, answer a question or override a check have none, because a shell
+//! keeps a variable for later commands. `audit` checks this for all options of a command line.
 
 #[cfg(feature = "trial")]
 pub mod audit;
@@ -17,7 +17,7 @@ use clap::{Arg, ArgMatches, Command};
 
 use crate::Failure;
 
-/// Reads an on/off variable. Letter case does not count; an empty one is off, as if it were not set.
+/// Reads an on/off variable. Letter case is ignored; an empty value means off, like an unset variable.
 pub fn on_off(text: &str) -> Result<bool, String> {
     match text.to_ascii_lowercase().as_str() {
         "1" | "true" | "yes" | "on" => Ok(true),
@@ -31,13 +31,13 @@ pub fn on_off(text: &str) -> Result<bool, String> {
 pub struct Variables {
     /// The variable of `--json`.
     pub json: &'static str,
-    /// Variables that are not read any more.
+    /// Retired variables.
     pub retired: &'static [Retired],
     /// Commands without a device: they do not use the global options of the link.
     pub offline: &'static [&'static str],
 }
 
-/// A variable that set an option once.
+/// Retired variable that set an option in an earlier version.
 #[derive(Clone, Copy, Debug)]
 pub struct Retired {
     /// Its name.
@@ -46,31 +46,31 @@ pub struct Retired {
     pub command: &'static str,
     /// The long name of the option.
     pub option: &'static str,
-    /// The consequence of not reading it.
+    /// Consequence of ignoring it.
     pub without: Without,
 }
 
-/// What a command does when it ignores a variable that is set.
+/// Effect on a command that ignores a variable that is set.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Without {
-    /// Less than the variable asked for: it goes on, with a note.
+    /// The command does less than the variable requested: it continues, with a note.
     Less,
-    /// Something else or more, as a motion at another speed: it is refused.
+    /// The command does more, or something else, such as a motion at another speed: it is refused.
     Other,
 }
 
 impl Retired {
-    /// A variable that made a command do more.
+    /// Creates a variable that made a command do more.
     pub const fn less(variable: &'static str, command: &'static str, option: &'static str) -> Self {
         Self { variable, command, option, without: Without::Less }
     }
 
-    /// A variable that limited or shaped what a command does.
+    /// Creates a variable that limited or changed the work of a command.
     pub const fn other(variable: &'static str, command: &'static str, option: &'static str) -> Self {
         Self { variable, command, option, without: Without::Other }
     }
 
-    /// The option that it set, if the command has it and does not read this variable for it.
+    /// Returns the option that it set, if the command has it and does not read this variable for it.
     fn option_of<'a>(&self, command: &'a Command, words: &str) -> Option<&'a Arg> {
         let named = self.command.is_empty() || self.command == words;
         let mut options = command.get_arguments().filter(|arg| arg.get_long() == Some(self.option));
@@ -78,18 +78,18 @@ impl Retired {
     }
 }
 
-/// Words about the variables that are set.
+/// Notes about the variables that are set.
 #[derive(Debug, Default)]
 pub(crate) struct Report {
     /// A line for the variables that set an option of this command.
     pub in_effect: Option<String>,
     /// A line for each variable that is ignored.
     pub ignored: Vec<String>,
-    /// The end of a command that would do something else without a variable.
+    /// Failure of a command that would do something else without a variable.
     pub refused: Option<Failure>,
 }
 
-/// A command of the command line.
+/// Command of the command line.
 struct Chosen<'a> {
     program: &'static str,
     command: &'a Command,
@@ -98,14 +98,14 @@ struct Chosen<'a> {
 }
 
 impl Chosen<'_> {
-    /// As it is typed, in quotation marks of the docs.
+    /// Returns the command as typed, in quotation marks of the docs.
     fn typed(&self) -> String {
         format!("`{}`", format!("{} {}", self.program, self.words).trim())
     }
 }
 
 impl Variables {
-    /// What to print about the variables of a command line that was read. `value` is the environment.
+    /// Returns the notes about the variables of a parsed command line. `value` is the environment.
     pub(crate) fn report(
         &self,
         program: &'static str,
@@ -147,8 +147,8 @@ impl Variables {
         }
     }
 
-    /// What to print about variables where the command line could not be read: those that an option in the error was set by, and those
-    /// that are not read any more.
+    /// Returns the notes about variables if the command line could not be parsed: the variables that set an option in
+    /// the error, and the retired ones.
     pub(crate) fn report_error(
         &self,
         program: &'static str,
@@ -181,7 +181,7 @@ impl Variables {
         lines
     }
 
-    /// Variables that are set, belonged to options of this command that are not typed, and are not read any more.
+    /// Returns the retired variables that are set, and that belonged to options of this command that are not typed.
     fn unread(
         &self,
         chosen: &Chosen<'_>,
@@ -215,7 +215,7 @@ impl Variables {
     }
 }
 
-/// A variable that is set and not read any more.
+/// Retired variable that is set.
 struct Unread {
     variable: &'static str,
     value: String,
@@ -240,7 +240,7 @@ impl Unread {
     }
 }
 
-/// The option counts because of its variable: it is not typed, and an on/off variable is on.
+/// Returns `true` if the option is set by its variable: it is not typed, and an on/off variable is on.
 fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
     let id = arg.get_id().as_str();
     arg.get_env().is_some()
@@ -248,7 +248,7 @@ fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
         && (arg.get_action().takes_values() || matches.get_flag(id))
 }
 
-/// The command that the words name, as far as they do.
+/// Returns the command that the words name, as far as they do.
 fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> Chosen<'a> {
     let (mut command, mut words) = (root, Vec::new());
     for word in typed.iter().take_while(|word| *word != "--") {
@@ -260,7 +260,7 @@ fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> C
     Chosen { program, command, words: words.join(" ") }
 }
 
-/// The options that the error names.
+/// Returns the options that the error names.
 fn options_in(error: &clap::Error) -> Vec<String> {
     let mut all = Vec::new();
     for kind in [ContextKind::InvalidArg, ContextKind::PriorArg] {
@@ -273,7 +273,7 @@ fn options_in(error: &clap::Error) -> Vec<String> {
     all.iter().filter_map(|shown| shown.split([' ', '=']).next().map(str::to_owned)).collect()
 }
 
-/// A value on one line, without characters that act on a terminal.
+/// Returns a value on one line, without control characters.
 fn shown(value: &OsStr) -> String {
     let mut text = String::new();
     for c in value.to_string_lossy().chars() {

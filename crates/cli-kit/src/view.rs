@@ -1,4 +1,4 @@
-//! Parts of live views: what is wrong before anything else, rows that scroll, and a line of keys that is always there.
+//! Parts of live views: errors first, rows that scroll, and a line of keys that is always visible.
 
 use ratatui::Frame;
 use ratatui::style::{Color, Style, Stylize};
@@ -7,12 +7,12 @@ use ratatui::widgets::{Block, BorderType, Padding, Paragraph};
 
 use crate::keys::Key;
 
-/// Columns and rows that a view needs.
+/// Least columns and rows of a view.
 pub const LEAST: (u16, u16) = (40, 12);
-/// Columns and rows from which on there are frames around the parts.
+/// Least columns and rows of a view with frames around its parts.
 pub const FRAMED: (u16, u16) = (80, 24);
 
-/// A frame around a part.
+/// Returns a frame around a part.
 pub fn panel(title: &str) -> Block<'static> {
     let title: String = if title.is_empty() { String::new() } else { format!(" {title} ") };
     Block::bordered()
@@ -22,7 +22,7 @@ pub fn panel(title: &str) -> Block<'static> {
         .padding(Padding::horizontal(1))
 }
 
-/// Broken between words into lines of at most `width` columns; a word that is longer goes on in the next line.
+/// Wraps text between words into lines of at most `width` columns; a longer word continues on the next line.
 pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     let width = usize::from(width.max(1));
     let mut lines: Vec<String> = Vec::new();
@@ -39,8 +39,8 @@ pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     lines
 }
 
-/// Draws, on a terminal that is too small, one sentence with the size that is needed. The keys work all the same, and the words name
-/// the one that stops. Returns whether it was so.
+/// Draws one sentence with the required size, if the terminal is too small. The keys still work, and the sentence names
+/// the one that stops. Returns `true` if the terminal is too small.
 pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     let area = frame.area();
     if area.width >= LEAST.0 && area.height >= LEAST.1 {
@@ -55,22 +55,22 @@ pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     true
 }
 
-/// What is wrong and the next command.
+/// Errors and the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Trouble {
-    /// Each in words of its own, the one that the others follow from first.
+    /// Text of each cause; the cause of the others comes first.
     pub causes: Vec<String>,
-    /// Not as it should be, and no reason to stop.
+    /// Defects that do not stop the operation.
     pub warnings: Vec<String>,
-    /// The next command; empty: none.
+    /// Next command; empty: none.
     pub next: String,
-    /// What became of the last key.
+    /// Result of the last key.
     pub message: String,
 }
 
 impl Trouble {
-    /// Lines for the head of a view, at most about `most`: as many whole causes as have room, the next command, and what became of
-    /// the last key. The causes that have none come back, to be shown as the first rows of what scrolls.
+    /// Returns lines for the head of a view, at most about `most`: as many whole causes as fit, the next command, and
+    /// the result of the last key. The causes that do not fit are returned as the first rows of the scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));
@@ -91,7 +91,7 @@ impl Trouble {
             .collect();
         let room = most.saturating_sub(foot.len());
         let all: usize = blocks.iter().map(Vec::len).sum();
-        // A line is kept for "and N more", where not all have room.
+        // A line is kept for "and N more" if not all causes fit.
         let room = if all <= room { room } else { room.saturating_sub(1) };
         let mut taken = 0;
         let mut head: Vec<Line<'static>> = Vec::new();
@@ -111,7 +111,7 @@ impl Trouble {
     }
 }
 
-/// How far rows are scrolled.
+/// Scroll position of rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Scroll {
     at: usize,
@@ -120,18 +120,18 @@ pub struct Scroll {
 }
 
 impl Scroll {
-    /// So many of all rows have room now. Nothing stays empty below the last one.
+    /// Sets how many of all rows are visible. No line below the last one stays empty.
     pub fn fit(&mut self, room: usize, rows: usize) {
         (self.room, self.rows) = (room, rows);
         self.at = self.at.min(rows.saturating_sub(room));
     }
 
-    /// The row that is shown first.
+    /// Returns the first visible row.
     pub fn first(&self) -> usize {
         self.at
     }
 
-    /// Scrolls, where the key asks for it.
+    /// Scrolls, if the key requests it.
     pub fn key(&mut self, key: Key) {
         let page = self.room.max(1) as isize;
         let by = match key {
@@ -147,7 +147,7 @@ impl Scroll {
         self.fit(self.room, self.rows);
     }
 
-    /// `↑↓ 3-5 of 10` where not all have room.
+    /// Returns `↑↓ 3-5 of 10` if not all rows are visible.
     pub fn place(&self) -> String {
         if self.rows <= self.room {
             return String::new();
@@ -170,7 +170,7 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// No cause is cut in its middle; those without room are counted, and are the first rows of what scrolls.
+    /// No cause is cut; causes that do not fit are counted, and are the first rows of the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {
@@ -190,7 +190,7 @@ mod tests {
         let (head, rest) = trouble.lines(20, 5);
         assert_eq!(text(&head), [&all[..2], &["and 3 more, below", "next: jtc recover"]].concat());
         assert_eq!(text(&rest), all[2..]);
-        // The first one is whole even where there is no room at all.
+        // The first cause is complete even without any space.
         assert_eq!(text(&trouble.lines(20, 0).0)[..2], all[..2]);
     }
 

@@ -1,9 +1,9 @@
-//! Words that nobody may read: printed, and not waited for.
+//! Output that may have no reader: printed with a timeout.
 
 use std::time::Duration;
 
-/// Prints in a thread of its own, and waits for that no longer than `timeout`: a pipe that nobody reads (`2>&1 | less`)
-/// does not keep the process from ending.
+/// Prints in a separate thread, and waits no longer than `timeout`: a pipe without a reader (`2>&1 | less`) does not
+/// keep the process from ending.
 pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
     let (done, printed) = std::sync::mpsc::channel();
     let spawned = std::thread::Builder::new().name("last words".into()).spawn(move || {
@@ -19,7 +19,7 @@ pub fn print_within(timeout: Duration, print: impl FnOnce() + Send + 'static) {
 mod tests {
     use super::*;
 
-    /// Words without a reader do not keep the process.
+    /// Output without a reader does not keep the process.
     #[test]
     fn words_without_a_reader_are_not_waited_for() {
         let (never, reader) = std::sync::mpsc::channel::<()>();

@@ -1,10 +1,10 @@
-//! A question to the person at the terminal, which an option answers as well.
+//! A question to the user at the terminal, which an option can answer as well.
 
 use cli_kit::{ErrorKind, Failure};
 use std::io::{BufRead, IsTerminal, Write};
 
-/// Asks `question` and goes on only when the answer is `yes`. Without a terminal nobody can be asked: the command is refused, and
-/// `option` is what answers the question beforehand.
+/// Asks `question` and continues only if the answer is `yes`. Without a terminal the command is refused, and the hint
+/// names `option`, which answers the question beforehand.
 pub fn confirm(question: &str, option: &str) -> Result<(), Failure> {
     let refused = |message: String| {
         Failure::new(ErrorKind::Refused, "not-confirmed-by-person", message)

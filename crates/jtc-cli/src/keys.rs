@@ -1,13 +1,13 @@
-//! What keys ask for while an arm moves.
+//! Requests by keys while an arm moves.
 
 use cli_kit::{Key, Keys};
 
-/// What the person wants of the motion.
+/// Request of the user for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
     /// `s`: stop on the path.
     Stop,
-    /// Space: pause, or go on after a pause.
+    /// Space: pause, or resume after a pause.
     PauseOrResume,
     /// `+`: faster.
     Faster,
@@ -15,17 +15,17 @@ pub enum Wish {
     Slower,
 }
 
-/// What the keys do, for the person at the terminal.
+/// Key help for the user at the terminal.
 pub const HELP: &str = "keys: space pauses, s stops, Ctrl-C ends";
 
-/// The same where the controller can change the speed of a motion.
+/// Like [`HELP`], if the controller can change the speed of a motion.
 pub const HELP_WITH_SPEED: &str = "keys: space pauses, s stops, + - speed, Ctrl-C ends";
 
-/// Why there is no other speed, and what to do.
+/// Message if the speed cannot be changed, with the next step.
 pub const NO_SPEED: &str = "this controller has no command to change the speed of a motion: s stops it, and `jtc traj run FILE \
                             --speed PCT` runs it at another";
 
-/// The strongest wish of keys pressed since the last look.
+/// Returns the strongest request of the keys pressed since the last call.
 pub fn wish(keys: &mut Keys) -> Option<Wish> {
     strongest(&keys.pressed())
 }
@@ -37,7 +37,7 @@ fn strongest(keys: &[Key]) -> Option<Wish> {
     } else if pressed(&[' ']) {
         Some(Wish::PauseOrResume)
     } else {
-        // On many keyboards the same keys without shift.
+        // On many keyboards the same keys without Shift.
         let faster = pressed(&['+', '=']).then_some(Wish::Faster);
         faster.or_else(|| pressed(&['-', '_']).then_some(Wish::Slower))
     }

@@ -1,4 +1,4 @@
-//! The way to the controller: the port named, or the only one found; itself, or the agent that owns it.
+//! Link to the controller: the named port, or the only one found; the port itself, or the agent that owns it.
 use cli_kit::{ErrorKind, Failure};
 use jtc_agent::access::Tokens;
 use jtc_client::agents::{Registered, is_same_port, owner_of, registered};
@@ -25,13 +25,13 @@ impl LinkArgs {
         self.open_with(None)
     }
 
-    /// The same; `policy` is what becomes of a motion when this program goes, which needs an agent.
+    /// Like [`Self::open`]; `policy` tells the agent what to do with a motion when this program disconnects.
     pub fn open_with(&self, policy: Option<&'static str>) -> Result<LinkPort, Failure> {
         Ok(self.open_as(policy, true)??)
     }
 
-    /// Opens it for a Stop or a Pause, for which an agent on this computer needs no token: one that it does not know keeps neither away. The
-    /// inner error is that of a serial port which no agent of this user owns.
+    /// Opens the link for a Stop or a Pause, for which an agent on this computer needs no token: even an unknown token
+    /// prevents neither. The inner error is that of a serial port that no agent of this user owns.
     pub fn open_to_halt(&self) -> Result<Result<LinkPort, PortError>, Failure> {
         self.open_as(None, true).or_else(|error| match error.kind {
             // The agent does not answer: a second attempt would only take time.
@@ -71,7 +71,8 @@ impl LinkArgs {
         Ok(Ok(Box::new(port)))
     }
 
-    /// How this program presents itself to an agent. A token goes to agents of this user only, and where its file was named.
+    /// Returns how this program presents itself to an agent. A token is sent only to agents of this user, and if its
+    /// file was named.
     fn options(
         &self,
         agent: Option<&Registered>,
@@ -85,12 +86,12 @@ impl LinkArgs {
         Ok(Options { name: who(), token, policy, certificates })
     }
 
-    /// A conversation over it.
+    /// Opens a session over it.
     pub fn session(&self) -> Result<Session<LinkPort>, Failure> {
         Ok(Session::new(self.open()?))
     }
 
-    /// The serial port itself, for the one who is to own it.
+    /// Opens the serial port itself, for the program that will own it.
     pub fn own(&self) -> Result<SerialPort, Failure> {
         let name = self.name()?;
         if is_agent(&name) {
@@ -106,7 +107,7 @@ impl LinkArgs {
     }
 }
 
-/// What others see of this program: its command, and who runs it.
+/// Returns the name of this program for other clients: its command and its user.
 pub fn who() -> String {
     let command = std::env::args().skip(1).find(|word| !word.starts_with('-')).unwrap_or_default();
     match std::env::var("USER").or_else(|_| std::env::var("LOGNAME")) {
@@ -115,7 +116,7 @@ pub fn who() -> String {
     }
 }
 
-/// It is the address of an agent, and no port of this computer.
+/// Returns `true` for the address of an agent, `false` for a port of this computer.
 fn is_agent(name: &str) -> bool {
     name.starts_with("http://") || name.starts_with("https://")
 }

@@ -1,4 +1,4 @@
-//! The person who watches an arm move: keys, Ctrl-C, and the words at a sudden end.
+//! User who watches an arm move: keys, Ctrl-C, and the message at a sudden end.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -13,10 +13,10 @@ use crate::keys::{HELP, HELP_WITH_SPEED, NO_SPEED, Wish, wish};
 use crate::progress::Progress;
 use cli_kit::output_file;
 
-/// How long the last words may take: a reader that takes nothing holds no command.
+/// Longest time for the last message: a blocked reader does not block the command.
 const LAST_WORDS: Duration = Duration::from_millis(300);
 
-/// At the second signal: leaves no empty file, reports why it ended, and returns the exit code.
+/// Handles the second signal: removes empty files, reports the reason of the end, and returns the exit code.
 pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> u8 {
     output_file::abandon();
     let (done, written) = mpsc::channel();
@@ -29,29 +29,29 @@ pub fn ended_at_once(out: Output, message: &'static str, hint: &'static str) -> 
     FAULT
 }
 
-/// Speeds on the path that the keys go through, in percent.
+/// Speed steps of the keys on the path, in percent.
 const SPEEDS: [u8; 10] = [5, 10, 20, 30, 40, 50, 60, 70, 85, 100];
 
-/// Wishes of the person, asked for at each status.
+/// Requests of the user, read at each status.
 pub struct Operator<'a> {
-    /// Where words go.
+    /// Output of messages.
     pub out: &'a Output,
-    /// What programs receive.
+    /// Events for programs.
     pub progress: Progress,
     stop: Stop,
-    /// Only while the arm moves: otherwise the terminal is as it was.
+    /// Keyboard input, only while the arm moves: otherwise the terminal is unchanged.
     keys: Option<Keys>,
     moving: Arc<AtomicBool>,
     stopping: bool,
-    /// Trajectory state that was announced last.
+    /// Last announced trajectory state.
     announced: Option<Code<TrajectoryState>>,
-    /// Speed override in percent, where the controller has one.
+    /// Speed override in percent, if the controller has one.
     pub speed: Option<u8>,
 }
 
 impl<'a> Operator<'a> {
-    /// From now on the first SIGINT, SIGTERM or SIGHUP is a wish to end; the second one ends the process at once, with the terminal
-    /// as it was and words about the arm.
+    /// Starts to listen: the first SIGINT, SIGTERM or SIGHUP requests the end. The second one ends the process at once,
+    /// with the terminal restored and a message about the arm.
     pub fn listen(out: &'a Output, progress: &Progress) -> Result<Self, Failure> {
         let moving = Arc::new(AtomicBool::new(false));
         let (its_moving, its_out) = (Arc::clone(&moving), *out);
@@ -78,12 +78,13 @@ impl<'a> Operator<'a> {
         })
     }
 
-    /// The command must end. A Stop counts even if the motion reached its end before it: no other one follows.
+    /// Returns `true` if the command must end. A Stop counts even if the motion ended before it, because no other
+    /// motion follows.
     pub fn wants_the_end(&self) -> bool {
         self.stop.asked() || self.stopping
     }
 
-    /// From now on keys count.
+    /// Starts to read keys.
     pub fn motion_begins(&mut self) {
         self.moving.store(true, Ordering::Relaxed);
         self.announced = None;
@@ -92,7 +93,7 @@ impl<'a> Operator<'a> {
             return;
         }
         match draws_bars() {
-            // They stand below the bar.
+            // The keys are shown below the bar.
             Ok(()) if !self.out.is_json() => {}
             Err(Some((columns, rows))) => self.out.note(format_args!(
                 "{}: the progress bar needs {} columns and {} rows, the terminal has {columns} and {rows}",
@@ -104,7 +105,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// The keys as they stand below a bar; empty where none count.
+    /// Returns the keys as shown below a bar; empty if no keys are read.
     pub fn keys(&self) -> &'static str {
         match (&self.keys, self.speed) {
             (None, _) => "",
@@ -113,26 +114,27 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// From now on they do not.
+    /// Stops reading keys.
     pub fn motion_ended(&mut self) {
         self.moving.store(false, Ordering::Relaxed);
         self.keys = None;
     }
 
-    /// What the person wants of the motion.
+    /// Returns the request of the user for the motion.
     pub fn wish(&mut self, status: &Status) -> Flow {
         if status.trajectory.is_in(&[TrajectoryState::Pause, TrajectoryState::Execute])
             && self.announced != Some(status.trajectory)
-            // Which ends the run, and has its own words.
+            // A held stop ends the run and has its own message.
             && !status.is_held_stop()
         {
             let before = self.announced.replace(status.trajectory);
             match (status.trajectory == TrajectoryState::Pause, &self.keys) {
                 (true, Some(_)) => self.out.note("paused; space goes on"),
                 (false, Some(_)) => self.out.note("moving"),
-                // It begins.
+                // The motion begins.
                 (_, None) if before.is_none() => {}
-                // Another program has paused it, or the controller, which heard nothing from this one for too long (J-59).
+                // Another program has paused the motion, or the controller did after a timeout without frames of this
+                // program (J-59).
                 (true, None) => {
                     self.out.note("paused; `jtc traj resume` goes on, `jtc traj stop` ends the motion");
                 }
@@ -154,7 +156,7 @@ impl<'a> Operator<'a> {
         }
     }
 
-    /// A step up or down.
+    /// Requests a step up or down.
     fn another_speed(&mut self, wish: Wish) -> Flow {
         let Some(speed) = &mut self.speed else {
             self.out.note(NO_SPEED.replace('`', ""));

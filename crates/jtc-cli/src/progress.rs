@@ -1,4 +1,4 @@
-//! What a command reports to programs while it works: events of `--json`, one object a line on stderr.
+//! Progress reports to programs: events of `--json`, one object per line on stderr.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -11,10 +11,10 @@ use jtc_host::{Session, session, words};
 use jtc_wire::{Code, ControllerState, Status, TrajectoryState};
 use serde_json::{Value, json};
 
-/// The page of `jtc help events`.
+/// Page of `jtc help events`.
 pub const EVENTS_HELP: &str = include_str!("progress.md");
 
-/// Samples and steps of an upload come no faster than this.
+/// Shortest period of samples and of upload events.
 const MODEST: Duration = Duration::from_millis(200);
 
 /// States of controller and trajectory, and errors.
@@ -26,7 +26,7 @@ pub struct Progress(Rc<Inner>);
 
 struct Inner {
     out: Output,
-    /// What was reported last.
+    /// Last report.
     reported: Cell<Option<Reported>>,
     sampled: Cell<Option<Instant>>,
     uploaded: Cell<Option<Instant>>,
@@ -34,7 +34,7 @@ struct Inner {
 }
 
 impl Progress {
-    /// From now on events are printed, where JSON was asked for.
+    /// Starts to print events, if JSON was requested.
     pub fn begin(out: &Output) -> Result<Self, Failure> {
         out.stream()?;
         Ok(Self(Rc::new(Inner {
@@ -46,20 +46,21 @@ impl Progress {
         })))
     }
 
-    /// Something that happens.
+    /// Prints an event.
     pub fn event(&self, name: &str, value: Value) {
         self.0.out.event(name, value);
     }
 
-    /// From now on the statuses of this session make events; whoever observes it otherwise hands them to [`Progress::see`].
+    /// Turns all further statuses of this session into events; callers with their own observer pass statuses to
+    /// [`Progress::see`].
     pub fn watch<P: Port>(&self, session: &mut Session<P>) {
         *self.0.link.borrow_mut() = json!({ "port": session.port().name(), "baud": session.port().baud() });
         let own = self.clone();
         session.observe(move |_, status| own.see(status));
     }
 
-    /// A status that came: the first one is the connection, changes of the state are reported at once, and measured values at a modest
-    /// rate while the arm moves or may be moved.
+    /// Takes a status: the first one means connected, changes of the state are reported at once, and measured values at
+    /// a limited rate while the arm moves or may be moved.
     pub fn see(&self, s: &Status) {
         let now = (s.state, s.trajectory, s.errors);
         let state = || json!({ "state": s.state.name(), "trajectory": s.trajectory.name(), "errors": words::causes(s) });
@@ -79,7 +80,7 @@ impl Progress {
         }
     }
 
-    /// How far an upload is; `phase` names the motion that it is of.
+    /// Reports the progress of an upload; `phase` names its motion.
     pub fn uploading(&self, phase: &str, p: &session::Progress) {
         if due(&self.0.uploaded) || p.segments_done == p.segments {
             let fraction = if p.segments == 0 { 0.0 } else { p.segments_done as f64 / p.segments as f64 };
@@ -99,7 +100,7 @@ fn due(last: &Cell<Option<Instant>>) -> bool {
     due
 }
 
-/// Measured values of all joints; null where one does not answer.
+/// Returns the measured values of all joints; null if a joint does not answer.
 fn sample(s: &Status) -> Value {
     let all = |value: fn(&jtc_wire::JointStatus) -> f32| -> Vec<Option<f32>> {
         let joints = s.joints.iter().enumerate();

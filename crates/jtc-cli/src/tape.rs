@@ -1,4 +1,4 @@
-//! Recordings that are written while the arm moves.
+//! Recordings during a motion.
 
 use crate::failure::recording_broken_off;
 use std::fs::File;
@@ -7,7 +7,7 @@ use cli_kit::output_file::{OutputFile, settle};
 use cli_kit::{Failure, Output};
 use jtc_host::recording::{Ending, LiveRecorder, RecordingInfo, SampleSink};
 
-/// A recording in the making.
+/// Recording in progress.
 pub struct Tape {
     name: String,
     live: LiveRecorder,
@@ -15,8 +15,8 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// Begins a recording in `output`, in the form of the ending of its name; what it began before is gone. Writing that fails
-    /// later is reported at once, and `goes_on` what happens then.
+    /// Begins a recording in `output`, in the format of its file ending; an earlier recording in it is discarded. A
+    /// later write error is reported at once, with `goes_on` as the consequence.
     pub fn begin(
         output: &mut OutputFile,
         info: &RecordingInfo,
@@ -32,31 +32,31 @@ impl Tape {
         match live {
             Ok(live) => Ok(Self { name: output.name(), live, on_disk }),
             Err(e) => {
-                // Without its beginning the file is as good as none.
+                // Without its beginning the file is useless.
                 output.is_worthless();
                 Err(e.into())
             }
         }
     }
 
-    /// As people name it.
+    /// Returns the name for users.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Where samples go.
+    /// Returns the sink of samples.
     pub fn sink(&self) -> SampleSink {
         self.live.sink()
     }
 
-    /// Completes it with how the run ended.
+    /// Completes the recording with the end of the run.
     pub fn finish(self, ending: &Ending) -> Result<(), Failure> {
         let Self { name, live, on_disk } = self;
         live.finish(ending).map_err(recording_broken_off)?;
         settle(&on_disk).map_err(|e| recording_broken_off(Failure::usage(format!("{name}: {e}"))))
     }
 
-    /// Ends it without completing the file, which is about to be begun again.
+    /// Ends the recording without completing the file, which will be started again.
     pub fn abandon(self) {
         self.live.abandon();
     }

@@ -1,4 +1,4 @@
-//! Runs that were broken off: what is run of them again, and from which place.
+//! Interrupted runs: their remainder, and the place from which it runs.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ fn phases(value: &Value) -> Vec<&str> {
     value["runs"].as_array().unwrap().iter().map(|run| run["phase"].as_str().unwrap()).collect()
 }
 
-/// A closed path that begins and ends where a controller stands that was started anew: nothing of it is left out.
+/// A closed path begins and ends at the position of a restarted controller: the whole path is run.
 #[test]
 fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let dir = tempfile::tempdir().unwrap();
@@ -44,7 +44,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     let of_first = &value["verdict"]["joints"][0];
     assert!(of_first["position_max_rad"].as_f64().unwrap() > 0.399, "{of_first}");
     assert!(of_first["position_min_rad"].as_f64().unwrap() < -0.399, "{of_first}");
-    // The whole of it again, and what was measured of it.
+    // The whole motion again, and its measured version.
     let output = sim.jtc(&["--json", "traj", "replay", &record, "--approach"]).ends(0);
     assert!(
         output.err.contains("the whole trajectory that the recording holds; the run got to"),
@@ -57,7 +57,7 @@ fn a_controller_that_was_started_anew_shows_no_place_of_a_run() {
     assert!(part["position_min_rad"].as_f64().unwrap() > -0.01, "{part}");
 }
 
-/// A recording that does not hold the trajectory ends in motion: what can be done with it is named, and works.
+/// A recording without its trajectory ends in motion: the output names the possible next step, and this step works.
 #[test]
 fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -73,7 +73,7 @@ fn the_part_of_a_motion_that_was_recorded_is_run_from_rest_to_rest() {
     sim.json(&["traj", "continue", &record, "--trajectory", &file], 0);
 }
 
-/// As fast as the limits allow: what was measured is run again within the limits.
+/// As fast as the limits allow: the measured motion runs again within the limits.
 #[test]
 fn a_measured_motion_at_its_limits_is_run_again() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -90,7 +90,7 @@ fn a_measured_motion_at_its_limits_is_run_again() {
     assert!((most - 45f64.to_radians()).abs() < 0.05, "{most} rad");
 }
 
-/// Also where it begins, and has no speed yet.
+/// Also at its beginning, before it has a speed.
 #[test]
 fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -109,7 +109,7 @@ fn a_pose_is_not_saved_while_a_trajectory_is_executed() {
     sim.jtc(&["pose", "save", "there", "--arm", &arm]).ends(0);
 }
 
-/// What would be ignored is refused before anything is sent.
+/// Options that would be ignored are refused before any frame is sent.
 #[test]
 fn options_without_a_meaning_are_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
     moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
 }
 
-/// Stopped by a person, or broken off with its program: the rest is run from the last place that is proved.
+/// Stopped by a user, or interrupted with its program: the remainder runs from the last proved place.
 #[test]
 fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -163,7 +163,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A stop that was recorded shows where the arm came to rest; of one that was not, nothing is proved.
+        // A recorded stop shows the final position of the arm; an unrecorded stop proves no place.
         let stands = output.err.contains("and the arm stands there: it goes on from there");
         assert!(stands || signal == "-KILL" && output.err.contains("no later place of it"), "{}", output.err);
         let value = output.json();
@@ -179,7 +179,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     child.wait().unwrap();
     let output = sim.jtc(&["traj", "continue", &half, "--trajectory", &file]).ends(4);
     assert!(output.err.contains("at another speed"), "{}", output.err);
-    // Nothing is left of a run that was finished, and a CSV file does not hold the path.
+    // A finished run has no remainder, and a CSV file does not hold the path.
     let (other, whole, rest) =
         (sim.file("other.csv", &slow_motion(30)), sim.path("whole.csv"), sim.path("rest.mcap"));
     sim.jtc(&["traj", "run", &other, "--approach", "--record", &whole]).ends(0);
@@ -190,7 +190,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     assert!(!std::path::Path::new(&rest).exists());
 }
 
-/// After an error the arm is brought back first; where it was moved meanwhile, an approach leads to the place.
+/// After an error the arm is recovered first; if it was moved meanwhile, an approach leads to the place.
 #[test]
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =
@@ -212,8 +212,8 @@ fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     at(&sim, [0.0; 6]);
 }
 
-/// Of three runs one was finished: the rest of the second and the third are run, also where the recording is that of a rest, and where the
-/// controller finished the run by itself.
+/// After one of three runs: the remainder of the second and the third are run, also if the recording is that of
+/// a remainder, and if the controller finished the run by itself.
 #[test]
 fn the_runs_that_are_left_are_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -223,7 +223,7 @@ fn the_runs_that_are_left_are_run() {
     let child = moving_after(&sim, &words, "run 1 of 3 finished", 0.7);
     cli_kit::trial::signal(&child, "-INT");
     child.wait_with_output().unwrap();
-    // Broken off again, in the last run.
+    // Interrupted again, in the last run.
     let words = ["traj", "continue", &run, "--record", &rest];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);
     cli_kit::trial::signal(&child, "-KILL");
@@ -231,17 +231,18 @@ fn the_runs_that_are_left_are_run() {
     std::thread::sleep(std::time::Duration::from_secs(3));
     let output = sim.jtc(&["traj", "continue", &rest]).ends(4);
     assert!(output.err.contains("nothing is left of it"), "{}", output.err);
-    // One more was asked for, as a person knows.
+    // The user asked for one more run.
     let value = sim.json(&["traj", "continue", &rest, "--repeat", "3"], 0);
     assert_eq!((phases(&value), &value["runs_finished"]), (vec!["motion"], &1.into()), "{value}");
-    // The first recording again, when the controller shows another motion: the rest of its second run, and the third.
+    // The first recording again, while the controller shows another motion: the remainder of its second run, and the
+    // third.
     sim.jtc(&["move", "--to", "0.1,0,0,0,0,0"]).ends(0);
     let output = sim.jtc(&["--json", "traj", "continue", &run]).ends(0);
     assert!(output.err.contains("then the whole trajectory is run once"), "{}", output.err);
     let value = output.json();
     assert_eq!(value["runs_finished"], 2, "{value}");
     assert!((value["verdict"]["duration_s"].as_f64().unwrap() - 2.0).abs() < 1e-6, "{value}");
-    // What a recording does not hold is reported.
+    // Data that a recording does not hold is reported.
     let csv = path("run.csv");
     let words = ["traj", "run", &file, "--repeat", "2", "--record", &csv];
     let child = moving_after(&sim, &words, "run 1 of 2 finished", 0.7);

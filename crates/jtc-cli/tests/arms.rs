@@ -1,10 +1,10 @@
-//! Arm files and robot descriptions: what they give, and what is refused of them.
+//! Arm files and robot descriptions: their content, and refusals.
 
 use crate::common;
 
 use common::{Sim, jtc, motion};
 
-/// An arm file whose first two joints may not turn as fast as the controller lets them.
+/// An arm file whose first two joints have lower speed limits than the controller.
 fn slower(dir: &std::path::Path) -> String {
     let arm = include_str!("../../../arms/avena.toml").replacen(
         "velocity_max_rad_s = 1.5",
@@ -16,14 +16,14 @@ fn slower(dir: &std::path::Path) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// J-55: what the controller does not use of an arm file is listed and refused before anything is sent.
+/// J-55: parameters of an arm file that the controller does not use are listed and refused before any frame is sent.
 #[test]
 fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     let dir = tempfile::tempdir().unwrap();
     let (arm, motion_file) = (slower(dir.path()), dir.path().join("motion.csv"));
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let file = motion_file.to_str().unwrap();
-    // The controller is asked what it has; where it is silent, that comes first.
+    // The controller is asked for its data; if it is silent, that error comes first.
     let port = ["--port", "/nowhere/tty"];
     jtc(&["params", "push", &arm, port[0], port[1]]).ends(3);
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -50,7 +50,8 @@ fn j55_an_arm_with_other_limits_is_refused_with_each_value() {
     }
 }
 
-/// What a URDF cannot give is not zero: no difference to the controller, and a check that leaves it out reports it.
+/// Parameters that a URDF cannot give are not zero: they make no difference to the controller, and a check without them
+/// reports it.
 #[test]
 fn j55_what_a_urdf_cannot_say_is_not_given() {
     let dir = tempfile::tempdir().unwrap();
@@ -59,7 +60,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     std::fs::write(&urdf, arm.to_urdf()).unwrap();
     std::fs::write(&motion_file, motion(0.3)).unwrap();
     let (urdf, file) = (urdf.to_str().unwrap(), motion_file.to_str().unwrap());
-    // Its limits are the controller's own: it goes on to the port, which is not there.
+    // Its limits are the controller's own: the command goes on to the port, which does not exist.
     let output = jtc(&["params", "push", urdf, "--port", "/nowhere/tty"]).ends(3);
     assert!(!output.err.contains("rotor_inertia"), "{}", output.err);
 
@@ -71,7 +72,7 @@ fn j55_what_a_urdf_cannot_say_is_not_given() {
     assert_eq!(left_out(urdf), serde_json::json!(["friction", "rotor inertia"]));
     let whole = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
     assert_eq!(left_out(whole), serde_json::json!([]));
-    // A run counts the rotors that the controller computes with.
+    // A run uses the rotors of the controller.
     let sim = Sim::start(&["--no-throttle"]).held();
     let output = sim.jtc(&["traj", "run", file, "--arm", urdf]).ends(0);
     assert!(output.err.contains("without friction, which"), "{}", output.err);
@@ -93,7 +94,7 @@ fn j55_recover_refuses_an_arm_that_is_not_whole() {
     jtc(&["recover", "--arm", path.to_str().unwrap(), "--defaults", "--port", "/nowhere/tty"]).ends(2);
 }
 
-/// From a description with a gripper on it to an arm file that can be used.
+/// From a description with a gripper to a usable arm file.
 #[test]
 fn an_arm_file_is_made_from_a_robot_description() {
     let dir = tempfile::tempdir().unwrap();
@@ -127,7 +128,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     let output = jtc(&["arm", "import", toml, "-o", urdf]).ends(2);
     assert!(output.err.contains("is no robot description"), "{}", output.err);
 
-    // What was changed and proposed is in the text as well, and the file passes its check with warnings.
+    // The text shows the changes and proposals as well, and the file passes its check with warnings.
     let output = jtc(&["arm", "import", urdf, "--joints", &joints, "-o", toml, "--overwrite"]).ends(0);
     for words in [
         "left out: ",
@@ -146,7 +147,7 @@ fn an_arm_file_is_made_from_a_robot_description() {
     assert!(codes.contains(&"proposed") && codes.contains(&"holding"), "{codes:?}");
 }
 
-/// J-06, J-35: what a controller would refuse is refused by the check, with joint, value, limit and what to do.
+/// J-06, J-35: the check refuses what a controller would refuse, with joint, value, limit and next step.
 #[test]
 fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
     let dir = tempfile::tempdir().unwrap();
@@ -171,7 +172,7 @@ fn j06_j35_a_file_that_no_controller_takes_is_refused_with_each_finding() {
         "{}",
         output.out
     );
-    // Unreadable is another thing.
+    // An unreadable file is a different error.
     jtc(&["arm", "check", "nowhere.toml"]).ends(2);
     jtc(&["arm", "check", "Cargo.toml"]).ends(2);
 }
@@ -206,7 +207,7 @@ fn an_arm_is_shown_with_units_ranges_and_sources() {
     assert_eq!(one("pid.kp", 2)["value"].as_f64(), Some(8000.0));
 }
 
-/// J-71: gains that are not stable are refused by the check, and given to no controller by any command.
+/// J-71: the check refuses unstable gains, and no command gives them to a controller.
 #[test]
 fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     let dir = tempfile::tempdir().unwrap();
@@ -239,7 +240,7 @@ fn j71_gains_that_are_not_stable_are_refused_by_each_command() {
     sim.jtc(&["arm", "push", whole]).ends(0);
 }
 
-/// Degrees in a robot description leave no file; the unit in a header is not turned once more.
+/// Degrees in a robot description leave no file; the unit in a header is not converted twice.
 #[test]
 fn degrees_are_neither_taken_for_radians_nor_turned_twice() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! docs/from-two-poses-to-a-cycle.md: each of its commands is run by the real program against `jtc sim`. `UPDATE_DOCS=1` writes what
-//! they print again.
+//! docs/from-two-poses-to-a-cycle.md: the real program runs each of its commands against `jtc sim`. `UPDATE_DOCS=1`
+//! writes their output again.
 #![cfg(target_os = "linux")]
 
 use test_kit::page::{Page, Printed, blurred};
@@ -9,23 +9,23 @@ use crate::desk::Desk;
 
 const PAGE: &str = "from-two-poses-to-a-cycle.md";
 
-/// Runs a command that has to succeed; what it prints was measured.
+/// Runs a command that must succeed and prints measured values.
 fn done(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command);
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
-    // The head of a table is as wide as its figures, which are left out.
+    // The width of a table head depends on the figures, which are left out.
     let lines = seen.text.lines().filter(|line| !line.contains("peak rad/s"));
     Printed { code: seen.code, text: lines.map(measured).collect() }
 }
 
-/// The same where no figure differs from run to run.
+/// Like [`done`], for commands without figures that differ from run to run.
 fn exact(desk: &Desk, command: &str) -> Printed {
     let seen = desk.run(command).0;
     assert_eq!(seen.code, 0, "{command}: {}", seen.text);
     seen
 }
 
-/// A line with its measured figures blurred, but not the words that were typed.
+/// Blurs the measured figures of a line, but not the typed words.
 fn measured(line: &str) -> String {
     let (typed, rest) = match line.split_once(": ") {
         Some((typed, rest)) if typed.starts_with("move to ") => (format!("{typed}: "), rest),
@@ -34,7 +34,7 @@ fn measured(line: &str) -> String {
     typed + &blurred(&without_signs(rest))
 }
 
-/// Without the signs of numbers: one behind a hyphen counts as a part of a name.
+/// Removes the signs of numbers: a sign after a hyphen counts as part of a name.
 fn without_signs(text: &str) -> String {
     let mut before = ' ';
     let mut out = String::new();
@@ -91,7 +91,7 @@ fn plan(desk: &Desk) {
         ("Their motion", "jtc plan cycle-waypoints.csv -o cycle.csv --blend 0.05 --report plan.html"),
         ("The check that every run makes", "jtc traj check cycle.csv"),
     ] {
-        // The poses of the first one were measured.
+        // The poses of the first plan were measured.
         let printed = if command.contains("poses.csv") { done(desk, command) } else { exact(desk, command) };
         page.case(title, command, &printed);
     }
@@ -135,7 +135,7 @@ fn runs(desk: &Desk) {
     page.finish();
 }
 
-/// In real time, so that there is a motion to stop.
+/// In real time, so that a motion can be stopped.
 fn broken_off() {
     let mut page = Page::new(PAGE, "continue");
     let desk = Desk::simulated(&["--no-throttle"]);

@@ -1,4 +1,4 @@
-//! Where a person sits who types commands: a directory, a port, and something behind it.
+//! Workplace of a user who types commands: a directory, a port, and a controller.
 #![cfg(target_os = "linux")]
 
 use std::fs::File;
@@ -19,7 +19,7 @@ use crate::common::{Sim, command};
 /// The port as the page names it.
 const PORT: &str = "/tmp/jtc";
 
-/// What a command printed.
+/// Output of a command.
 pub struct Seen(pub Printed);
 
 impl std::ops::Deref for Seen {
@@ -30,13 +30,13 @@ impl std::ops::Deref for Seen {
 }
 
 impl Seen {
-    /// Without what differs from run to run.
+    /// Removes values that differ from run to run.
     pub fn blurred(self) -> Printed {
         Printed { code: self.code, text: blurred(&self.text) }
     }
 }
 
-/// The terminal's other end, and the file that a command opens.
+/// Returns the terminal's other end, and the file that a command opens.
 fn terminal() -> (File, String, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -46,7 +46,7 @@ fn terminal() -> (File, String, OwnedFd) {
     (File::from(master), name.to_string_lossy().into_owned(), slave)
 }
 
-/// A serial line with something else at its end.
+/// A serial line with another device at its end.
 pub struct Line {
     port: String,
     ended: Arc<AtomicBool>,
@@ -54,7 +54,7 @@ pub struct Line {
 }
 
 impl Line {
-    /// Something that sends this text again and again, and takes what it is sent.
+    /// Creates a device that sends this text again and again, and ignores its input.
     pub fn new(text: &'static str) -> Self {
         let (mut end, port, slave) = terminal();
         let mut raw = rustix::termios::tcgetattr(&slave).unwrap();
@@ -86,22 +86,22 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// With nothing at the port.
+    /// Creates a desk without a device at the port.
     pub fn new() -> Self {
         Self { dir: tempfile::tempdir().unwrap(), sim: None, line: None }
     }
 
-    /// With this line at the port.
+    /// Creates a desk with this line at the port.
     pub fn at(line: Line) -> Self {
         Self { line: Some(line), ..Self::new() }
     }
 
-    /// With a simulated controller at the port.
+    /// Creates a desk with a simulated controller at the port.
     pub fn simulated(options: &[&str]) -> Self {
         Self { sim: Some(Sim::start(options)), ..Self::new() }
     }
 
-    /// Where its files are.
+    /// Returns the directory of its files.
     pub fn dir(&self) -> &Path {
         self.dir.path()
     }
@@ -125,7 +125,7 @@ impl Desk {
         let programs = Path::new(env!("CARGO_BIN_EXE_jtc")).parent().unwrap();
         let path = std::env::var("PATH").unwrap_or_default();
         let real = shown.replace(PORT, &self.port());
-        // Alone, the command takes the place of the shell, so that a signal reaches it.
+        // A single command replaces the shell, so that a signal reaches it.
         let alone = !real.contains([';', '|']);
         shell
             .args(["-c", &format!("exec 2>&1\n{}{real}", if alone { "exec " } else { "" })])
@@ -143,13 +143,13 @@ impl Desk {
         Seen(Printed { code: code.unwrap_or(-1), text })
     }
 
-    /// What a command prints.
+    /// Runs a command and returns its output.
     pub fn run(&self, shown: &str) -> Seen {
         let output = self.shell(shown).stdin(Stdio::null()).output().unwrap();
         self.seen(output.status.code(), &String::from_utf8_lossy(&output.stdout))
     }
 
-    /// The same of one that moves the arm, with what happens once it moves.
+    /// Like [`Self::run`], for a command that moves the arm; calls `happens` once the arm moves.
     pub fn moving(&self, shown: &str, happens: impl FnOnce(&Child, &Sim)) -> Seen {
         let (_person, _, slave) = terminal();
         let mut child = self.shell(shown).stdin(Stdio::from(slave)).spawn().unwrap();
@@ -161,14 +161,14 @@ impl Desk {
         self.seen(child.wait().unwrap().code(), &text)
     }
 
-    /// Types a line where the simulator runs.
+    /// Types a line into the simulator.
     pub fn write_line(&mut self, line: &str) {
         if let Some(sim) = &mut self.sim {
             sim.write_line(line);
         }
     }
 
-    /// Keeps the port as another program does.
+    /// Opens the port, as another program does.
     pub fn hold_port(&self) -> jtc_host::port::SerialPort {
         jtc_host::port::SerialPort::open(&self.port(), 115_200).unwrap()
     }

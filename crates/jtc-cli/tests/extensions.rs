@@ -1,4 +1,4 @@
-//! What a controller with extensions reports and takes: identity, arm, speed, jogging (J-52 to J-58).
+//! Reports and requests of a controller with extensions: identity, arm, speed, jogging (J-52 to J-58).
 
 use crate::common;
 
@@ -30,7 +30,7 @@ fn j52_a_controller_tells_who_it_is() {
     }
     let text = sim.jtc(&["info"]).ends(0).out;
     assert!(text.contains(info["hash"].as_str().unwrap()) && text.contains("started:   once"), "{text}");
-    // The hash is that of the arm, whoever computes it.
+    // The hash belongs to the arm: controller and host compute the same value.
     let sim = sim.with_parameters();
     assert_eq!(sim.json(&["info"], 0)["hash"], info["hash"]);
     let avena = concat!(env!("CARGO_MANIFEST_DIR"), "/../../arms/avena.toml");
@@ -43,7 +43,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let sim = Sim::start(&["--no-throttle"]);
     let arm = another(&sim);
     let file = sim.file("motion.csv", &motion(0.2));
-    // Before it is given, nothing of it is the controller's; gains and friction are those that are built in.
+    // Before the push the controller has none of its values; gains and friction are the built-in ones.
     let diff = sim.json(&["arm", "diff", &arm], 4);
     assert_eq!(names(&diff), ["velocity_max_rad_s", "ramp_ms", "pid.kd"]);
 
@@ -54,7 +54,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     assert_eq!((&info["hash"], info["missing"].as_array().unwrap().len()), (&pushed["hash"], 3));
     assert_eq!(sim.json(&["arm", "diff", &arm], 0)["equal"], true);
 
-    // The defaults mean it now, and a run is checked for it; one for another arm is refused.
+    // The defaults now mean this arm, and a run is checked for it; a run for another arm is refused.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let sim = sim.held();
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
@@ -66,7 +66,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let named = sim.jtc(&["traj", "run", &file]).ends(0).err;
     assert!(named.contains("checked for the arm of the controller, another"), "{named}");
 
-    // What is pulled is the same arm.
+    // The pulled arm is the same.
     let pulled = sim.path("pulled.toml");
     assert_eq!(sim.json(&["arm", "pull", "-o", &pulled], 0)["hash"], pushed["hash"]);
     assert_eq!(sim.json(&["arm", "diff", &pulled], 0)["equal"], true);
@@ -74,7 +74,7 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
     let shown = sim.json(&["arm", "show"], 0);
     assert_eq!(shown["arm"], "another");
 
-    // Its settings change without torque only.
+    // Its settings change only without torque.
     let refused = sim.jtc(&["arm", "push", avena]).ends(1);
     assert!(
         refused.err.contains("jtc disable") && refused.err.contains("nothing was changed"),
@@ -82,14 +82,14 @@ fn j54_j55_a_whole_arm_is_pushed_stored_read_back_and_compared() {
         refused.err
     );
     assert_eq!(sim.json(&["info"], 0)["hash"], pushed["hash"]);
-    // Nobody can be asked whether the arm may lose its torque.
+    // Without a terminal no user can confirm that the arm may lose its torque.
     sim.jtc(&["disable"]).ends(4);
     assert_eq!(sim.json(&["disable", "--yes"], 0)["status"]["state"], "Init");
     sim.jtc(&["arm", "push", avena]).ends(0);
     assert_eq!(sim.json(&["arm", "diff", avena], 0)["equal"], true);
 }
 
-/// An arm without gains is nobody's arm.
+/// An arm without gains is incomplete.
 #[test]
 fn j55_an_arm_that_is_not_whole_is_not_pushed() {
     let text: String = include_str!("../../../arms/avena.toml")
@@ -114,7 +114,7 @@ fn j57_the_speed_of_a_motion_changes_while_it_runs() {
     let run = sim.jtc(&["--json", "traj", "run", &file]).ends(0);
     assert!(run.err.contains("speed override is 50 %"), "{}", run.err);
     let executed = run.json()["recorded_s"].as_f64().unwrap();
-    // The way to the first point takes as long as ever.
+    // The approach takes as long as before.
     assert!(executed > 1.6 * whole && executed < 2.1 * whole, "{whole} s became {executed} s");
     for wrong in ["4", "101", "nan"] {
         sim.jtc(&["traj", "speed", wrong]).ends(2);
@@ -133,7 +133,7 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!((at(&way["to_rad"], 0) - at(&way["from_rad"], 0)).abs() < 1e-3);
     let back = sim.json(&["jog", "3", "-10", "--deg", "--duration", "0.5"], 0);
     assert!(at(&back["to_rad"], 2) < at(&way["to_rad"], 2) - 0.05);
-    // Killed, it cannot send a stop: the arm comes to rest by itself.
+    // A killed command cannot send a stop: the arm comes to rest by itself.
     let mut child = sim.command(&["jog", "1", "0.3"]).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_millis(600));
     child.kill().unwrap();
@@ -153,7 +153,7 @@ fn j58_a_joint_is_jogged_for_as_long_as_the_command_lives() {
     assert!(refused.err.contains("jtc recover"), "{}", refused.err);
 }
 
-/// A script that jogs learns of an arm that was released meanwhile, and why.
+/// A script that jogs is told that the arm was released meanwhile, and why.
 #[test]
 fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() {
     let fault =
@@ -167,7 +167,7 @@ fn j21_j58_a_jog_in_which_the_arm_is_released_ends_with_exit_5_and_the_reason() 
     assert!(error.to_string().contains("jtc recover"), "{error}");
 }
 
-/// The simulated board keeps its arm as flash does: in a file, over the end of the simulator.
+/// The simulated board keeps its arm like flash: in a file, beyond the end of the simulator.
 #[test]
 fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -181,7 +181,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
         (&status["state"], status["missing_parameters"].as_array().unwrap().len()),
         (&"Init".into(), 3)
     );
-    // Of an arm that is held nothing is taken without asking.
+    // A held arm is not disabled without confirmation.
     sim.jtc(&["recover", "--defaults"]).ends(0);
     let refused = sim.jtc(&["arm", "push", &arm, "--store"]).ends(1);
     assert!(
@@ -202,7 +202,7 @@ fn j54_the_simulator_keeps_a_stored_arm_in_its_file() {
     assert!(refused.err.contains("holds no stored arm"), "{}", refused.err);
 }
 
-/// A simulated arm of one's own: its controller knows it as a board does, from its memory.
+/// A user's own simulated arm: its controller gets it from its memory, as a board does.
 #[test]
 fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     let dir = tempfile::tempdir().unwrap();
@@ -217,7 +217,7 @@ fn j55_the_controller_of_another_simulated_arm_has_it_stored() {
     assert_eq!(sim.json(&["arm", "diff", arm], 0)["equal"], true);
 }
 
-/// Numbers that nobody has tried hold no arm because they are to be kept.
+/// Storing untried parameters must not make the controller hold the arm with them.
 #[test]
 fn j54_an_arm_that_is_stored_is_not_held_in_between() {
     let dir = tempfile::tempdir().unwrap();

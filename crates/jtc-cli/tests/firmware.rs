@@ -1,5 +1,5 @@
-//! `jtc firmware` with drives that are folders, and boards behind pseudo-terminals. All that an ST-LINK may do is in the tests of the
-//! library.
+//! `jtc firmware` with drives that are folders, and boards on pseudo-terminals. The tests of the library cover all
+//! behaviour of an ST-LINK.
 
 #[cfg(unix)]
 mod board;
@@ -14,7 +14,7 @@ use common::{Dir, Sim, command};
 use serde_json::Value;
 
 const H745: &str = "nucleo-h745zi-q";
-/// SHA-256 of 4096 bytes is computed by the library; a wrong one is this.
+/// A wrong SHA-256; the library computes the correct one of 4096 bytes.
 const WRONG: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
 /// An image of this board, which does nothing.
@@ -79,7 +79,7 @@ fn images_and_drives_are_listed() {
     assert!(listed["drives"].is_array());
     let text = jtc(&dir, &["firmware", "list"]).ends(0).out;
     assert!(text.contains("nucleo-h745zi-q  new.bin, 4096 bytes"), "{text}");
-    // None installed is no error of the list.
+    // A list without installed images is not an error.
     let empty = Dir::new();
     let listed = jtc(&empty, &["firmware", "list"]).ends(0);
     assert!(listed.err.contains("no firmware.json in"), "{}", listed.err);
@@ -106,7 +106,7 @@ fn without_a_line_a_person_answers_for_the_arm_and_nothing_is_proved() {
     let question = refused["error"]["message"].as_str().unwrap();
     assert!(question.contains("safety wires") && question.contains("cut short"), "{question}");
     nothing_written(&drive);
-    // A drive that stays has not taken the image, and that is no success.
+    // A drive that stays mounted has not taken the image, and that is a failure.
     let done = json(&jtc(&dir, &[&words[..], &["--yes"]].concat()).ends(5));
     assert_eq!(done["error"]["code"], "not-taken");
     assert_eq!(fs::read(Path::new(&drive).join("openjtc.bin")).unwrap(), image(H745));
@@ -206,7 +206,7 @@ mod with_a_board {
         let board = Board::new(H745, Path::new(&drive), image(H745).len());
         let words = [&["--json"], &words(&board, &drive, &new)[..], &["--yes"]].concat();
         let crc32 = format!("{:08x}", program_of(&image(H745)).crc32);
-        // The second time it runs the image already; whether that is the board with this drive is not known.
+        // The second time the board already runs the image; it is unknown whether it is the board with this drive.
         for _ in 0..2 {
             let done = json(&jtc(&dir, &words).ends(0));
             assert_eq!((&done["written"], &done["proved"]), (&true.into(), &true.into()), "{done}");
@@ -217,7 +217,7 @@ mod with_a_board {
         }
         let verified = jtc(&dir, &["--json", "firmware", "verify", "--image", &new, "--port", &board.port]);
         assert_eq!(json(&verified.ends(0))["proved"], true);
-        // And without proof, when the drive has come back.
+        // Without proof, too, when the drive has come back.
         let done = json(&jtc(&dir, &[&words[..], &["--no-read-back"]].concat()).ends(0));
         assert_eq!((&done["proved"], &done["drive_after"]), (&false.into(), &"came_back".into()), "{done}");
     }
@@ -252,7 +252,7 @@ mod with_a_board {
             },
             "meanwhile the board reports something else",
         );
-        // The drive is unmounted, and the folder stays; and another drive is there.
+        // The drive is unmounted, and the folder stays; another drive is mounted.
         let page = Path::new(&drive).join("MBED.HTM");
         answer_after(&|| fs::write(&page, "code=0843").unwrap(), "another drive is there");
         fs::remove_file(page).unwrap();

@@ -1,4 +1,4 @@
-//! A held stop (J-69) at each front end of `jtc`: what was found stands there with joint, value, limit and age, and what to do about it.
+//! A held stop (J-69) at each front end of `jtc`: each shows it with joint, value, limit, age and next step.
 #![cfg(target_os = "linux")]
 
 use std::io::{BufRead as _, BufReader};
@@ -14,10 +14,10 @@ use test_kit::patience::Patience;
 use crate::common::agent::{command_in, serve};
 use crate::common::{Sim, jtc};
 
-/// Time after which every joint has settled since it was enabled.
+/// Time after which every joint has settled since the enable.
 const SETTLES: Duration = Duration::from_secs(8);
 
-/// 30 % of the 40 N·m of joint 5 are a push.
+/// 30 % of the 40 N·m of joint 5 count as a push.
 const LIMIT: f64 = 12.0;
 
 fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
@@ -30,7 +30,8 @@ fn until(what: &str, mut ask: impl FnMut() -> Option<Value>) -> Value {
     }
 }
 
-/// Pushes joint 5, harder than its friction holds, until `ask` finds a held stop. The joints have to have settled since they were enabled.
+/// Pushes joint 5, harder than its friction holds, until `ask` finds a held stop. The joints must have settled since
+/// they were enabled.
 fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
     std::thread::sleep(SETTLES);
     let mut looks = 0;
@@ -43,7 +44,7 @@ fn pushed(sim: &mut Sim, mut ask: impl FnMut() -> Option<Value>) -> Value {
     })
 }
 
-/// Kind, joint, value and limit of a push against joint 5.
+/// Checks kind, joint, value and limit of a push against joint 5.
 fn is_a_push(stop: &Value) {
     assert_eq!((&stop["kind"], &stop["joint"], &stop["unit"]), (&"push".into(), &5.into(), &"N·m".into()));
     assert_eq!((&stop["number"], &stop["code"]), (&2.into(), &"held-stop-push".into()));
@@ -148,7 +149,8 @@ fn j69_the_agent_asks_for_the_cause_and_shows_it() {
     agent.wait().expect("it ends");
 }
 
-/// The command that gives gains to an arm under torque ends when they have held it, or with the reason why the controller took them back.
+/// The command that gives gains to an arm under torque ends when they have held it, or with the reason why the
+/// controller rejected them.
 #[test]
 fn j71_params_push_waits_for_the_trial_of_its_gains() {
     let mut sim = Sim::start(&["--no-throttle"]).held();

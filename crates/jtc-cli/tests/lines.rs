@@ -1,4 +1,4 @@
-//! `jtc plan` with the flange on lines and arcs: where the flange is, from the trajectory that was written, and what is refused.
+//! `jtc plan` with the flange on lines and arcs: positions of the flange in the written trajectory, and refusals.
 
 use crate::common;
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
@@ -13,8 +13,8 @@ use serde_json::Value;
 type Vec3 = [f64; 3];
 
 impl Dir {
-    /// What is printed for a plan of this text, and where the flange is at ten times in each interval of what is written, as the controller
-    /// interpolates.
+    /// Returns the output for a plan of this text, and the flange poses at ten times in each interval of the written
+    /// trajectory, as the controller interpolates.
     fn plan(&self, text: &str, options: &[&str]) -> (Value, Vec<(f64, Pose)>) {
         let name = if text.starts_with('[') { "waypoints.json" } else { "waypoints.csv" };
         let (file, out) = (self.file(name, text), self.path("out.csv"));
@@ -24,7 +24,7 @@ impl Dir {
         (printed, flange(&std::fs::read_to_string(out).unwrap()))
     }
 
-    /// What a refused plan prints; it leaves no file.
+    /// Returns the output of a refused plan, which leaves no file.
     fn refused(&self, text: &str, options: &[&str], code: i32) -> String {
         let (file, out) = (self.file("refused.csv", text), self.path("none.csv"));
         let output = jtc(&[&["plan", &file, "-o", &out], options].concat()).ends(code);
@@ -81,7 +81,7 @@ fn a_line_is_straight_and_a_leg_in_joint_space_says_that_it_is_not() {
     let (a, b) = ([0.6, -0.3, 0.4], [0.6, 0.3, 0.4]);
     let furthest =
         |all: &[(f64, Pose)]| all.iter().map(|(_, p)| off_leg(p.position, a, b)).fold(0.0, f64::max);
-    // In joint space it is not, and how far it is off is printed.
+    // In joint space the flange leaves the line, and the distance is printed.
     let (printed, all) = dir.plan(TWO, &[]);
     let note = printed["notes"][0].as_str().unwrap();
     let mm: f64 = note.split_once("by up to ").unwrap().1.split_once(" mm").unwrap().0.parse().unwrap();
@@ -142,7 +142,8 @@ fn corners_are_sharp_stops_or_rounded_within_the_blend() {
     assert!(durations[1] <= durations[0] && durations[2] < durations[1], "{durations:?}");
 }
 
-/// A quarter of a circle about the base's upright axis; the orientation of the point on its way does not count, and it may have none.
+/// A quarter of a circle about the base's upright axis; the orientation of the point on the arc is ignored, and may be
+/// missing.
 #[test]
 fn an_arc_is_round() {
     let dir = Dir::new();
@@ -197,7 +198,7 @@ fn waypoints_of_any_kind_may_be_ends_of_lines() {
     let early = text.replace("\n5,", "\n0.2,");
     let refused = dir.refused(&early, &["--arm", &arm], 4);
     assert!(refused.contains("line 4: waypoint 3: 0.200 s after waypoint 1 is too early"), "{refused}");
-    // The same place in another configuration.
+    // Another configuration with an equal pose.
     let other = robots_other(&q);
     let cells = other.map(|v| v.to_string()).join(",");
     let refused =
@@ -222,7 +223,7 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
             legs.iter().enumerate().map(|(i, leg)| format!("0.6,{},0.4,0,0,0,1,{leg}\n", 0.1 * i as f64));
         format!("x,y,z,qx,qy,qz,qw,leg\n{}", rows.collect::<String>())
     };
-    // Of the file's form.
+    // Errors in the format of the file.
     for (kinds, message) in [
         (
             &["", "via", "line"][..],
@@ -239,14 +240,14 @@ fn lines_and_arcs_that_cannot_be_are_refused_with_their_place() {
         let refused = dir.refused(&legs(kinds), &[], 2);
         assert!(refused.contains(message), "{kinds:?}: {refused}");
     }
-    // Three points in line are no arc.
+    // Three collinear points are not an arc.
     let refused = dir.refused(&legs(&["", "via", "arc"]), &[], 4);
     assert!(refused.contains("line 4: waypoint 3: the arc's three points are on no circle"), "{refused}");
-    // The end out of reach, and the middle of a line between ends that are reached.
+    // The end is out of reach, or the middle of a line between ends in reach.
     let far = "x,y,z,qx,qy,qz,qw\n0.6,0,0.4,0,0,0,1\n0.6,0.2,0.4,0,0,0,1\n2.6,0,0.4,0,0,0,1\n";
     let refused = dir.refused(far, &["--line"], 4);
     assert!(refused.contains("line 4: waypoint 3: out of reach"), "{refused}");
-    // Through a singular pose: of which joints, and where.
+    // Through a singular pose: the error names the joints and the place.
     let through = "q1,q2,q3,q4,q5,q6\n0.3,-0.2,1.2,0.4,0.3,0.2\n0.5,-0.1,1.1,0.4,-0.3,0.2\n";
     let refused = dir.refused(through, &["--line"], 4);
     let place = refused.split_once("line 3: leg 1 (to waypoint 2), ").map(|(_, rest)| rest);

@@ -9,12 +9,12 @@ use serde_json::Value;
 const SILENT: &str =
     "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_point = 700\nfor_s = 0.5\n";
 
-/// A controller on which that has happened.
+/// A controller after this fault.
 fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
     sim.jtc(&["traj", "run", &file, "--approach"]).ends(5);
-    // What follows the fault is in the log, too.
+    // Events after the fault are in the log, too.
     std::thread::sleep(std::time::Duration::from_millis(500));
     sim
 }
@@ -35,7 +35,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
         (&Value::from("joint 3: does not answer"), &Value::from(true))
     );
     assert_eq!(first["joints"], serde_json::json!([3]));
-    // Two seconds and more before it, 0.3 s after it, all of them what was.
+    // At least two seconds before it, 0.3 s after it, all real values.
     let at = first["time_s"].as_f64().unwrap();
     assert!(fetched["from_s"].as_f64().unwrap() < at - 2.0);
     assert!((fetched["to_s"].as_f64().unwrap() - at - 0.3).abs() < 1e-9);
@@ -43,7 +43,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     assert!(count(&fetched, "replayed") > 2_300, "{fetched}");
     assert_eq!((count(&fetched, "other_arm"), count(&fetched, "other_trajectory")), (0, 0));
 
-    // The page leads with it; the recording is one like any other, and holds the log.
+    // The page begins with the fault; the recording is a normal one, and holds the log.
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("after the start of the device: joint 3: does not answer"));
     let report = jtc(&["--json", "report", &recording, "--out", &sim.path("again.html")]).ends(0).json();
@@ -53,7 +53,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     let text = jtc(&["log", "replay", &recording]).ends(0).out;
     assert!(text.contains(" replayed, no difference"), "{text}");
 
-    // Clearing errors keeps it; it is gone when it is cleared.
+    // Clearing errors keeps the log; clearing the log removes it.
     sim.jtc(&["recover"]).ends(0);
     assert_eq!(sim.json(&["log", "fetch"], 0)["first"], *first);
     let info = sim.jtc(&["info"]).ends(0).out;
@@ -62,7 +62,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     std::thread::sleep(std::time::Duration::from_millis(300));
     let anew = sim.json(&["log", "fetch"], 0);
     assert_eq!((&anew["state"], &anew["first"]), (&Value::from("recording"), &Value::Null));
-    // An output is never written over.
+    // An output is never overwritten.
     sim.jtc(&["log", "fetch", "-o", &recording]).ends(4);
 }
 
@@ -98,7 +98,7 @@ fn j56_a_log_without_a_fault_holds_the_motion_that_was() {
     assert!(count(&fetched, "replayed") > 2_000, "{fetched}");
     let words = fetched["events"].to_string();
     assert!(words.contains("trajectory Finish"), "{words}");
-    // It has not stopped, and goes on.
+    // The log has not stopped, and continues.
     assert_eq!(fetched["state"], "recording");
 }
 

@@ -1,4 +1,4 @@
-//! Commands that need no controller: exit codes, JSON, filters.
+//! Commands without a controller: exit codes, JSON, filters.
 
 use crate::common;
 
@@ -7,7 +7,7 @@ use common::{jtc, jtc_with, motion};
 #[test]
 fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["traj", "rum", "x"]).ends(2);
-    // Which nodes must be named, and a bit mask is none: nothing is even opened.
+    // Nodes must be named, and a bit mask is not accepted: the port is not even opened.
     jtc(&["reset", "--port", "/nowhere/tty"]).ends(2);
     let output = jtc(&["reset", "3", "--port", "/nowhere/tty"]).ends(2);
     assert!(output.err.contains("--joints 3") && output.err.contains("--joints 1,2"), "{}", output.err);
@@ -20,7 +20,7 @@ fn wrong_usage_and_unreadable_input_end_with_2() {
     jtc(&["dynamics", "inverse", "--arm", "/nowhere.toml"]).ends(2);
 }
 
-/// Wrong usage is an answer, too, where JSON was asked for, before the command or after it, or by its variable.
+/// Wrong usage gives a JSON answer, too, if JSON was requested before the command, after it, or by its variable.
 #[test]
 fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     for words in
@@ -35,7 +35,7 @@ fn wrong_usage_is_a_json_object_where_json_is_asked_for() {
     assert_eq!(jtc(&["traj", "rum"]).ends(2).out, "");
 }
 
-/// Options that every command has stand anywhere.
+/// Options of every command may stand anywhere.
 #[test]
 fn the_port_may_stand_before_the_command() {
     for words in [
@@ -46,12 +46,12 @@ fn the_port_may_stand_before_the_command() {
         let output = jtc(words).ends(3);
         assert!(output.err.contains("/nowhere/tty"), "{}", output.err);
     }
-    // The nearer one counts.
+    // The nearer option counts.
     let output = jtc(&["--port", "/far/tty", "status", "--port", "/near/tty"]).ends(3);
     assert!(output.err.contains("/near/tty"), "{}", output.err);
 }
 
-/// The joint bus is CAN FD: a transport that cannot carry it is refused with one that can.
+/// The joint bus is CAN FD: a transport that cannot carry it is refused, and a suitable one is named.
 #[cfg(unix)]
 #[test]
 fn a_bus_that_cannot_carry_the_joints_is_refused() {
@@ -86,7 +86,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     let output = jtc(&["--json", "traj", "check", file]).ends(4);
     let problems = output.json()["verdict"]["problems"].clone();
     assert!(problems[0]["joint"].is_u64() && problems[0]["limit"].is_f64(), "{problems}");
-    // The next command is one that can be typed.
+    // The next command can be typed.
     let spaced = dir.path().join("my motion.csv");
     std::fs::write(&spaced, motion(0.3)).unwrap();
     let spaced = spaced.to_str().unwrap();
@@ -94,7 +94,7 @@ fn the_check_refuses_with_4_and_names_joint_and_point() {
     assert!(output.out.contains(&format!("next: jtc traj run '{spaced}' --speed 50")), "{}", output.out);
     let output = jtc(&["traj", "check", file]).ends(4);
     assert!(output.out.contains(&format!("jtc traj check {file} --speed ")), "{}", output.out);
-    // Refused before anything is opened: the port is not even there.
+    // Refused before any file or port is opened: the port does not even exist.
     let output = jtc(&["--json", "traj", "run", file, "--port", "/nowhere/tty"]).ends(4);
     assert_eq!(output.json()["outcome"], "refused");
     let output = jtc(&["--json", "traj", "info", file]).ends(0);
@@ -165,7 +165,7 @@ fn an_output_that_is_there_or_cannot_be_is_refused_before_a_port_is_opened() {
     assert!(output.err.contains("uses itself"), "{}", output.err);
     run(&["--record", &path("no/where.mcap")]).ends(2);
     run(&["--record", &path("a.csv"), "--report", &path("./a.csv"), "--overwrite"]).ends(4);
-    // Allowed, and then there is no port: the old file is as it was, and no empty one is left behind.
+    // Overwriting is allowed, but the port is missing: the old file is unchanged, and an empty file is not left.
     run(&["--record", &old, "--report", &path("new.html"), "--overwrite"]).ends(3);
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
     assert!(!std::path::Path::new(&path("new.html")).exists());
@@ -208,7 +208,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     for name in ["report.html", "recording.mcap", "recording.csv", "picture.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 10_000, "{name}");
     }
-    // Neither a second demo nor a report takes the place of what is there, unless asked to; refused, nothing is run.
+    // Neither a second demo nor a report overwrites existing files without the option; a refused command runs nothing.
     std::fs::write(out.join("picture.svg"), "precious").unwrap();
     let output = jtc(&["demo", "--out", out.to_str().unwrap()]).ends(4);
     assert!(
@@ -223,7 +223,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     let file = out.join("recording.mcap");
     let page = out.join("report.html");
     jtc(&["report", file.to_str().unwrap(), "--out", page.to_str().unwrap()]).ends(4);
-    // What was recorded gives the same figures again.
+    // The recording gives the same figures again.
     let again = jtc(&["--json", "report", file.to_str().unwrap()]).ends(0).json();
     for (a, b) in again["joints"].as_array().unwrap().iter().zip(value["joints"].as_array().unwrap()) {
         let rms = |v: &serde_json::Value| v["rms_error_mrad"].as_f64().unwrap();
@@ -231,7 +231,7 @@ fn the_demo_leaves_its_files_and_follows_within_2_mrad() {
     }
 }
 
-/// A result that went nowhere is no success; a reader that has gone is.
+/// A result that cannot be printed is a failure; a reader that has disconnected is not.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -251,7 +251,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// Each example is written, and the command that it names takes it.
+/// Each example is written, and the command that it names accepts it.
 #[test]
 fn examples_are_files_that_the_named_commands_take() {
     let dir = tempfile::tempdir().unwrap();
@@ -269,7 +269,7 @@ fn examples_are_files_that_the_named_commands_take() {
             "toml" if name == "arm" => drop(jtc(&["params", "show", file]).ends(0)),
             "toml" => {}
             _ if file.ends_with("-waypoints.csv") => {
-                // No trajectory yet.
+                // Not a trajectory yet.
                 let refused = jtc(&["traj", "check", file]).ends(2);
                 assert!(refused.err.contains("`jtc plan`"), "{}", refused.err);
                 let planned = dir.path().join(format!("{name}-planned.csv"));
@@ -277,7 +277,7 @@ fn examples_are_files_that_the_named_commands_take() {
             }
             _ => drop(jtc(&["traj", "check", file]).ends(0)),
         }
-        // It may have been changed since.
+        // The file may have been changed since.
         jtc(&["example", name, "-o", to]).ends(4);
         jtc(&["example", name, "-o", to, "--overwrite"]).ends(0);
     }

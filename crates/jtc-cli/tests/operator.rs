@@ -1,4 +1,4 @@
-//! A person at a terminal while an arm moves: keys, signals, and a terminal that is as it was afterwards.
+//! A user at a terminal while an arm moves: keys, signals, and a terminal that is restored afterwards.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,7 +14,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, tcgetattr};
 use test_kit::patience::Patience;
 
-/// A terminal: the person's end, and the command's.
+/// Returns a terminal: the user's end, and the command's.
 fn terminal() -> (File, OwnedFd) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).unwrap();
@@ -24,7 +24,7 @@ fn terminal() -> (File, OwnedFd) {
     (File::from(master), slave)
 }
 
-/// Reads what a command prints until these words have come.
+/// Reads the output of a command until these words have come.
 fn until(err: &mut impl BufRead, words: &str) {
     let (mut line, mut all) = (String::new(), String::new());
     while !line.contains(words) {
@@ -34,7 +34,7 @@ fn until(err: &mut impl BufRead, words: &str) {
     }
 }
 
-/// A command at work in real time, with a person at its terminal.
+/// A command in real time, with a user at its terminal.
 struct Session {
     sim: Sim,
     child: Child,
@@ -60,7 +60,7 @@ impl Session {
         session
     }
 
-    /// A run that is just about to move.
+    /// Starts a run that is just about to move.
     fn run() -> Self {
         let sim = Sim::start(&["--no-throttle"]).with_parameters();
         let (file, record) = (sim.path("motion.csv"), sim.path("run.csv"));
@@ -68,7 +68,7 @@ impl Session {
         Self::start(sim, &["traj", "run", &file, "--record", &record], "space pauses")
     }
 
-    /// A recording of a taught arm.
+    /// Starts a recording of a taught arm.
     fn teaching() -> Self {
         let sim = Sim::start(&["--no-throttle"]).held();
         let file = sim.path("taught.csv");
@@ -84,7 +84,7 @@ impl Session {
         until(self.err.as_mut().expect("somebody listens"), words);
     }
 
-    /// Waits for the end.
+    /// Waits for its end.
     fn end(mut self) -> Ended {
         let code = self.child.wait().unwrap().code().unwrap_or(-1);
         let (mut out, mut err) = (String::new(), String::new());
@@ -98,7 +98,7 @@ impl Session {
     }
 }
 
-/// Exit code, what was printed on stdout, what was left of stderr, and the simulator.
+/// Exit code, stdout, the rest of stderr, and the simulator.
 struct Ended {
     code: i32,
     value: serde_json::Value,
@@ -130,13 +130,13 @@ fn stands(sim: &Sim) {
     }
 }
 
-/// J-33: however a person or a system ends the command, the arm is stopped on its path first.
+/// J-33: after any end of the command by a user or a system, the arm is first stopped on its path.
 #[test]
 fn j33_every_signal_stops_on_the_path_and_then_ends() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let mut run = Session::run();
         if signal == "-HUP" {
-            // The terminal has gone: nothing that is printed is read.
+            // The terminal is closed: the output has no reader.
             run.err = None;
         }
         run.signal(signal);
@@ -146,7 +146,7 @@ fn j33_every_signal_stops_on_the_path_and_then_ends() {
     }
 }
 
-/// Space pauses, space goes on, `s` stops.
+/// Space pauses, space resumes, `s` stops.
 #[test]
 fn j33_keys_pause_resume_and_stop() {
     let mut run = Session::run();
@@ -167,27 +167,28 @@ fn j33_keys_pause_resume_and_stop() {
     stands(&sim);
 }
 
-/// A second Ctrl-C ends the command at once, reports what may be, and leaves the terminal as it was.
+/// A second Ctrl-C ends the command at once, reports the possible state, and restores the terminal.
 #[test]
 fn a_second_interrupt_ends_at_once_and_says_that_the_arm_may_be_moving() {
     let mut run = Session::run();
     run.signal("-INT");
     run.until("stopping on the path");
-    // Signals within 0.1 s are one.
+    // Signals within 0.1 s count as one.
     std::thread::sleep(std::time::Duration::from_millis(150));
     run.signal("-INT");
     let Ended { code, value, err, sim } = run.end();
-    // On a slow computer the first one may have come to its end already.
+    // On a slow computer the first one may already have completed.
     let at_once = value["error"]["code"] == "ended-at-once";
     assert!(code == 5 && (at_once || value["outcome"] == "stopped"), "{code} {value}");
     let words = err.contains("MAY BE MOVING") || err.contains("moves nothing any more");
     assert!(!at_once || words, "{err}");
-    // What was recorded is there, and can be read.
+    // The recording exists and can be read.
     jtc(&["report", &sim.path("run.csv")]).ends(0);
     sim.jtc(&["traj", "stop"]);
 }
 
-/// Teaching: a terminal and a wrapper may both send a signal, which is one; a second press ends it with words about the controller.
+/// Teaching: a terminal and a wrapper may both send a signal, which counts as one; a second press ends the command with
+/// a message about the controller.
 #[test]
 fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching() {
     for close in [true, false] {
@@ -204,13 +205,13 @@ fn a_second_interrupt_while_teaching_says_that_the_controller_stays_in_teaching(
             assert!(!close && code == 5, "{code} {value}");
             assert!(value["error"]["message"].as_str().unwrap().contains("stays in Teaching"), "{value}");
         } else {
-            // The first one did its work before the second came: the arm was not moved, and is held again.
+            // The first one took effect before the second came: the arm was not moved, and is held again.
             assert_eq!((code, state.as_str()), (2, Some("HoldPos")), "{value}");
         }
     }
 }
 
-/// A command at a simulated controller that was interrupted at the words that are waited for on its stderr: its exit code and answer.
+/// Interrupts a command at a simulated controller at these words on its stderr; returns its exit code and answer.
 fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) {
     let mut child = sim
         .command(&[&["--json"], words].concat())
@@ -222,14 +223,14 @@ fn interrupted(sim: &Sim, words: &[&str], at: &str) -> (i32, serde_json::Value) 
     let mut err = BufReader::new(child.stderr.take().unwrap());
     until(&mut err, at);
     cli_kit::trial::signal(&child, "-INT");
-    // Nobody reads on: a full pipe must not hold it either.
+    // No reader is left: a full pipe must not block the command either.
     let mut out = String::new();
     child.stdout.take().unwrap().read_to_string(&mut out).unwrap();
     let code = child.wait().unwrap().code().unwrap_or(-1);
     (code, serde_json::from_str(out.trim()).unwrap_or_else(|e| panic!("{e}: {out:?}")))
 }
 
-/// Ctrl-C in each wait before the motion: nothing moves, and that is reported, with exit code 5.
+/// Ctrl-C in each wait before the motion: the arm does not move, and the command reports that with exit code 5.
 #[test]
 fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     let sim = Sim::start(&[]);
@@ -252,7 +253,7 @@ fn j33_an_interrupt_in_a_wait_of_a_run_starts_no_motion() {
     }
 }
 
-/// Ctrl-C while a jog waits for the drives: nothing was jogged, which is not the same as a jog by nothing.
+/// Ctrl-C while a jog waits for the drives: no jog was sent, which differs from a jog by 0.
 #[test]
 fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     let sim = Sim::start(&[]);
@@ -271,7 +272,7 @@ fn j58_an_interrupt_of_a_jog_that_waits_jogs_nothing() {
     assert!(message.contains("during the wait for the drives"), "{value}");
 }
 
-/// Ctrl-C on the way to the first point stops there, and the motion is not begun.
+/// Ctrl-C on the approach stops there, and the motion does not begin.
 #[test]
 fn j33_an_interrupt_on_the_approach_stops_on_it() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -301,24 +302,24 @@ fn j33_an_interrupt_on_the_approach_stops_on_it() {
     assert!(status["joints"][0]["position_rad"].as_f64().unwrap() < 0.7, "{status}");
 }
 
-/// Ctrl-C in the waits of recover: it sends nothing more, but stops what moves; and what it prints in each state.
+/// Ctrl-C in the waits of recover: the command sends no more, but stops a motion; and its output in each state.
 #[test]
 fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     let cancelled = |sim: &Sim, words: &[&str], at: &str| {
         let (code, value) = interrupted(sim, words, at);
         assert_eq!((code, value["error"]["code"].as_str()), (5, Some("cancelled")), "{at}: {value}");
     };
-    // Fresh: it waits for the drives, of which one does not come.
+    // After a start the command waits for the drives, and one does not come.
     let fault = "format = 2\n[[fault]]\nkind = \"ignores-state\"\njoint = 1\nat_s = 0\n";
     cancelled(
         &Sim::with_faults(&["--no-throttle"], fault),
         &["recover", "--defaults"],
         "waiting for joint 1",
     );
-    // Somebody presses the emergency stop while the arm is taught, after `teach on` has seen that it is.
+    // The emergency stop is pressed while the arm is taught, after `teach on` has seen Teaching.
     let fault = "format = 2\n[[fault]]\nkind = \"safety-input\"\nin_state = \"teaching\"\nafter_s = 5\n";
     let sim = Sim::with_faults(&["--no-throttle"], fault).held();
-    // In motion, of which nobody takes care any more.
+    // In motion, without any program that supervises it.
     let file = sim.file("motion.csv", &slow_motion(600));
     let (_person, slave) = terminal();
     let mut run = sim
@@ -332,7 +333,7 @@ fn j33_an_interrupt_of_recover_leaves_a_standing_arm() {
     run.wait().unwrap();
     cancelled(&sim, &["recover"], "stopping the motion");
     stands(&sim);
-    // The emergency stop is pressed, and nobody releases it.
+    // The emergency stop stays pressed.
     sim.jtc(&["teach", "on"]).ends(0);
     reaches(&sim, "Error");
     cancelled(&sim, &["recover"], "release the emergency stop (waiting)");

@@ -1,4 +1,5 @@
-//! The commands of README.md and of the pages of docs/ are typed as they stand there, against `jtc sim`, and print what is shown.
+//! The commands of README.md and of the pages of docs/ are typed as written, against `jtc sim`, and print the shown
+//! output.
 #![cfg(target_os = "linux")]
 
 #[test]

@@ -1,14 +1,14 @@
-//! `jtc payload`: what the arm carries (J-60).
+//! `jtc payload`: the payload of the arm (J-60).
 
 use crate::common;
 
 use common::{Sim, jtc, moving_while};
 use serde_json::Value;
 
-/// Bent, so that the shoulder and the elbow carry what is at the flange.
+/// Bent, so that shoulder and elbow carry the payload.
 const BENT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1.5,0,0.35,0.3,0,0.3,0\n3,0,0.7,0.6,0,0.6,0\n";
 
-/// Stretched out in the end.
+/// Stretched out at the end.
 fn stretched() -> String {
     BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05")
 }
@@ -17,8 +17,8 @@ fn mass(value: &Value) -> f64 {
     value["mass_kg"].as_f64().unwrap()
 }
 
-/// What the control law has to add to the torque of the model at joint 2 (N·m), the magnitude: before the model of the arm that
-/// is held changed by more than 2 N·m, and at the end of a recording of the simulator.
+/// Returns the magnitude of the torque that the control law adds to the model at joint 2 (N·m): before the model of the
+/// held arm changed by more than 2 N·m, and at the end of a recording of the simulator.
 fn missing(recording: &str) -> (f64, f64) {
     let mut lines = recording.lines().filter(|line| !line.starts_with('#'));
     let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -38,7 +38,7 @@ fn missing(recording: &str) -> (f64, f64) {
     ((rows[changed - 300][2] - rows[changed - 300][1]).abs(), (last[2] - last[1]).abs())
 }
 
-/// 3 kg that the controller does not know are held by its integral; given, by its model.
+/// The integral holds 3 kg that the controller does not know; the model holds them once they are set.
 #[test]
 fn j60_a_payload_that_is_given_is_carried() {
     let dir = tempfile::tempdir().unwrap();
@@ -61,7 +61,7 @@ fn j60_a_payload_that_is_given_is_carried() {
     assert!(before > 8.0 && after < 0.5 * before, "{before} N·m became {after} N·m");
 }
 
-/// What is refused is named with the joint and its torque, and nothing is changed.
+/// A refusal names the joint and its torque, and changes no setting.
 #[test]
 fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -93,12 +93,12 @@ fn j60_a_payload_that_cannot_be_is_refused_with_its_reason() {
         let refused = set(words, 2);
         assert!(refused.contains(what), "{words:?}: {refused}");
     }
-    // Without a port nothing is looked for.
+    // Without a port no search starts.
     let none = jtc(&["payload", "set", "--mass", "-2", "--com", "0,0,0", "--port", "/nowhere/tty"]).ends(2);
     assert!(none.err.contains("nothing was sent"), "{}", none.err);
 }
 
-/// A path that the arm cannot run with what it carries is refused before anything is sent.
+/// A path that the arm cannot run with its payload is refused before any frame is sent.
 #[test]
 fn j60_a_run_is_checked_with_the_payload() {
     let sim = Sim::start(&["--no-throttle", "--speed", "max"]).held();
@@ -123,7 +123,7 @@ fn j60_a_run_is_checked_with_the_payload() {
     sim.json(&["traj", "run", &far, "--approach"], 0);
 }
 
-/// What remains of a motion is checked with a payload that came while it was paused; a motion that is not known is not, and that is
+/// The remainder of a paused motion is checked with a new payload; an unknown motion is not checked, and that is
 /// reported.
 #[cfg(unix)]
 #[test]

@@ -1,4 +1,4 @@
-//! `jtc plan`: trajectories through waypoints, and what is refused of them.
+//! `jtc plan`: trajectories through waypoints, and refusals.
 
 use crate::common;
 
@@ -22,7 +22,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
     );
     lines
         .map(|line| {
-            // 17 significant digits: one before the point and 16 behind it.
+            // 17 significant digits: one before the point and 16 after it.
             for cell in line.split(',').skip(1) {
                 let digits = cell.trim_start_matches('-').split_once('e').expect("an exponent").0;
                 assert_eq!(digits.len(), 18, "{cell}");
@@ -32,7 +32,7 @@ fn rows(file: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// `--deg` makes degrees of the blend as of the positions, and a waypoint that a rounded corner misses is named.
+/// `--deg` converts the blend as well as the positions, and a waypoint that a rounded corner misses is named.
 #[test]
 fn a_blend_is_in_the_unit_of_the_positions() {
     let dir = Dir::new();
@@ -55,8 +55,8 @@ fn a_blend_is_in_the_unit_of_the_positions() {
     }
 }
 
-/// `plan` keeps the margin and prints it, and both `plan` and `traj check` warn below 10 %. A margin out of its range is refused, and the
-/// range is named.
+/// `plan` keeps the margin and prints it, and both `plan` and `traj check` warn below 10 %. A margin out of range is
+/// refused, and the range is named.
 #[test]
 fn a_plan_leaves_the_margin_that_is_asked_for() {
     let dir = Dir::new();
@@ -97,8 +97,8 @@ fn a_plan_leaves_the_margin_that_is_asked_for() {
     }
 }
 
-/// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is no slower without a
-/// limit; what is printed is what is in the file.
+/// The trajectory passes the check of a run, rests at its ends, passes the waypoints as the blend allows, and is at
+/// least as fast without a limit; the output matches the file.
 #[test]
 fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     let dir = Dir::new();
@@ -132,7 +132,7 @@ fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
             let q: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
             let away = |row: &Vec<f64>| (0..6).map(|j| (row[1 + j] - q[j]).abs()).fold(0.0, f64::max);
             let nearest = rows.iter().map(away).fold(f64::INFINITY, f64::min);
-            // Between two points at 1.5 rad/s and 10 ms it is 7.5 mrad away at most.
+            // Between two points at 1.5 rad/s and 10 ms the distance is at most 7.5 mrad.
             assert!(nearest <= blend + 8e-3, "{name}: {nearest} rad from {line}");
         }
         for end in [&rows[0], rows.last().unwrap()] {
@@ -144,7 +144,7 @@ fn a_plan_leads_through_its_waypoints_and_passes_the_check() {
     assert!(jumps < stops && blended < stops && half > 1.5 * blended, "{durations:?}");
 }
 
-/// Units, poses and JSON lead to the same motion.
+/// Units, poses and JSON give the same motion.
 #[test]
 fn the_forms_of_waypoints_are_the_same_motion() {
     let dir = Dir::new();
@@ -171,7 +171,7 @@ fn the_forms_of_waypoints_are_the_same_motion() {
     assert!(durations.iter().all(|d| (d - durations[0]).abs() < 1e-9), "{durations:?}");
 }
 
-/// Times of the file are kept to the millisecond; where some are left out, the motion is as fast there as it can be.
+/// Times of the file are kept to the millisecond; without a time the motion is as fast as possible.
 #[test]
 fn given_times_are_kept() {
     let dir = Dir::new();
@@ -244,7 +244,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     // Suggestions, in the hint.
     let output = jtc(&["plan", &pose, "--arm", &arm, "-o", &out]).ends(2);
     assert!(output.err.contains("is \"above-table\" meant?"), "{}", output.err);
-    // Outputs that are there, or are the input.
+    // Outputs that exist, or are the input.
     jtc(&["plan", &good, "-o", &out]).ends(0);
     let output = jtc(&["plan", &good, "-o", &out]).ends(4);
     assert!(
@@ -256,7 +256,7 @@ fn what_cannot_be_planned_is_refused_with_its_line() {
     jtc(&["plan", &good, "-o", &good, "--overwrite"]).ends(4);
 }
 
-/// Many waypoints are a motion like any other; one that no trajectory can carry is refused.
+/// Many waypoints are a normal motion; a motion that no trajectory can carry is refused.
 #[test]
 fn ten_thousand_waypoints_are_planned_or_too_long() {
     let dir = Dir::new();
@@ -278,7 +278,7 @@ fn ten_thousand_waypoints_are_planned_or_too_long() {
     );
 }
 
-/// The page shows the motion, the limits, and what binds when; it is whole in itself.
+/// The page shows the motion, the limits, and the limiting constraints over time; it needs no other file.
 #[test]
 fn the_report_names_what_binds_when() {
     let dir = Dir::new();
@@ -290,7 +290,7 @@ fn the_report_names_what_binds_when() {
     assert!(text.contains(&format!("\"plan\":[{bound}")), "{bound}");
     assert!(text.contains("What binds for how long") && text.contains("[\"joint 6\","));
     assert!(!text.contains("src=\"http") && text.contains("set_position_rad"));
-    // A page that is there already: nothing is written.
+    // The page already exists: no file is written.
     let other = dir.path("other.csv");
     jtc(&["plan", &file, "-o", &other, "--report", &page]).ends(4);
     assert!(!dir.has("other.csv"));

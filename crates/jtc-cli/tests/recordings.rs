@@ -1,4 +1,4 @@
-//! Recordings of a run, of the simulator and of the demo: what a killed program, a full disk and a second run leave of them.
+//! Recordings of a run, of the simulator and of the demo after a killed program, a full disk and a second run.
 #![cfg(unix)]
 
 use crate::common;
@@ -16,7 +16,8 @@ fn json(words: &[&str]) -> serde_json::Value {
     jtc(&[&["--json"], words].concat()).ends(0).json()
 }
 
-/// Each millisecond of a motion that ran over the serial port, readable while the simulator runs, after `kill -9`, and run again.
+/// Each millisecond of a motion over the serial port: readable while the simulator runs, after `kill -9`, and run
+/// again.
 #[test]
 fn the_simulator_records_each_millisecond() {
     for name in ["sim.mcap", "sim.csv"] {
@@ -26,10 +27,10 @@ fn the_simulator_records_each_millisecond() {
         let sim = ready(&["--no-throttle", "--record", &record]);
         let file = sim.file("motion.csv", &motion(0.2));
         sim.jtc(&["traj", "run", &file]).ends(0);
-        // It was ready before, so the file is there, and not written over.
+        // The recording was already started, so the file exists and is not overwritten.
         let output = jtc(&["sim", "--record", &record]).ends(4);
         assert!(output.err.contains("is there already"), "{}", output.err);
-        // What is younger than 0.2 s may be missing.
+        // Data younger than 0.2 s may be missing.
         until("1201 places", || jtc(&["traj", "info", &record]).err.contains("at 1201 places"));
         assert_eq!(sim.end("-KILL").0, -1);
         let info = json(&["traj", "info", &record]);
@@ -63,7 +64,7 @@ fn a_simulator_that_is_ended_completes_its_recording() {
     assert!(!info["notes"].to_string().contains("completed"), "{info}");
 }
 
-/// A recorder that is killed in the middle of a motion leaves all but the last moments of it.
+/// A recorder that is killed during a motion keeps all but the last moments of it.
 #[test]
 fn a_run_that_is_killed_leaves_its_recording() {
     for name in ["run.mcap", "run.csv"] {
@@ -82,7 +83,7 @@ fn a_run_that_is_killed_leaves_its_recording() {
         run.wait().unwrap();
         let info = json(&["traj", "info", &record]);
         let seen = info["duration_s"].as_f64().unwrap();
-        // An MCAP file holds the whole trajectory, 6 s at 20 %, however much of it was run.
+        // An MCAP file holds the whole trajectory, 6 s at 20 %, even if only a part of it was run.
         assert!(
             if name == "run.mcap" { (seen - 30.0).abs() < 0.1 } else { (1.0..30.0).contains(&seen) },
             "{info}"
@@ -95,13 +96,13 @@ fn a_run_that_is_killed_leaves_its_recording() {
     }
 }
 
-/// Milliseconds of the path in a recording that somebody is writing.
+/// Milliseconds of the path in a recording that is still being written.
 fn recorded_ms(record: &str) -> u64 {
     let samples = jtc_host::recording::Recording::read(std::path::Path::new(record)).map(|read| read.samples);
     samples.unwrap_or_default().iter().map(|sample| u64::from(sample.point)).max().unwrap_or(0)
 }
 
-/// A disk that takes nothing is known before the arm moves.
+/// A disk without space is detected before the arm moves.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_full_disk_is_found_before_anything_moves() {
@@ -122,7 +123,8 @@ fn a_full_disk_is_found_before_anything_moves() {
     assert!(output.err.contains("No space left") && output.out.is_empty(), "{}", output.err);
 }
 
-/// The disk is full on the way: reported at once, the motion goes on to its end, and the exit code shows that something is lost.
+/// The disk becomes full during the motion: this is reported at once, the motion continues to its end, and the exit
+/// code shows the loss.
 #[test]
 fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good() {
     let sim = ready(&["--speed", "max", "--no-throttle"]);
@@ -130,7 +132,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // A reader that takes the header and no more.
+    // A reader that takes only the header.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {
@@ -147,6 +149,6 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
         (Some("finished"), Some("output-lost"))
     );
     assert!(output.err.contains("nothing more is recorded, the motion goes on"), "{}", output.err);
-    // The other output is not lost with it.
+    // The other output is not affected.
     assert_eq!(value["files"], serde_json::json!([page]));
 }

@@ -84,13 +84,13 @@ fn a_command_finds_the_agent_that_owns_its_port_and_does_without_one_that_is_gon
     assert!(log.out.contains("HoldPos"), "{}", log.out);
     let second = run(agent.command(&["serve", "--listen", "127.0.0.1:0"], &port), &[], "").ends(3);
     assert!(second.err.contains(&agent.url), "{}", second.err);
-    // It leaves a file behind that names an address where nobody is.
+    // The killed agent leaves a file with an address without a listener.
     Command::new("kill").args(["-KILL", &agent.child.id().to_string()]).status().expect("kill");
     std::thread::sleep(std::time::Duration::from_millis(200));
     run(agent.command(&["status", "--baud", "921600"], &port), &[], "").ends(0);
 }
 
-/// The journal of the system, or a file, is read by others and kept.
+/// The journal of the system, or a file, can be read by others, and is kept.
 #[test]
 fn the_operators_token_is_printed_on_a_terminal_alone() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -104,7 +104,7 @@ fn the_operators_token_is_printed_on_a_terminal_alone() {
         "--token-file",
         tokens.to_str().expect("a name"),
     ];
-    // Its first start makes the token, the second one is asked for the link.
+    // The first start creates the token, the second one is asked for the link.
     for begun in 0..2 {
         let mut command = command_in(&dir);
         let mut child =
@@ -163,7 +163,8 @@ fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     ]
 }
 
-/// Both simulators take an arm the same way: the controller has stored it, and one that it could not have is refused.
+/// Both simulators take an arm in the same way: the controller has stored it, and an arm that it could not have stored
+/// is refused.
 #[test]
 fn an_arm_is_simulated_as_by_jtc_sim() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -184,7 +185,7 @@ fn an_arm_is_simulated_as_by_jtc_sim() {
     }
 }
 
-/// Modbus knows no tokens: it is off where nobody has asked for it, and for others than this computer where nobody is named.
+/// Modbus has no tokens: it is off by default, and refuses other computers unless their addresses are named.
 #[test]
 fn modbus_is_there_for_those_who_are_named() {
     let dir = tempfile::tempdir().expect("a directory");

@@ -1,4 +1,4 @@
-//! `jtc serve --record`: a recording of each motion, whoever commands it.
+//! `jtc serve --record`: a recording of each motion, for all clients.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ use jtc_host::recording::Recording;
 use serde_json::Value;
 use test_kit::patience::{Patience, until};
 
-/// An agent of a simulated controller that records.
+/// Starts a recording agent of a simulated controller.
 fn recording() -> Agent {
     recording_in(tempfile::tempdir().expect("a directory"))
 }
@@ -26,7 +26,7 @@ fn recording_in(dir: tempfile::TempDir) -> Agent {
     agent
 }
 
-/// Recordings with this ending, oldest first, when there are so many.
+/// Waits for `count` recordings with this ending and returns them, oldest first.
 fn recorded(agent: &Agent, ending: &str, count: usize) -> Vec<PathBuf> {
     let mut patience = Patience::begin();
     loop {
@@ -53,7 +53,7 @@ fn read(path: &Path) -> Recording {
     Recording::read(path).expect("a recording")
 }
 
-/// `jtc report` makes its page of it.
+/// Checks that `jtc report` makes its page of the recording.
 fn is_reported(dir: &tempfile::TempDir, path: &Path) -> Value {
     let words = ["--json", "report", path.to_str().expect("a name"), "--overwrite"];
     run(command_in(dir), &words, "").ends(0).json()
@@ -78,7 +78,7 @@ fn every_motion_has_a_recording_with_the_channels_of_a_run() {
     assert_eq!((&info.description, &info.device), (&info_of_run.description, &info_of_run.device));
     assert!(!info.commanded_by.is_empty() && info_of_run.commanded_by.is_empty(), "{}", info.commanded_by);
     assert!(info.device.is_some() && info.hash.is_some() && info.start_unix_ns > 0);
-    // What was commanded at a point is the same in both; the agent has all that the run saw, and what was before.
+    // Both have the same commanded values at a point; the agent has all samples of the run, and those before it.
     let at = |recording: &Recording, point: u32| {
         let found = recording.samples.iter().find(|s| s.is_operating() && s.point == point);
         found.map(|s| {
@@ -121,7 +121,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
         .expect("it starts");
     let part = recorded(&agent, ".part.mcap", 1).remove(0);
     let moving = |recording: &Recording| recording.samples.iter().filter(|s| s.is_operating()).count();
-    // It is readable while it is written.
+    // The file can be read while it is written.
     until("20 samples in motion", || Recording::read(&part).is_ok_and(|recording| moving(&recording) >= 20));
     let (_, dir) = agent.end("-KILL");
     runs.wait().expect("it ends");
@@ -148,7 +148,7 @@ fn a_killed_agent_leaves_its_recording_and_the_next_one_goes_on() {
     assert!(String::from_utf8_lossy(&second.stderr).contains("another agent"), "{second:?}");
 }
 
-/// The arm in a recording is the one that the controller has, also after it was given another.
+/// The arm in a recording is that of the controller, even after a new arm was given.
 #[test]
 fn the_arm_in_a_recording_is_that_of_the_controller() {
     let agent = recording();

@@ -1,4 +1,5 @@
-//! `jtc stop` from a second terminal: whatever the program is doing that has the port, the arm stands, and that program moves it no more.
+//! `jtc stop` from a second terminal: the arm stops in every phase of the program that has the port, and that program
+//! moves it no more.
 #![cfg(unix)]
 
 use crate::common;
@@ -15,7 +16,7 @@ use jtc_host::session::Flow;
 use jtc_host::{CheckOptions, CheckedTrajectory, Error, LinkError, PortError, Session};
 use serde_json::Value;
 
-/// A simulated controller, and the commands of a user with a folder of their own for sockets.
+/// A simulated controller, and the commands of a user with a separate folder for sockets.
 struct Cell(Sim);
 
 impl Cell {
@@ -33,7 +34,7 @@ impl Cell {
         run(self.command(words), &[], "")
     }
 
-    /// Starts a command, and waits for a line of its stderr that fits.
+    /// Starts a command, and waits for a matching line of its stderr.
     fn start(&self, words: &[&str], fits: impl Fn(&str) -> bool) -> Child {
         Self::started(self.command(&[&["--json"], words].concat()), words, fits)
     }
@@ -50,7 +51,8 @@ impl Cell {
         child
     }
 
-    /// The same; the line is an event of a motion that has gone on for so many seconds of its path, behind a line with this text.
+    /// Like `start`; the line is an event of a motion that has run for `seconds` of its path, after a line with this
+    /// text.
     fn moving(&self, words: &[&str], text: &str, seconds: f64) -> Child {
         let behind = std::cell::Cell::new(text.is_empty());
         self.start(words, |line| {
@@ -60,7 +62,8 @@ impl Cell {
         })
     }
 
-    /// Stops the arm; what was stopped is this program, and it ends with exit code 5. Its JSON, and that of the Stop.
+    /// Stops the arm; the stopped program is this one, and it ends with exit code 5. Returns its JSON, and that of the
+    /// Stop.
     fn stops(&self, child: Child) -> (Value, Value) {
         let stopped = self.jtc(&["--json", "stop"]).ends(0).json();
         let pid = child.id();
@@ -70,7 +73,7 @@ impl Cell {
         (ended, stopped)
     }
 
-    /// The arm stands, and goes on standing.
+    /// Checks that the arm is at rest, and stays at rest.
     fn stands(&self) {
         let status = self.0.json(&["status"], 0);
         assert_ne!(status["trajectory"], "Execute", "{status}");
@@ -82,7 +85,7 @@ impl Cell {
     }
 }
 
-/// The command ends with this code; what it printed.
+/// Checks that the command ends with this code, and returns its output.
 fn ends(child: Child, code: i32) -> Value {
     let Output { status, stdout, .. } = child.wait_with_output().unwrap();
     let text = String::from_utf8(stdout).unwrap();
@@ -103,7 +106,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     );
     let holder = &stopped["arms"][0]["holder"]["program"];
     assert_eq!(holder, "jtc traj run", "{stopped}");
-    // In words, under another name of the port, of another command, which is the same one.
+    // As text, under another name of the port, by another command with the same effect.
     let child = cell.moving(&["run", &file, "--approach"], "\"phase\":\"motion\"", 0.5);
     let real = std::fs::canonicalize(&cell.0.port).unwrap();
     let mut other = command();
@@ -111,7 +114,7 @@ fn a_run_is_stopped_from_a_second_terminal() {
     let stopped = run(other, &[], "").ends(0);
     let words = format!("stopped: the arm stands; jtc run {file}, process {}, has ", child.id());
     assert!(stopped.out.starts_with(&words), "{}", stopped.out);
-    // What the program may do is not denied.
+    // The message names what the program may still do.
     assert!(stopped.out.contains("it may request a new motion after 3 s"), "{}", stopped.out);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
@@ -142,7 +145,7 @@ fn a_move_is_stopped() {
     assert_eq!(ended["outcome"], "stopped", "{ended}");
 }
 
-/// On a line as slow as a real one: the upload goes on for many seconds, and leads to nothing.
+/// On a line as slow as a real one: the upload takes many seconds, and has no effect.
 #[test]
 fn an_upload_does_not_go_on_after_a_stop() {
     let cell = Cell(Sim::start(&[]).held());
@@ -162,7 +165,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
         );
         cell.stands();
     }
-    // A command of its own is a new request.
+    // A new command is a new request.
     let short = cell.0.file("short.csv", &motion(0.1));
     cell.jtc(&["traj", "run", &short]).ends(0);
 }
@@ -171,7 +174,7 @@ fn an_upload_does_not_go_on_after_a_stop() {
 fn a_jog_is_stopped_and_does_not_start_again() {
     let cell = Cell::held();
     let before = place(&cell.0)[0];
-    // It tells nobody when it begins.
+    // The program does not report its start.
     let (child, stopped) = (1..6)
         .map(|seconds| {
             let mut jog = cell.command(&["jog", "1", "0.2"]);
@@ -212,16 +215,16 @@ fn a_pause_reaches_the_program_too() {
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let paused = cell.jtc(&["traj", "pause"]).ends(0);
     assert!(paused.out.contains("pausing on the path; jtc traj run"), "{}", paused.out);
-    // Once the arm stands nothing is executed any more.
+    // Once the arm is at rest no motion is executed any more.
     let mut tries = (0..100).map(|_| cell.jtc(&["traj", "pause"]));
     let refused = tries.find(|again| again.code != 0).expect("the arm comes to rest").ends(1);
     assert!(refused.err.contains("trajectory Pause"), "{}", refused.err);
-    // What is paused moves no more, and its program ends.
+    // A paused motion does not continue, and its program ends.
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// As in Python: the program has the port for longer than for one motion, and may be busy with something else while the arm moves.
+/// As in Python: the program has the port for longer than one motion, and may be busy otherwise while the arm moves.
 #[test]
 fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let cell = Cell::held();
@@ -234,7 +237,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let checked = CheckedTrajectory::check(&loaded.trajectory, &arm, &status.positions(), &options).unwrap();
     session.upload(&checked, |_| Flow::Continue).unwrap();
     session.execute(&checked).unwrap();
-    // It does not read any more.
+    // The program does not read any more.
     std::thread::sleep(Duration::from_millis(1500));
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!(stopped["arms"][0]["moved"], true, "{stopped}");
@@ -243,14 +246,14 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     assert!(!status.is_executing());
     let halted =
         |error: Error| matches!(error, Error::Link(LinkError::Port(PortError::Halted { by: Some(_) })));
-    // What follows in the same program was requested before, or too soon after the Stop.
+    // The next requests of the same program were made before the Stop, or too soon after it.
     assert!(session.execute(&checked).is_err_and(halted));
     assert!(session.upload(&checked, |_| Flow::Continue).is_err_and(halted));
     session.ask_to_move().unwrap();
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     assert!(session.teach(true).is_err_and(halted));
     session.jog(&[0.0; 6]).unwrap();
-    // Three seconds later a new request is one.
+    // Three seconds later a new request is accepted.
     std::thread::sleep(Duration::from_millis(3100));
     assert!(session.jog(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.0]).is_err_and(halted));
     session.ask_to_move().unwrap();
@@ -267,7 +270,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
         assert_eq!(direct.out.trim_end(), words);
         let value = cell.jtc(&["--json", "traj", "stop"]).ends(0).json();
         assert_eq!((&value["command"], &value["arms"][0]["moved"]), (&"stop".into(), &false.into()));
-        // Through a program that looks on.
+        // Through a program that only watches.
         let mut monitor = cell.command(&["--json", "monitor"]).stdout(Stdio::piped()).spawn().unwrap();
         let mut line = String::new();
         let mut out = BufReader::new(monitor.stdout.take().unwrap());
@@ -282,7 +285,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     cell.jtc(&["recover", "--defaults"]).ends(0);
     nothing("HoldPos", "Null");
     cell.jtc(&["traj", "run", &file]).ends(0);
-    // A finished one is ended by the first of them.
+    // A finished one is ended by the first Stop.
     let direct = cell.jtc(&["stop"]).ends(0);
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
     nothing("HoldPos", "Stop");
@@ -295,7 +298,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
 }
 
-/// No Stop holds an arm without brakes that has no torque: as long as it falls, the Stop is no success.
+/// A Stop cannot hold an arm without brakes and torque: while the arm falls, the Stop fails.
 #[test]
 fn an_arm_that_falls_without_torque_does_not_stand() {
     let stops = |cell: &Cell, state: &str| {
@@ -345,7 +348,7 @@ fn the_socket_of_a_program_that_was_killed_is_passed_over() {
     cell.stops(child);
 }
 
-/// The program is stopped itself (SIGSTOP): nothing can be sent, and the emergency stop is named.
+/// The program is suspended (SIGSTOP): no frame can be sent, and the message names the emergency stop.
 #[test]
 fn a_program_that_does_not_answer_is_named() {
     let cell = Cell::held();
@@ -368,7 +371,8 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     let file = cell.0.file("motion.csv", &slow_motion(100));
     let child = cell.moving(&["traj", "run", &file], "", 1.0);
     let socket = std::fs::read_dir(cell.0.path("openjtc")).unwrap().flatten().next().unwrap().path();
-    // One connects and is silent, one sends what is no request, one leaves behind its request.
+    // The first client connects and is silent, the second sends an invalid request, the third disconnects after its
+    // request.
     let silent = std::os::unix::net::UnixStream::connect(&socket).unwrap();
     for words in [vec![b'x'; 10_000], b"{\"halt\":\"execute\",\"by\":\"x\"}\n".to_vec()] {
         let mut stream = std::os::unix::net::UnixStream::connect(&socket).unwrap();
@@ -394,7 +398,7 @@ fn several_ask_at_once_and_one_that_leaves_takes_nothing_back() {
     cell.stands();
 }
 
-/// Without a port a Stop goes to the arms whose ports programs of this user have.
+/// Without a port, a Stop goes to the arms whose ports are open in programs of this user.
 #[test]
 fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     let cell = Cell::held();
@@ -407,7 +411,7 @@ fn a_stop_without_a_port_finds_the_program_that_moves_an_arm() {
     assert_eq!(ends(child, 5)["outcome"], "stopped");
 }
 
-/// Two arms whose programs have one folder for sockets; what `jtc stop` without a port says.
+/// Two arms whose programs share a folder for sockets; the output of `jtc stop` without a port.
 struct Two(Cell, Child, Cell, Child);
 
 impl Two {
@@ -433,7 +437,7 @@ impl Two {
     }
 }
 
-/// The controller goes on with the motion of a program that was killed: the socket that it left names the arm.
+/// The controller continues the motion of a killed program: the remaining socket names the arm.
 #[test]
 fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     let mut two = Two::moving();
@@ -449,7 +453,7 @@ fn the_arm_of_a_program_that_was_killed_is_stopped_beside_another_one() {
     other.stands();
 }
 
-/// A program that hangs delays no other arm's Stop, and one JSON object tells of all arms.
+/// A hanging program delays no other arm's Stop, and one JSON object reports all arms.
 #[test]
 fn a_program_that_hangs_delays_no_other_stop() {
     let two = Two::moving();

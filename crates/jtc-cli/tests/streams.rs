@@ -1,4 +1,4 @@
-//! Events of `--json`: stderr has what happens as it happens, stdout the result alone.
+//! Events of `--json`: stderr shows events as they happen, stdout only the result.
 #![cfg(unix)]
 
 use crate::common;
@@ -11,7 +11,7 @@ use common::{Sim, jtc, motion};
 use serde_json::Value;
 use test_kit::patience::until;
 
-/// The events of a command, and its result.
+/// Returns the events of a command, and its result.
 fn stream(output: &CommandOutput) -> (Vec<Value>, Value) {
     let events = output.events();
     for event in &events {
@@ -52,7 +52,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert!(places.is_sorted(), "{places:?} {}", output.err);
     let full = events.iter().rfind(|e| name(e) == "uploading").unwrap();
     assert_eq!((full["fraction"].as_f64(), &full["phase"]), (Some(1.0), &Value::from("motion")));
-    // 2.4 s of motion: more than one sample, and not one a status.
+    // 2.4 s of motion: more than one sample, but not one per status.
     let samples: Vec<&Value> = events.iter().filter(|e| name(e) == "sample").collect();
     assert!((3..=20).contains(&samples.len()), "{}", samples.len());
     assert_eq!(samples[0]["position_rad"].as_array().unwrap().len(), 6);
@@ -88,7 +88,7 @@ fn a_command_reports_what_happens_and_then_its_result() {
     assert_eq!(result["outcome"], "refused");
 }
 
-/// What breaks in motion is reported at once, the first cause first.
+/// A failure in motion is reported at once, the first cause first.
 #[test]
 fn what_breaks_in_motion_is_reported_at_once() {
     let fault =
@@ -117,14 +117,14 @@ fn the_demo_has_events_and_all_events_are_documented() {
     }
 }
 
-/// A reader that takes nothing of the events (`2>&1 >report.json | less`) does not keep a run from moving or hearing Ctrl-C.
+/// A blocked reader of the events (`2>&1 >report.json | less`) does not keep a run from moving or receiving Ctrl-C.
 #[test]
 fn j33_a_reader_that_does_not_read_holds_no_run() {
     let sim = Sim::start(&["--no-throttle"]).held();
     let (file, recording) = (sim.path("motion.csv"), sim.path("run.csv"));
     std::fs::write(&file, motion(0.2)).unwrap();
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // What a pipe holds.
+    // Capacity of a pipe.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut run = sim.command(&["--json", "traj", "run", &file, "--speed", "5", "--record", &recording]);
     let mut run = run.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(writer).spawn().unwrap();

@@ -1,4 +1,5 @@
-//! Host supervision (J-59) as docs/arm.md sets it: motions of `jtc` come to their end, and one whose program was killed is paused.
+//! Host supervision (J-59) as in docs/arm.md: motions of `jtc` run to their end, and a motion whose program was killed
+//! is paused.
 #![cfg(unix)]
 
 use crate::common;
@@ -6,7 +7,7 @@ use crate::common;
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
 
-/// An arm that is held by a controller that supervises its host.
+/// An arm held by a controller that supervises its host.
 fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
     let arm = include_str!("../../../arms/avena.toml");
@@ -21,7 +22,7 @@ const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]
 fn j59_a_motion_longer_than_the_timeout_comes_to_its_end() {
-    // As long as a program may have to wait for its turn on a busy computer.
+    // Longest wait of a program for its turn on a busy computer.
     let sim = supervised(4000);
     let file = sim.file("motion.csv", MOTION);
     assert_eq!(sim.json(&["traj", "run", &file], 0)["outcome"], "finished");
@@ -37,7 +38,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     let mut child = moving_while(&sim, &["traj", "run", &file], 0.5);
     child.kill().unwrap();
     child.wait().unwrap();
-    // A program that only watches does not keep it going.
+    // A program that only watches does not keep the motion running.
     loop {
         let status = sim.json(&["status"], 0);
         let (state, trajectory) = (status["state"].as_str(), status["trajectory"].as_str());
@@ -49,7 +50,7 @@ fn j59_a_motion_whose_program_was_killed_is_paused() {
     }
 }
 
-/// The agent before has read the timeout, and this one has not: it reads it before it passes on questions.
+/// The previous agent has read the timeout, the new one has not: it reads the timeout before it forwards requests.
 #[test]
 fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let sim = supervised(3000);
@@ -60,7 +61,7 @@ fn j59_no_question_stands_for_a_program_that_was_gone_before_the_agent_came() {
     let agent = Agent::start(&["--port", sim.port.to_str().unwrap()]);
     let mut patience = Patience::begin();
     loop {
-        // Each of them is a frame, where it is passed on.
+        // Each command sends a frame, if the agent passes it on.
         agent.jtc(&["info"]);
         let status = agent.jtc(&["--json", "status"]).ends(0).json();
         if status["trajectory"] == "Pause" {

@@ -1,5 +1,5 @@
-//! The part of docs/troubles.md that is about `jtc`: each case is run by the real program, mostly against `jtc sim`.
-//! `UPDATE_DOCS=1` writes it again.
+//! The part of docs/troubles.md about `jtc`: the real program runs each case, mostly against `jtc sim`. `UPDATE_DOCS=1`
+//! writes it again.
 #![cfg(target_os = "linux")]
 
 mod files;
@@ -10,7 +10,7 @@ use test_kit::page::Page;
 
 use crate::desk::{Desk, Line};
 
-/// With the files of the cases.
+/// Adds the files of the cases.
 fn with_files(desk: Desk) -> Desk {
     files::write(desk.dir());
     desk
@@ -137,7 +137,7 @@ fn moving(page: &mut Page) {
     let pushed = ready(&["--speed", "max", "--faults", fault.to_str().unwrap()]);
     pushed.run(run);
     let mut doctor = pushed.run("jtc doctor").blurred();
-    // The simulated time runs as fast as it can: how long ago it was may be seconds or hours.
+    // The simulated time runs at full speed: the age may be seconds or hours.
     for unit in ["s", "min", "h", "days"] {
         doctor.text = doctor.text.replace(&format!("… {unit} ago"), "… s ago");
     }

@@ -1,4 +1,5 @@
-//! Environment variables: no variable moves, resets, programs, answers a question or overrules a check; those that count are shown.
+//! Environment variables: no variable moves, resets, programs, answers a question or overrides a check; variables in
+//! effect are shown.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -13,8 +14,8 @@ fn with((name, value): (&str, &str), words: &[&str]) -> CommandOutput {
     run(command, words, "")
 }
 
-/// A variable that shaped a motion or a result is refused before a port is opened (that would be exit code 3): without it the arm
-/// would go elsewhere, faster or longer.
+/// A variable that changed a motion or a result is refused before a port is opened (that would be exit code 3): without
+/// it the arm would move elsewhere, faster or longer.
 #[test]
 fn a_variable_that_shaped_a_motion_refuses_the_command() {
     let dir = Dir::new();
@@ -48,7 +49,7 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
         with((variable, value), &["plan", &file, "-o", &out]).ends(2);
         assert!(!dir.has("out.csv"), "{variable}");
     }
-    // Off, empty or typed, there is nothing to refuse; and a stop is never refused.
+    // Off, empty or typed, the variable is not refused; and a stop is never refused.
     let plan = ["plan", &file, "-o", &out, "--overwrite", "--speed", "50"];
     for (variable, value) in [("JTC_DEG", "off"), ("JTC_LINE", ""), ("JTC_SPEED_PERCENT", "5")] {
         with((variable, value), &plan).ends(0);
@@ -58,7 +59,7 @@ fn a_variable_that_shaped_a_motion_refuses_the_command() {
     }
 }
 
-/// A variable that moved, reset, answered a question or overruled a check does nothing, and one line says so.
+/// A variable that moved, reset, answered a question or overrode a check has no effect, and one line reports that.
 #[test]
 fn no_variable_acts() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -72,7 +73,7 @@ fn no_variable_acts() {
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
         output
     };
-    // It misses its parameters: nothing gives it any but a typed option.
+    // Parameters are missing: only a typed option gives them.
     ignored("JTC_DEFAULTS", "1", &["recover", "--port", &port], 4);
     ignored("JTC_ARM", &arm, &["recover", "--port", &port], 4);
     assert_eq!(sim.json(&["status"], 0)["state"], "Init");
@@ -116,7 +117,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// A variable in effect is shown in one line of stderr, where the option is not typed before or after the command.
+/// A variable in effect is shown in one line of stderr, unless the option is typed before or after the command.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::start(&["--speed", "max", "--no-throttle"]);
@@ -130,7 +131,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = with(("JTC_PORT", &port), &["--json", "status"]).ends(0);
     assert_eq!(programs.events()[0]["text"], line.trim_end(), "{}", programs.err);
     assert!(programs.json()["state"].is_string());
-    // What is wrong with a value of a variable names the variable.
+    // An error in the value of a variable names the variable.
     let wrong = with(("JTC_BAUD", "fast"), &["status"]).ends(2);
     assert!(wrong.err.contains("--baud is set by the variable JTC_BAUD=fast"), "{}", wrong.err);
 }

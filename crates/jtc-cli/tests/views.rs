@@ -1,4 +1,4 @@
-//! `jtc` at a terminal: the live view from its begin to its end, and a run with its bar.
+//! `jtc` at a terminal: the live view from start to end, and a run with its bar.
 #![cfg(unix)]
 
 use crate::common;
@@ -9,7 +9,7 @@ use std::process::Stdio;
 use cli_kit::trial::{Terminal, signal};
 use common::{Sim, motion, slow_motion};
 
-/// The arm moves slowly, and the command that began it is gone.
+/// Moves the arm slowly, after the end of the command that started the motion.
 fn moving(sim: &Sim) {
     let file = sim.file("slow.csv", &slow_motion(300));
     let mut run = sim.command(&["--json", "traj", "run", &file]);
@@ -20,7 +20,7 @@ fn moving(sim: &Sim) {
     run.wait().unwrap();
 }
 
-/// The view stops a motion whose own command has gone, shows it, and leaves the terminal as it was.
+/// The view stops a motion whose command has ended, shows it, and restores the terminal.
 #[test]
 fn j33_the_stop_key_of_the_view_stops() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -37,7 +37,7 @@ fn j33_the_stop_key_of_the_view_stops() {
     assert!(terminal.is_as_before());
 }
 
-/// However the view ends, it ends at once, with the terminal as it was.
+/// After any cause the view ends at once, and restores the terminal.
 #[test]
 fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -51,7 +51,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         // The screen from before the view is shown again.
         assert!(String::from_utf8_lossy(&terminal.bytes).contains("\u{1B}[?1049l"), "{name}");
     }
-    // The window is closed, for a session of its own and for one that receives nothing of it.
+    // The window is closed, for its own session and for a session without that signal.
     for nohup in [false, true] {
         let mut terminal = Terminal::new(60, 20);
         let mut monitor = sim.command(&["monitor"]);
@@ -68,7 +68,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
         terminal.hang_up();
         assert_eq!(terminal.ends(&mut child), 0, "nohup: {nohup}");
     }
-    // Lines for whoever is no terminal, until it has read enough.
+    // Output in lines for a reader without a terminal, until it has read enough.
     let mut child = sim.command(&["monitor"]);
     let mut child = child.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut line = String::new();
@@ -79,7 +79,7 @@ fn the_view_ends_with_its_terminal_its_reader_and_its_signals() {
     assert_eq!(child.wait().unwrap().code(), Some(0));
 }
 
-/// On a terminal below 40 columns the keys work, and what is missing is printed.
+/// On a terminal below 40 columns the keys work, and the required size is printed.
 #[test]
 fn a_small_terminal_says_so_and_its_keys_work() {
     let sim = Sim::start(&["--no-throttle"]);
@@ -92,7 +92,8 @@ fn a_small_terminal_says_so_and_its_keys_work() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// What is printed while a bar is drawn stands above it, and no piece of the bar is left; keys that cannot do anything report it.
+/// Text that is printed while a bar is drawn stands above it, and no piece of the bar is left; keys without effect
+/// report it.
 #[test]
 fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -100,7 +101,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let mut terminal = Terminal::new(40, 40);
     let mut child = terminal.start(&sim.command(&["traj", "run", &file, "--speed", "10"]));
     terminal.until("the bar", |p| p.text().contains("% of 12.0 s") && p.text().contains("space pauses"));
-    // Ctrl-S holds no command whose stop key counts.
+    // Ctrl-S blocks no command whose stop key is active.
     terminal.press("\u{13} ");
     terminal.until_it_shows("paused; space goes on");
     terminal.press(" ");
@@ -112,7 +113,7 @@ fn j33_a_run_at_a_terminal_leaves_no_stray_bar() {
     let text = terminal.picture.text();
     assert!(!text.contains('━') && !text.contains('╸') && !text.contains("keys:"), "{text}");
     assert!(text.contains("stopping on the path") && text.contains("stopped"), "{text}");
-    // Nor is a word of the result cut at the edge of the terminal.
+    // No word of the result is cut at the edge of the terminal either.
     let words: Vec<&str> = text.split_whitespace().collect();
     for whole in ["statuses,", "frames", "damaged"] {
         assert!(words.contains(&whole), "{whole}: {text}");

@@ -1,9 +1,9 @@
-//! Lets arms fall freely for a second and prints where they are: one arm per line on stdin, one line of six
-//! positions on stdout.
+//! Lets arms fall freely for a second and prints their positions: one arm per line on stdin, one line of six positions
+//! on stdout.
 //!
-//! A line holds 154 numbers: for 7 joints x y z roll pitch yaw; for 7 links x y z roll pitch yaw Ixx Ixy Ixz
-//! Iyy Iyz Izz mass; gravity (3); rotor inertia, position and velocity of 6 joints each. No friction, no end
-//! stops, no drives; RK4 in steps of 1 ms, or as many ms as the first argument.
+//! A line holds 154 numbers: for 7 joints x y z roll pitch yaw; for 7 links x y z roll pitch yaw Ixx Ixy Ixz Iyy Iyz
+//! Izz mass; gravity (3); rotor inertia, position and velocity of 6 joints each. No friction, no end stops, no drives;
+//! RK4 in steps of 1 ms, or of the number of ms in the first argument.
 use std::io::{BufRead, Write};
 
 use jtc_sim::{Arm, SimArm, SimFriction};

@@ -1,11 +1,11 @@
-//! Hours of virtual time with random commands and faults: `soak --hours 24 --seed 1`. Ends with 1 when an
-//! invariant is broken.
+//! Runs hours of virtual time with random commands and faults: `soak --hours 24 --seed 1`. Exits with 1 if an invariant
+//! is broken.
 use std::process::ExitCode;
 use std::time::Instant;
 
 use jtc_sim::soak::Soak;
 
-/// A new world, made by the next seed, this often.
+/// Time after which a new world is created with the next seed, ms.
 const WORLD_MS: u64 = 600_000;
 
 fn main() -> Result<ExitCode, String> {

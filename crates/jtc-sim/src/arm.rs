@@ -1,7 +1,6 @@
-//! The true arm: rigid bodies, rotors behind their gears, friction, end stops and walls, integrated by Runge-Kutta
-//! at 1 ms, or in parts of it.
+//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls, integrated by Runge-Kutta at 1 ms, or in parts of it.
 //!
-//! It is deliberately not the arm that the controller believes in: see [`ModelError`](crate::ModelError).
+//! The true arm deliberately differs from the controller's model of it: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics, JOINTS, JointVec, LinkInertias, Payload};
 
@@ -21,7 +20,7 @@ const STOP_STIFFNESS: f64 = 20_000.0;
 const STOP_DAMPING: f64 = 200.0;
 /// Deceleration of a joint whose brake closes, rad/s².
 const BRAKE_DECELERATION: f64 = 40.0;
-/// Inertia that stands for a closed brake, kg·m².
+/// Inertia that represents a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
 /// Least inertia of a rotor, kg·m²: a lighter one would be through its range within a few steps.
 const LIGHTEST: f64 = 0.02;
@@ -32,7 +31,7 @@ const MOST_SUBSTEPS: f64 = 32.0;
 /// Largest angle of a vibration on a wall or on gears in a sub-step, rad, and largest part of its decay.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
-/// Most sub-steps of a step for walls and gears; damping of walls that would need more is reduced to what these bear.
+/// Most sub-steps of a step for walls and gears; damping of walls that would need more is reduced to the limit of these.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
 /// Decay in a sub-step from which damping is reduced; Runge-Kutta is unstable from 2.7 on.
 const UNSTABLE_DECAY: f64 = 2.0;
@@ -43,12 +42,12 @@ const HEAT_CAPACITY: f64 = 900.0;
 /// Heat flow from a bearing to the air, W/K.
 const HEAT_FLOW: f64 = 1.2;
 
-/// What an arm is made of; plain data.
+/// Properties of an arm; plain data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimArm {
     /// Kinematics and masses.
     pub model: ArmModel,
-    /// What it carries at its flange.
+    /// Load at its flange.
     pub payload: Payload,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
@@ -58,11 +57,11 @@ pub struct SimArm {
     pub friction: [SimFriction; JOINTS],
     /// Speed up to which friction polynomials hold, rad/s; beyond it they go on in a straight line that does not fall.
     pub polynomial_speed: JointVec,
-    /// What friction does around standstill.
+    /// Friction around standstill.
     pub friction_model: FrictionModel,
     /// End stops per joint, rad.
     pub stops: [(f64, f64); JOINTS],
-    /// How far the gears yield; rigid unless set. A gear that yields takes 0.01 kg·m² of the rotor's inertia to its link.
+    /// Elasticity of the gears; rigid unless set. A gear that yields takes 0.01 kg·m² of the rotor's inertia to its link.
     pub gears: [Gear; JOINTS],
     /// Torque that a drive really reaches, N·m: more is clamped silently.
     pub torque_ceiling: JointVec,
@@ -82,7 +81,7 @@ impl SimArm {
             model: parameters.model,
             payload: config.payload,
             gravity: config.gravity,
-            // A drive has a rotor also where the file of the arm gives no inertia for it.
+            // A drive has a rotor even if the arm file gives no inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
             // Friction is measured only within the limits of the arm.
@@ -106,7 +105,7 @@ impl Default for SimArm {
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without what was taken up, and what that is.
+    /// Inertias without carried payloads, and these payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -123,7 +122,7 @@ pub struct Arm {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors as seen through the gears, rad: that of the links where gears are rigid.
+    /// Position of the motors as seen through the gears, rad: equal to the position of the links if gears are rigid.
     pub motor: JointVec,
     /// Velocity of the motors as seen through the gears, rad/s.
     pub motor_speed: JointVec,
@@ -131,7 +130,7 @@ pub struct Arm {
     pub temperature: JointVec,
     /// Closed brakes.
     pub braked: [bool; JOINTS],
-    /// What a fault makes of the friction: 1 normally.
+    /// Factor of a fault on the friction: 1 normally.
     pub friction_fault: JointVec,
 }
 
@@ -175,7 +174,7 @@ impl Arm {
         arm
     }
 
-    /// What it is made of.
+    /// Returns the properties of the arm.
     pub fn parts(&self) -> &SimArm {
         &self.parts
     }
@@ -264,7 +263,7 @@ impl Arm {
         contacts.iter_mut().for_each(|contact| contact.follow(dynamics, q));
     }
 
-    /// The arm carries these beside its own payload, and nothing else that it has taken up.
+    /// Sets the payloads that the arm carries in addition to its own; replaces earlier ones.
     pub fn set_carried(&mut self, payloads: &[Payload]) {
         if self.carried == payloads {
             return;
@@ -273,7 +272,7 @@ impl Arm {
         let of = |payload: &Payload| {
             Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
         };
-        // They are linear in the bodies.
+        // The inertias are linear in the bodies.
         let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
         for payload in payloads {
             let with = of(payload);
@@ -287,8 +286,8 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Inertia of the rotors for a step of `dt`, kg·m²: more than their own where steep friction or an end stop has a time constant
-    /// below `dt` with a light one. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m²: more than their own if steep friction or an end stop would have
+    /// a time constant below `dt` with a light rotor. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -305,7 +304,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Bring temperatures and friction up to date: they change so slowly that not every millisecond has to.
+    /// Updates temperatures and friction: they change so slowly that an update in every millisecond is not necessary.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
@@ -316,8 +315,8 @@ impl Arm {
         self.refresh_friction();
     }
 
-    /// Classical Runge-Kutta of fourth order; the bristles of friction, which are too stiff for it, take its stages' velocities by
-    /// [`FrictionTorques::bend`].
+    /// Integrates by classical Runge-Kutta of fourth order; the bristles of friction, which are too stiff for it, take its stages'
+    /// velocities by [`FrictionTorques::bend`].
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;

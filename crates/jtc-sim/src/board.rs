@@ -24,17 +24,17 @@ const CHUNK: usize = 4096;
 /// Ticks that storing an arm takes: erasing a sector of flash does.
 const STORE_MS: u32 = 2_000;
 
-/// Looks at the parser between two ticks: what a processor with time to spare does.
+/// Polls of the parser between two ticks, as by a processor with time to spare.
 const POLLS: usize = 64;
 
 /// A host frame that the controller executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
-    /// A good one, by its type byte.
+    /// A valid frame, by its type byte.
     Frame(u8),
-    /// A good one that executes, pauses or stops, by its command byte.
+    /// A valid frame that executes, pauses or stops, by its command byte.
     Exec(u8),
-    /// Something that was none.
+    /// Bytes that are not a valid frame.
     Bad(FrameStatus),
 }
 
@@ -50,7 +50,7 @@ impl From<&LinkEvent<'_>> for Worked {
     }
 }
 
-/// What a tick needs beside the host link.
+/// Inputs of a tick apart from the host link.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins<'a> {
     /// Answers of the nodes.
@@ -68,7 +68,7 @@ pub struct Pins<'a> {
 struct Memory {
     arm: Option<Vec<u8>>,
     sequence: u32,
-    /// What is being written, and ticks until it is there.
+    /// Image that is being written, and ticks until it is stored.
     writing: Option<(Vec<u8>, u32)>,
 }
 
@@ -85,18 +85,18 @@ pub struct Board {
     watchdog_ms: u32,
     /// Ticks that did not come.
     missed: u32,
-    /// What the tick executed.
+    /// Frames that the tick executed.
     pub worked: Vec<Worked>,
     /// Bytes from the host that found no room.
     pub lost_bytes: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
-    /// What the last tick computed.
+    /// Telemetry of the last tick.
     telemetry: Telemetry,
     recorder: SimRecorder,
 }
 
-/// The flight recorder with as much memory as the board gives it.
+/// Flight recorder with as much memory as on the board.
 pub type SimRecorder = Recorder<Vec<Block>, 3>;
 
 /// Blocks in the pieces of the flight recorder's memory: 157 KiB together.
@@ -130,7 +130,7 @@ impl Board {
         board
     }
 
-    /// What the board does before the first tick.
+    /// Performs the actions of the board before the first tick.
     fn boot(&mut self) {
         let boot_cause = if self.watchdog_resets > 0 { BootCause::Watchdog } else { BootCause::PowerOn };
         self.controller.set_identity(Identity {
@@ -149,16 +149,16 @@ impl Board {
         self.controller.set_store_state(state, self.memory.sequence);
     }
 
-    /// Forget everything but what is in the memory that lasts, as a reset does.
+    /// Resets the board: forgets everything except the contents of lasting memory.
     pub fn reset(&mut self) {
         let resets = self.watchdog_resets;
-        // What was being written is lost; the arm before it is still there.
+        // An unfinished write is lost; the arm stored before is kept.
         let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
         let recorder =
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
-        // Its memory keeps what is in it; a reset by the watchdog is a failure.
+        // The recorder's memory keeps its contents; a reset by the watchdog is a failure.
         self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
@@ -173,7 +173,7 @@ impl Board {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
     }
 
-    /// What the last tick returns to an extension request, when its outputs had `answer_line` set.
+    /// Returns the last tick's answer to an extension request, if its outputs had `answer_line` set.
     pub fn answer_frame(&self) -> &[u8] {
         self.controller.answer_frame()
     }
@@ -205,7 +205,7 @@ impl Board {
         self.recorder.clear();
     }
 
-    /// The controller itself, for a replay of what was recorded.
+    /// Returns the controller, for a replay of a recording.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         &self.controller
     }
@@ -215,17 +215,17 @@ impl Board {
         self.controller.status_frame()
     }
 
-    /// What the last tick computed.
+    /// Returns the telemetry of the last tick.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
     }
 
-    /// Between ticks: bytes that have arrived by `now_us` are looked at for urgent commands and go through the parser.
+    /// Handles bytes that have arrived by `now_us`, between ticks: checks them for urgent commands and passes them to the parser.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // More than the controller can execute for too long: what waits is lost, but no Stop.
+            // More bytes than the controller can execute for too long: the waiting bytes are lost, but no Stop.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
@@ -245,7 +245,7 @@ impl Board {
         }
     }
 
-    /// Gives the event of the parser to the controller; false when there is no room for it.
+    /// Gives the event of the parser to the controller; returns `false` if there is no room for it.
     fn hand_over(&mut self) -> bool {
         let moved = self.receiver.received(LINE).is_some_and(|received| self.batch.push(&received));
         if moved {
@@ -268,7 +268,7 @@ impl Board {
         true
     }
 
-    /// One tick of the controller.
+    /// Runs a tick of the controller.
     pub fn tick(&mut self, pins: &Pins<'_>) -> Outputs {
         let missed_ticks = core::mem::take(&mut self.missed).try_into().unwrap_or(u16::MAX);
         let urgent = self.watch.take();

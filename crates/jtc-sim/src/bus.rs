@@ -19,7 +19,7 @@ const TICK_US: u32 = 1000;
 const ERROR_FRAME_US: u32 = 23;
 /// Transmit error counter above which a controller leaves the bus (ISO 11898-1).
 const BUS_OFF: u16 = 255;
-/// 128 times 11 recessive bits: what a controller waits before it comes back, µs.
+/// Recovery time of a controller from bus-off, 128 times 11 recessive bits, µs.
 const RECOVERY_US: u32 = 1408;
 
 /// Bit of an answer's id.
@@ -36,8 +36,8 @@ pub const fn frame_us(len: usize) -> u32 {
         let mut times = [0; LEN_MAX + 1];
         let mut len = 0;
         while len <= LEN_MAX {
-            // 31 bits at the nominal rate; at five times that ESI, DLC and data, of which every tenth makes a stuff bit, then
-            // stuff count and CRC.
+            // 31 bits at the nominal rate; at five times this rate ESI, DLC and data, of which every tenth bit makes a stuff
+            // bit, then stuff count and CRC.
             let crc = if len > 16 { 31 } else { 27 };
             let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
             times[len] = 31 + (tenths + 25) / 50;
@@ -48,7 +48,7 @@ pub const fn frame_us(len: usize) -> u32 {
     TIMES[if len < LEN_MAX { len } else { LEN_MAX }]
 }
 
-/// What is wrong with the bus at the moment.
+/// Faults of the bus at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusFault {
     /// Share of receptions that fail, each receiver on its own, 0..1.
@@ -63,7 +63,7 @@ pub struct BusFault {
     pub bus_off: bool,
 }
 
-/// What was on the bus since the start.
+/// Counters of the bus since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusStatistics {
     /// Frames carried.
@@ -109,11 +109,11 @@ pub struct Bus {
     log: Vec<TimedFrame>,
     /// Frames of members that are not of this world, oldest first.
     foreign: VecDeque<Frame>,
-    /// How late answers reach the controller.
+    /// Delay of answers to the controller.
     pub jitter: Jitter,
-    /// Something else on the bus, such as an analyser, acknowledges frames too.
+    /// `true` if another device on the bus, such as an analyser, acknowledges frames, too.
     pub monitored: bool,
-    /// What is wrong with it.
+    /// Faults.
     pub fault: BusFault,
     /// Counted since the start.
     pub statistics: BusStatistics,
@@ -142,8 +142,8 @@ impl Bus {
         &self.log
     }
 
-    /// One millisecond: `out` goes to the nodes, answers that are through by its end are added to
-    /// `received`: they wait there until the controller takes them, however late its tick is.
+    /// Simulates a millisecond: sends `out` to the nodes and adds answers that are complete by its end to `received`.
+    /// There they wait until the controller takes them, even if its tick is late.
     pub fn tick(
         &mut self,
         now_us: u64,
@@ -202,7 +202,7 @@ impl Bus {
         false
     }
 
-    /// The controller's request; true when somebody acknowledged it.
+    /// Sends the controller's request; returns `true` if a node acknowledged it.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
         if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
             // Repeated until the next tick replaces it; such errors alone make no bus-off.
@@ -235,7 +235,7 @@ impl Bus {
         }
     }
 
-    /// Put a frame on the wire, again after each error; false when there was no time left for it.
+    /// Puts a frame on the wire, again after each error; returns `false` if no time was left for it.
     fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
         let length = frame_us(frame.data().len());
         while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
@@ -290,7 +290,7 @@ impl Bus {
                 received.push(self.garble(frame));
             }
         }
-        // What did not get through competes again in the next tick.
+        // Frames that did not get through compete again in the next tick.
         for p in &mut self.pending {
             p.ready_us = 0;
         }
@@ -312,7 +312,7 @@ impl Bus {
         }
     }
 
-    /// A frame of a member that is not of this world waits for its turn; false when too many wait already.
+    /// Queues a frame of a member outside this world; returns `false` if too many frames wait already.
     pub fn put(&mut self, frame: Frame) -> bool {
         let room = self.foreign.len() < FOREIGN_MAX;
         if room {
@@ -340,7 +340,7 @@ impl Bus {
         Frame::new(id, &data).unwrap_or(frame)
     }
 
-    /// Drop what waits: the controller was reset.
+    /// Drops waiting frames: the controller was reset.
     pub fn clear(&mut self) {
         self.errors = 0;
         self.off_us = None;

@@ -9,10 +9,10 @@ use crate::faults::FaultPlan;
 /// Over-speed trip of a drive over the velocity limit of its joint: with the default arm that of known drives.
 const OVER_SPEED: f64 = 1.2;
 
-/// A joint that does not get to 0 starts so far from its end, rad.
+/// Distance from its limit at which a joint starts that cannot reach 0, rad.
 const END_DISTANCE: f64 = 0.2;
 
-/// How far the true arm is from the one that it was made from.
+/// Deviation of the true arm from its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelError {
     /// Each link's mass (and inertia with it) times 1 ± up to this, drawn from the seed.
@@ -53,15 +53,15 @@ impl ModelError {
     }
 }
 
-/// What supports the arm while drives are not enabled.
+/// Support of the arm while drives are not enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
-    /// Nothing: a joint without torque falls.
+    /// No support: a joint without torque falls.
     None,
     /// A stand, until every joint has been enabled once; afterwards nothing.
     Stand,
-    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the
-    /// simulated arm stays where it can be used again after an error.
+    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the simulated arm
+    /// keeps a usable pose after an error.
     Brakes,
 }
 
@@ -74,11 +74,11 @@ pub struct SimConfig {
     pub controller: Config,
     /// Image of the arm that its board has stored (J-54).
     pub stored_arm: Option<Vec<u8>>,
-    /// How far the true arm is from `arm`.
+    /// Deviation of the true arm from `arm`.
     pub model_error: ModelError,
-    /// Pose at the start, rad; 0 at first, and where a joint does not get there as near to it as it does.
+    /// Pose at the start, rad; by default 0, or for a joint that cannot reach 0 a pose near its limit.
     pub start: JointVec,
-    /// What supports the arm while drives are not enabled.
+    /// Support of the arm while drives are not enabled.
     pub support: Support,
     /// Habits of the drives.
     pub drives: [DriveConfig; JOINTS],
@@ -89,8 +89,8 @@ pub struct SimConfig {
     pub absent_drives: u8,
     /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
     pub bus_monitored: bool,
-    /// Answers reach the controller up to so many ticks after they ended on the bus, drawn from the seed for each millisecond; none
-    /// overtakes an older one. 0: in the tick that follows.
+    /// Largest delay of answers to the controller after they ended on the bus, ticks; drawn from the seed for each millisecond.
+    /// Answers stay in order. 0: in the tick that follows.
     pub answer_jitter_ms: u8,
     /// Rate of the serial line, bit/s; `None`: bytes take no time.
     pub baud: Option<u32>,
@@ -102,7 +102,7 @@ pub struct SimConfig {
     pub safety_wired: bool,
     /// Seed of everything that is drawn by chance.
     pub seed: u64,
-    /// What goes wrong, and when.
+    /// Faults, and their times.
     pub faults: FaultPlan,
     /// Entries that the event log holds: the last ones; those before them are counted only.
     pub log_entries: usize,

@@ -38,9 +38,9 @@ pub struct Drive {
     temperature: f64,
     torque: f64,
     inbox: Inbox,
-    /// It is not there at all.
+    /// `true` if the drive is not installed.
     pub absent: bool,
-    /// What is wrong with it.
+    /// Faults of the drive.
     pub fault: DriveFault,
 }
 
@@ -106,7 +106,7 @@ impl Drive {
         self.config.delivers * self.torque
     }
 
-    /// It receives and acknowledges frames.
+    /// Returns `true` if the drive receives and acknowledges frames.
     pub fn on_bus(&self) -> bool {
         self.booting == 0 && !self.fault.silent && !self.absent
     }
@@ -119,8 +119,8 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// One millisecond of the drive: read sensors, check, accept a request, act. `motor` and `link`: true positions of both sides of the
-    /// gear as seen at the joint, rad.
+    /// Simulates a millisecond of the drive: reads sensors, checks, accepts a request, acts. `motor` and `link`: true positions of both
+    /// sides of the gear as seen at the joint, rad.
     pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
         self.read_encoders(motor, link);
         if self.booting > 0 {

@@ -215,7 +215,7 @@ fn a_request_of_zero_cancels_a_pending_one() {
     change(&mut drive, NodeState::START);
     run(&mut drive, 5, 0.5);
     assert_eq!(drive.state(), NodeState::INIT);
-    // A completed transition erases what is pending too.
+    // A completed transition also erases a pending one.
     change(&mut drive, NodeState::READY);
     run(&mut drive, 1, 0.5);
     change(&mut drive, NodeState::ENABLED);

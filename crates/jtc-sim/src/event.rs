@@ -1,4 +1,4 @@
-//! What happened in the world, for reports and for people who read along.
+//! Events of the world, for reports and for live output.
 use core::fmt;
 use std::collections::VecDeque;
 
@@ -46,9 +46,9 @@ pub enum Event {
         /// Type byte.
         frame_type: u8,
     },
-    /// Bytes arrived that are no good frame.
+    /// Bytes arrived that are not a valid frame.
     BadFrame {
-        /// Why.
+        /// Reason.
         status: FrameStatus,
     },
     /// A fault begins.
@@ -83,7 +83,7 @@ impl fmt::Display for Event {
 pub struct LogEntry {
     /// µs since the start.
     pub time_us: u64,
-    /// What happened.
+    /// Event.
     pub event: Event,
 }
 

@@ -68,7 +68,7 @@ struct Entry {
     for_s: Option<f64>,
 }
 
-/// What fault files look like, for people (Markdown).
+/// Description of fault files, for people (Markdown).
 pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 
 /// Format of the files that are read: joints count from 1 since format 2.
@@ -311,7 +311,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Keys that nobody asked for are mistakes of the writer.
+    /// Reports unused keys as mistakes of the author.
     fn nothing_left(&self) -> Result<(), FaultFileError> {
         let e = &self.entry;
         let keys = [

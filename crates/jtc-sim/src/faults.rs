@@ -1,4 +1,4 @@
-//! What can go wrong in the simulated world, and when.
+//! Faults of the simulated world, and their times.
 use core::fmt;
 
 use jtc_bus::Joint;
@@ -7,7 +7,7 @@ use jtc_core::ControllerState;
 use crate::arm::{Side, Wall};
 use crate::hand::HandPath;
 
-/// Declares the kinds of faults: meaning, name, the name in fault files and tables, and what belongs to it.
+/// Declares the kinds of faults: meaning, name, the name in fault files and tables, and the fields.
 macro_rules! fault_kinds {
     ($($(#[$doc:meta])* $kind:ident $name:literal $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ })?;)+) => {
         /// A kind of fault.
@@ -43,48 +43,48 @@ fault_kinds! {
     };
     /// The motor control reports faults.
     MotorFault "motor-fault" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// Bits of the fault byte.
         bits: u8,
     };
     /// The gate driver reports a fault.
     HardwareFault "hardware-fault" {
-        /// Which.
+        /// Joint.
         joint: Joint,
     };
     /// A drive goes to its fault state with no error bit set, once.
     FaultState "fault-state" {
-        /// Which.
+        /// Joint.
         joint: Joint,
     };
     /// A drive answers requests for another state, and stays in the one that it is in.
     IgnoresState "ignores-state" {
-        /// Which.
+        /// Joint.
         joint: Joint,
     };
     /// The encoder reads something else.
     EncoderJump "encoder-jump" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// Added to the position, rad.
         rad: f64,
     };
     /// A drive reports that its position is not accurate.
     NotAccurate "not-accurate" {
-        /// Which.
+        /// Joint.
         joint: Joint,
     };
     /// Friction is multiplied.
     Friction "friction" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// Times the true one.
         factor: f64,
     };
     /// A bearing is at this temperature.
     Temperature "temperature" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// °C.
         celsius: f64,
@@ -131,7 +131,7 @@ fault_kinds! {
     TickOverrun "tick-overrun";
     /// Someone pushes a joint.
     Push "push" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// N·m.
         torque: f64,
@@ -149,7 +149,7 @@ fault_kinds! {
     };
     /// A joint meets a wall; see [`Wall::Joint`].
     JointWall "joint-wall" {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// Angle at which the wall begins, rad.
         rad: f64,
@@ -164,12 +164,12 @@ fault_kinds! {
     Payload "payload" {
         /// kg.
         mass: f64,
-        /// Its centre in the flange frame, m.
+        /// Centre of mass in the flange frame, m.
         com: [f64; 3],
     };
     /// The brake of a joint stays closed while its drive is enabled.
     BrakeClosed "brake-closed" {
-        /// Which.
+        /// Joint.
         joint: Joint,
     };
     /// A hand leads the arm while it is taught.
@@ -238,7 +238,7 @@ impl FaultKind {
     }
 }
 
-/// When a fault begins.
+/// Trigger of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
     /// At this time, ms after the start.
@@ -249,14 +249,14 @@ pub enum Trigger {
     AtPoint(u32),
 }
 
-/// One fault.
+/// Fault with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// What.
+    /// Kind.
     pub kind: FaultKind,
-    /// When it begins.
+    /// Trigger.
     pub trigger: Trigger,
-    /// How long it lasts, ms, at least 1: no fault passes between two milliseconds; `None`: for good.
+    /// Duration, ms, at least 1: no fault ends between two milliseconds; `None`: for good.
     pub duration_ms: Option<u64>,
 }
 
@@ -269,11 +269,11 @@ pub struct FaultPlan {
     pub hands: Vec<HandPath>,
 }
 
-/// Where a fault is in its life.
+/// Phase of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Waiting,
-    /// Its state was entered: begins at this ms.
+    /// Its state was entered: the fault begins at this ms.
     Armed(u64),
     /// Ends at this ms.
     Active(u64),
@@ -301,9 +301,9 @@ impl Running {
         Self { open: faults.len(), faults }
     }
 
-    /// One more fault.
+    /// Adds a fault.
     pub fn add(&mut self, fault: Fault) {
-        // A soak adds without end: what is over is forgotten.
+        // A soak run adds faults without end: finished faults are removed.
         self.faults.retain(|(_, phase)| *phase != Phase::Over);
         self.faults.push((fault, Phase::Waiting));
         self.open += 1;

@@ -1,20 +1,20 @@
-//! Friction of the simulated joints: how it depends on speed and temperature, and what happens around standstill.
+//! Friction of the simulated joints: its dependence on speed and temperature, and its behaviour around standstill.
 //!
-//! At speed both models follow the same measured curve (polynomial or table). They differ around zero: [`FrictionModel::LuGre`]
-//! sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its sign over a small speed and
-//! can neither stick nor hunt.
+//! At speed both models follow the same measured curve (polynomial or table). The models differ around zero:
+//! [`FrictionModel::LuGre`] sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its
+//! sign over a small speed and can neither stick nor hunt.
 //!
-//! Beyond the speeds for which it was made a curve goes on in a straight line that does not fall: a cubic that is followed further
-//! ends as a motor (c3 < 0) or is too steep for any step.
+//! Beyond its range of speeds a curve continues in a straight line that does not fall: an extrapolated cubic ends as a
+//! motor (c3 < 0) or is too steep for any step.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Largest natural frequency of a rotor on its bristles, rad/s: what a step of 1 ms still integrates well.
+/// Largest natural frequency of a rotor on its bristles, rad/s, that a step of 1 ms still integrates well.
 const STIFFEST: f64 = 800.0;
 /// Smallest level that bristles are divided by, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
-/// True friction of a joint as a function of speed, without what happens around standstill.
+/// True friction of a joint as a function of speed, without the effects around standstill.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum SimFriction {
@@ -26,7 +26,7 @@ pub enum SimFriction {
     Table(TableOf<f32>),
 }
 
-/// What friction does around standstill.
+/// Friction around standstill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrictionModel {
     /// The sign of the velocity is v/√(v² + width²): no stiction. Below a width of 0.005 rad/s Runge-Kutta at 1 ms becomes unstable.
@@ -56,7 +56,7 @@ impl Default for FrictionModel {
 pub struct LuGre {
     /// Break-away torque over Coulomb torque. The paper's example has 1.5; harmonic drives are reported between 1.1 and 1.6.
     pub stiction_ratio: f64,
-    /// Speed at which half of the excess of stiction is gone, rad/s.
+    /// Speed at which half of the excess of stiction remains, rad/s.
     pub stribeck_speed: f64,
     /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one
     /// step of the joint's encoder. Stiffer ones are softened until a rotor on its bristles swings below 800 rad/s.
@@ -159,7 +159,7 @@ impl FrictionTorques {
         }
     }
 
-    /// Make the next [`warm`](Self::warm) act on tables too: a scale has changed.
+    /// Makes the next [`warm`](Self::warm) update tables, too: a scale has changed.
     pub fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
@@ -182,7 +182,7 @@ impl FrictionTorques {
                 core::array::from_fn(|j| {
                     let (v, load) = (v[j], self.stiffness[j] * z[j]);
                     let (b, level) = lugre.stribeck(v * inverse, k0[j]);
-                    // σ1(v)·dz/dt over one denominator: divisions are what this function costs.
+                    // σ1(v)·dz/dt over one denominator, because divisions dominate the cost of this function.
                     let bending = (v * level - v.abs() * load * b) / (b * level);
                     load + self.damping[j] * bending + viscous(j)
                 })
@@ -198,8 +198,8 @@ impl FrictionTorques {
         out
     }
 
-    /// How fast the curve rises with speed at velocities `v` (rad/s), N·m·s/rad, no less than 0; without what happens around
-    /// standstill, whose steepness is bounded by itself.
+    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, no less than 0; without the effects around
+    /// standstill, whose slope is bounded by itself.
     pub fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
@@ -213,7 +213,7 @@ impl FrictionTorques {
         k1[j] + speed * (2.0 * k2[j] + 3.0 * k3[j] * speed)
     }
 
-    /// Bristle deflections `dt` seconds after `z` at velocities `v`.
+    /// Returns the bristle deflections `dt` seconds after `z` at velocities `v`.
     ///
     /// dz/dt = v − rate·z with rate up to 10⁴/s at speed: far too stiff for Runge-Kutta at 1 ms. For a constant velocity the exact
     /// solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). With 1/(1 + x + x²/2) for e it is of second order, needs no
@@ -234,8 +234,8 @@ impl FrictionTorques {
 }
 
 impl LuGre {
-    /// For the velocity in Stribeck speeds `r` and a Coulomb torque (N·m): b = 1 + r², whose inverse falls from 1 at standstill to 0
-    /// far above the Stribeck speed, and b·g(v), N·m.
+    /// Returns, for the velocity in Stribeck speeds `r` and a Coulomb torque (N·m): b = 1 + r², whose inverse falls from 1 at
+    /// standstill to 0 far above the Stribeck speed, and b·g(v), N·m.
     #[inline]
     fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
         let b = 1.0 + r * r;
@@ -274,7 +274,7 @@ impl Points {
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }
 
-    /// Of the line at `v`, N·m·s/rad.
+    /// Returns the slope of the line at `v`, N·m·s/rad.
     fn slope(&self, v: f64) -> f64 {
         let (x, y, i) = (&self.velocity, &self.torque, self.segment(v));
         let slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
@@ -286,7 +286,8 @@ impl Points {
         self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
-    /// Coulomb torque: where the lines through the two slowest points of each direction meet standstill, the mean of both, N·m.
+    /// Returns the Coulomb torque, N·m: the torque at standstill of the lines through the two slowest points of each direction,
+    /// the mean of both.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
@@ -302,7 +303,7 @@ impl Points {
         }
     }
 
-    /// Take the Coulomb torque out of the points: what is left is the viscous part.
+    /// Takes the Coulomb torque out of the points: the remainder is the viscous part.
     fn take_coulomb(&mut self) -> f64 {
         let coulomb = self.coulomb();
         for (v, torque) in self.velocity.iter().zip(&mut self.torque) {

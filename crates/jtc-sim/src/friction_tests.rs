@@ -62,7 +62,7 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // Up to 1.2 times 6 N·m within a second, then nothing: some 1e-4 rad, of which the elastic part comes back.
+        // Up to 1.2 times 6 N·m within a second, then no torque: some 1e-4 rad; the elastic part comes back.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
@@ -137,7 +137,7 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // What is left of the Stribeck curve.
+                // Tolerance for the remainder of the Stribeck curve.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;

@@ -8,7 +8,7 @@ use crate::request::NodeRequest;
 const PUMP_LAG: u32 = 100;
 /// Ticks of pumping until the first and second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
-/// Its transitions to Init, numbered in its own way.
+/// Transition to Init, with the gripper's own number.
 const TO_INIT: NodeState = NodeState::new(14);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 /// Ticks after power-up in which it is silent.
@@ -72,7 +72,7 @@ impl Gripper {
         self.state
     }
 
-    /// It receives and acknowledges frames.
+    /// Returns `true` if the gripper receives and acknowledges frames.
     pub fn on_bus(&self) -> bool {
         self.booting == 0 && !self.silent
     }
@@ -117,7 +117,7 @@ impl Gripper {
         }
     }
 
-    /// Its requests are executed in the interrupt: the answer is the transition's code already.
+    /// Executes a request in the interrupt: the answer is already the transition's code.
     fn change(&mut self, request: NodeState) {
         self.state = match (request, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -143,7 +143,7 @@ impl Gripper {
         }
     }
 
-    /// One millisecond.
+    /// Simulates a millisecond.
     pub fn tick(&mut self) {
         if self.booting > 0 {
             self.booting -= 1;

@@ -1,7 +1,7 @@
 //! A hand that leads the arm along a path while it is taught: a compliant pull of bounded force on every joint.
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Torque per distance from where the hand wants the joint, N·m/rad.
+/// Torque per distance between a joint and its target by the hand, N·m/rad.
 const STIFFNESS: f64 = 1500.0;
 /// Torque per difference of speed, N·m·s/rad.
 const DAMPING: f64 = 80.0;
@@ -22,7 +22,7 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// `points`: joint positions, rad, `step_s` seconds apart. `None`: there is no point, or a number makes no sense.
+    /// Creates a path. `points`: joint positions, rad, `step_s` seconds apart. `None`: no points, a non-finite number, or `step_s` ≤ 0.
     pub fn new(points: Vec<JointVec>, step_s: f64) -> Option<Self> {
         let finite = points.iter().flatten().all(|q| q.is_finite());
         let good = !points.is_empty() && finite && step_s.is_finite() && step_s > 0.0;
@@ -50,7 +50,7 @@ pub(crate) struct Hand {
     led: Option<Led>,
 }
 
-/// Teaching has begun: where the arm was then, how long the way to the first point takes, and for how long the hand leads, s.
+/// State since Teaching began: the pose of the arm then, the duration of the move to the first point, and the time so far, s.
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -63,8 +63,8 @@ impl Hand {
         Self { path, led: None }
     }
 
-    /// The torque of a millisecond, N·m, for an arm at `q`, `qd`. It waits for Teaching and lets go (`None`) at the end of the path
-    /// or of Teaching.
+    /// Returns the torque of a millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching and lets go (`None`) at the
+    /// end of the path or of Teaching.
     pub fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
@@ -86,7 +86,7 @@ impl Hand {
         }))
     }
 
-    /// Where the hand wants the arm: smoothly to the first point, then along the path.
+    /// Returns the hand's target for the arm: smoothly to the first point, then along the path.
     fn wanted(&self, led: &Led, t: f64) -> JointVec {
         if t >= led.approach_s {
             return self.path.at(t - led.approach_s);

@@ -96,7 +96,7 @@ fn quintic(a: &JointVec, b: &JointVec, u: f64, seconds: f64) -> RawPoint {
     }
 }
 
-/// The statuses in what the device sends.
+/// Collector of the statuses that the device sends.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     bytes: Vec<u8>,
@@ -109,7 +109,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Take what the world has for the host.
+    /// Takes the bytes that the world has for the host.
     pub fn listen(&mut self, world: &mut World) {
         let mut buffer = [0; 1024];
         loop {

@@ -1,4 +1,4 @@
-//! How a node takes frames out of its receive buffer: at once, or as older firmware does, one per interrupt.
+//! Receive buffer of a node: emptied at once, or as in older firmware, by one frame per interrupt.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;

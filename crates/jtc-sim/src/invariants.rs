@@ -1,4 +1,4 @@
-//! What must hold in every millisecond, whatever happens: the checker to run beside a world.
+//! Invariants that must hold in every millisecond: the checker to run together with a world.
 use jtc_bus::{Joint, Request, Target};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
@@ -17,7 +17,7 @@ use crate::world::World;
 /// Ticks between two frames that take the place of Move.
 const MOVES_BETWEEN: u32 = 3;
 
-/// Remembers what it needs from one millisecond to the next.
+/// Checker with the state that it keeps from one millisecond to the next.
 #[derive(Clone, Debug)]
 pub struct Invariants {
     state: ControllerState,
@@ -48,7 +48,7 @@ impl Default for Invariants {
 }
 
 impl Invariants {
-    /// A checker that joins a world which has been running for a while; what was permitted before counts.
+    /// Creates a checker for a world that has been running for a while; earlier permissions count.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
         Self {
@@ -136,7 +136,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// J-24: nothing moves by itself. J-31: the index goes forward.
+    /// J-24: no motion without a command. J-31: the index goes forward.
     fn states(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let telemetry = moment.telemetry;
         let (from, to) = (self.state, telemetry.state);
@@ -144,7 +144,7 @@ impl Invariants {
             return Err(Broken::LeftErrorAlone { to });
         }
         if to == ControllerState::Error {
-            // What was commanded before the error permits nothing after it.
+            // A command before the error permits no action after it.
             self.execute = false;
             self.teach = false;
         } else {

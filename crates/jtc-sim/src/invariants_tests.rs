@@ -1,4 +1,4 @@
-//! The checker finds what it is there to find.
+//! Tests that the checker finds each violation.
 use jtc_core::{Config, Telemetry};
 
 use super::*;
@@ -221,7 +221,7 @@ fn j33_a_stop_that_takes_too_long_is_found() {
         let found = (0..600).find_map(|ms| script.tick(state, trajectory).map(|broken| (ms, broken)));
         assert_eq!(found, Some((521, Broken::NoStop { ticks: 521 })), "{trajectory:?}");
     }
-    // One that was given before it could be executed begins when the arm brakes.
+    // A stop that was given before it could be executed begins when the arm brakes.
     let mut script = stopped_at(0.3);
     script.worked.clear();
     script.telemetry.braking = true;
@@ -291,7 +291,7 @@ fn j35_a_joint_that_races_is_found() {
     assert!((0..4).all(|_| script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_none()));
     script.telemetry.joints[3].fresh = true;
     assert!(script.tick(ControllerState::HoldPos, TrajectoryState::Null).is_some());
-    // Without torque, or slower, it is none.
+    // Without torque, or slower, the movement is not a violation.
     let mut script = fast();
     assert!((0..10).all(|_| script.tick(ControllerState::Error, TrajectoryState::Null).is_none()));
     let mut script = fast();
@@ -302,7 +302,7 @@ fn j35_a_joint_that_races_is_found() {
 #[test]
 fn j43_torque_that_stays_at_its_limit_is_found() {
     let limit = Config::avena().joints[0].torque_max;
-    // One tick of nine, and one of ten.
+    // At the limit once in nine ticks, and once in ten.
     for (period, allowed) in [(9, false), (10, true)] {
         let mut script = Script::new();
         let mut good = true;

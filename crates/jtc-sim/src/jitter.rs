@@ -10,7 +10,7 @@ pub struct Jitter {
     pub most_ms: u8,
     rng: fastrand::Rng,
     now: u64,
-    /// Answers on their way, the oldest first, and the tick in which they arrive.
+    /// Delayed answers, the oldest first, with the tick in which they arrive.
     waiting: VecDeque<(u64, Vec<Frame>)>,
 }
 
@@ -21,7 +21,7 @@ impl Jitter {
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
-    /// One tick: the frames of `received` from `first` on are those of this millisecond. Those that are due take their place.
+    /// Handles a tick: the frames of `received` from `first` on came in this millisecond. The frames that are due replace them.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {

@@ -1,5 +1,5 @@
-//! An arm that is lowered through a place where its shoulder carries much of what it can, and is stopped there (J-33): for tests
-//! and for the tables of docs/safety.md.
+//! An arm that is lowered through a pose in which its shoulder carries much of its torque limit, and is stopped there (J-33):
+//! for tests and for the tables of docs/safety.md.
 use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
@@ -10,7 +10,7 @@ use crate::operator::{Operator, OperatorError};
 
 /// The joint that lowers: the shoulder, which carries most.
 pub const LOADED: usize = 1;
-/// Speed below which a joint stands, rad/s.
+/// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 0.01;
 /// The arm is watched until it has stood for this long, ms, or
 const STOOD_MS: u64 = 1_000;
@@ -45,33 +45,33 @@ pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     low
 }
 
-/// The arm is lowered through `shoulder`, where the command comes.
+/// Lowering of the arm through `shoulder`, at which the command comes.
 #[derive(Clone, Debug)]
 pub struct Lowering {
     /// The arm.
     pub model: ArmModel,
-    /// What the controller is given as its model.
+    /// Model that the controller is given.
     pub known: ArmModel,
     /// Torque limit of the shoulder, N·m.
     pub torque_max: f64,
     /// Angle of the shoulder at which the command comes, rad.
     pub shoulder: f64,
-    /// Its speed there, rad/s.
+    /// Speed at that angle, rad/s.
     pub speed: f64,
     /// Pause or Stop.
     pub command: ExecCommand,
-    /// How far the true arm is from `model`.
+    /// Deviation of the true arm from `model`.
     pub model_error: ModelError,
-    /// What carries it without torque.
+    /// Support of the arm without torque.
     pub support: Support,
 }
 
-/// What came of it.
+/// Result of a lowering.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     /// Longest way of a joint in the half second after every joint was enabled, and before, rad.
     pub sag: f64,
-    /// From the last byte of the command until the trajectory state is no more Execute, ms.
+    /// Time from the last byte of the command until the trajectory state is no longer Execute, ms.
     pub commanded_ms: u64,
     /// Until no joint moves, ms.
     pub standing_ms: u64,
@@ -83,16 +83,17 @@ pub struct Outcome {
     pub errors: u16,
     /// Internal errors of all joints at the end.
     pub joints: u16,
-    /// Longest way of a joint from where the command came, rad.
+    /// Longest way of a joint since the command, rad.
     pub way: f64,
     /// Highest true speed of a joint after the command, rad/s.
     pub peak: f64,
-    /// Largest position error of any joint until the trajectory state is no more Execute, rad.
+    /// Largest position error of any joint until the trajectory state is no longer Execute, rad.
     pub error: f64,
 }
 
 impl Lowering {
-    /// The default arm, the shoulder's torque limit such that holding it where the command comes takes `share` of it.
+    /// Creates a lowering of the default arm. The shoulder's torque limit is set so that holding it at the command takes
+    /// `share` of the limit.
     pub fn at_share(share: f64, speed: f64) -> Self {
         let model = Parameters::avena().model;
         let shoulder = -0.9;

@@ -1,4 +1,4 @@
-//! The fault matrix: each fault in each state, what the controller makes of it and after how many ticks, as a
+//! The fault matrix: the reaction of the controller to each fault in each state, and the number of ticks until then, as a
 //! table for the docs.
 use core::fmt;
 
@@ -35,10 +35,10 @@ const STATES: [ControllerState; 5] = [
     ControllerState::Error,
 ];
 
-/// What became of a fault in a state.
+/// Reaction to a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// Nothing within the time watched.
+    /// No reaction within the time watched.
     None,
     /// Another state, or more errors in the same.
     Change {
@@ -48,7 +48,7 @@ pub enum Reaction {
         errors: u16,
         /// Internal errors of all joints then.
         joints: u16,
-        /// The state is the one from before: `errors` and `joints` are what was added.
+        /// `true` if the state is unchanged: `errors` and `joints` are then the added ones.
         same: bool,
         /// In which tick, counted from the fault: 1 is the first that can know of it.
         tick: u64,
@@ -102,7 +102,7 @@ fn words(errors: u16, joints: u16) -> Vec<&'static str> {
     [internal, &of(errors, &jtc), &of(joints, &joint)].concat()
 }
 
-/// Why there is no matrix.
+/// Reasons why the matrix cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MatrixError {
     /// The state was not reached.
@@ -111,15 +111,15 @@ pub enum MatrixError {
     Invariant(Violation),
     /// The arm did not come to rest in the time that a pause or stop may take.
     NoStop {
-        /// How long it took, ms; `None`: it ended in an error, or the motion was not begun.
+        /// Time that it took, ms; `None`: the stop ended in an error, or the motion was not begun.
         ms: Option<u64>,
     },
-    /// The arm was released by what it can be held in.
+    /// The arm was released by a fault in which it can be held.
     Released {
         /// State before.
         state: ControllerState,
     },
-    /// Nothing happened where something should have.
+    /// An expected reaction did not come.
     NoReaction {
         /// Row of the table.
         row: &'static str,
@@ -151,8 +151,7 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// One cell: what happened, and whether the arm was held again after ClearCurrentErrors and, where they were
-/// lost, new parameters.
+/// Cell of the matrix: the reaction, and the recovery of the arm after ClearCurrentErrors and, if they were lost, new parameters.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -237,7 +236,7 @@ fn world_in(
     bring_to(config_for(support, host_timeout_ms), state)
 }
 
-/// What such a world is made of.
+/// Returns the configuration of such a world.
 fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
@@ -258,7 +257,7 @@ fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, Opera
     }
     operator.bring_up()?;
     operator.run(200);
-    // A supervised host is there until the fault.
+    // A supervised host is present until the fault.
     let run = |operator: &mut Operator, ms: u64| {
         for _ in 0..ms / 50 {
             operator.run(50);
@@ -308,7 +307,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     Ok(Cell { reaction, back: recover(&mut operator, &mut watch, state)? })
 }
 
-/// Do what an operator would to get the arm held.
+/// Performs the steps of an operator to get the arm held.
 fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
     // Init and Error wait for the host anyway.
     let host_first = matches!(state, ControllerState::Init | ControllerState::Error);
@@ -336,7 +335,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
     Ok(Back::Never)
 }
 
-/// What is compared from tick to tick.
+/// Values that are compared from tick to tick.
 struct Watch {
     invariants: Invariants,
     state: ControllerState,
@@ -370,7 +369,7 @@ impl Watch {
         Ok(Self { invariants, state: telemetry.state, errors: telemetry.errors, resets: 0 })
     }
 
-    /// One millisecond; what changed in it. The end of a trajectory is no reaction.
+    /// Simulates a millisecond; returns the change in it. The end of a trajectory is not a reaction.
     fn step(&mut self, operator: &mut Operator) -> Result<Option<Seen>, MatrixError> {
         operator.step();
         self.invariants.check(&operator.world).map_err(MatrixError::Invariant)?;

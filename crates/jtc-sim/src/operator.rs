@@ -9,14 +9,14 @@ use crate::config::SimConfig;
 use crate::host::{self, Listener};
 use crate::world::World;
 
-/// What an operator waited for did not come.
+/// Failed waits of an operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OperatorError {
     /// The world did not get there in time.
     Late {
-        /// What was waited for.
+        /// Condition that was waited for.
         waited_for: &'static str,
-        /// For how long, ms.
+        /// Time waited, ms.
         ms: u64,
         /// State then.
         state: ControllerState,
@@ -47,7 +47,7 @@ impl std::error::Error for OperatorError {}
 pub struct Operator {
     /// The world.
     pub world: World,
-    /// What came from the device.
+    /// Data from the device.
     pub listener: Listener,
 }
 
@@ -62,7 +62,7 @@ impl Operator {
         self.world.telemetry().state
     }
 
-    /// One millisecond.
+    /// Simulates a millisecond.
     pub fn step(&mut self) {
         self.world.step();
         self.listener.listen(&mut self.world);
@@ -142,7 +142,7 @@ impl Operator {
         self.wait("trajectory complete", 100, |world| world.telemetry().trajectory == TrajectoryState::Stop)
     }
 
-    /// Execute the trajectory that is there, until it is finished.
+    /// Executes the uploaded trajectory until it is finished.
     pub fn execute(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.ask(&host::exec(ExecCommand::Execute))?;
         self.wait("end of the trajectory", ms, |world| {

@@ -1,5 +1,5 @@
-//! What is behind the joint bus: drives, gripper and the arm that they move. It is independent of the controller, which may be
-//! the simulated one of [`World`](crate::World) or any other that sends frames.
+//! The devices on the joint bus: drives, gripper and the arm that they move. The plant is independent of the controller, which
+//! may be the simulated one of [`World`](crate::World) or any other that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec, Payload};
@@ -18,14 +18,14 @@ const TICK: f64 = 1e-3;
 /// An answer of a node and how long after the end of the request it is ready, µs.
 pub type ReadyAnswer = (u32, Frame);
 
-/// How the arm really is.
+/// True state of the arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Position, rad.
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors as seen through the gears, rad: `q` where gears are rigid.
+    /// Position of the motors as seen through the gears, rad: `q` if gears are rigid.
     pub motor: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
@@ -95,8 +95,8 @@ impl Plant {
         plant
     }
 
-    /// A frame has ended on the bus at `now_us`; the nodes' answers are added to `answers`. Answers of nodes and frames that
-    /// are no request are passed over.
+    /// Handles a frame that has ended on the bus at `now_us`; adds the nodes' answers to `answers`. Ignores answers of nodes
+    /// and frames that are not requests.
     pub fn receive(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
         let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
@@ -104,8 +104,8 @@ impl Plant {
         }
     }
 
-    /// One millisecond of a bus on which the plant's nodes and one controller are: `out` goes to the nodes, the answers that are
-    /// through by its end are added to `received`.
+    /// Simulates a millisecond of a bus with the plant's nodes and one controller: sends `out` to the nodes, adds the answers
+    /// that are complete by its end to `received`.
     pub fn exchange(
         &mut self,
         bus: &mut Bus,
@@ -121,15 +121,15 @@ impl Plant {
         self.nodes.any_on_bus()
     }
 
-    /// One millisecond: drives and gripper do their tick, the arm moves. `safety_output`: the controller's safety output is at
-    /// the level that means no error.
+    /// Simulates a millisecond: drives and gripper do their tick, the arm moves. `safety_output`: the controller's safety
+    /// output is at the level that means no error.
     pub fn step(&mut self, safety_output: bool) {
         self.step_nodes(safety_output);
         self.step_arm();
     }
 
-    /// One millisecond of the arm alone: these torques (N·m) act on its joints, within what the drives reach, brakes are open, and drives and
-    /// gripper do nothing. For a controller without a joint bus; NaN is no torque.
+    /// Simulates a millisecond of the arm alone: these torques (N·m) act on its joints, within what the drives reach, brakes are open,
+    /// and drives and gripper do nothing. For a controller without a joint bus; NaN counts as no torque.
     pub fn step_free(&mut self, torque: &JointVec) {
         let ceiling = self.arm.parts().torque_ceiling;
         self.truth.torque = core::array::from_fn(|j| {
@@ -189,7 +189,7 @@ impl Plant {
         self.truth.temperature = self.arm.temperature;
     }
 
-    /// What a fault of a node does once, when it begins; other faults do nothing here.
+    /// Applies the immediate effect of a fault of a node when it begins; ignores other faults.
     pub fn begin(&mut self, kind: FaultKind) {
         match kind {
             FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
@@ -254,7 +254,7 @@ impl Plant {
         }
     }
 
-    /// How the arm really is.
+    /// Returns the true state of the arm.
     pub fn truth(&self) -> &Truth {
         &self.truth
     }
@@ -269,7 +269,7 @@ impl Plant {
         self.nodes.states()
     }
 
-    /// Something is where the gripper can hold it (from the start it is).
+    /// Places a part where the gripper can hold it, or removes it (present from the start).
     pub fn set_part_present(&mut self, present: bool) {
         if let Some(gripper) = &mut self.nodes.gripper {
             gripper.part_present = present;

@@ -1,4 +1,4 @@
-//! Requests as nodes take them off the bus: with any state byte, of which the controller sends four only.
+//! Requests as nodes take them off the bus: with any state byte; the controller sends only four of them.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.

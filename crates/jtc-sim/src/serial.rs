@@ -5,13 +5,13 @@ use std::collections::VecDeque;
 /// Picoseconds in a microsecond: at that resolution a byte's time at any usual rate is exact enough for days.
 const PS_PER_US: u64 = 1_000_000;
 
-/// One direction of the line.
+/// A direction of the line.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// Time of a byte (10 bits), ps; 0: no throttling.
     byte_ps: u64,
     queue: VecDeque<u8>,
-    /// When the first byte of the queue has arrived, ps.
+    /// Time at which the first byte of the queue has arrived, ps.
     front_ps: u64,
     /// Bytes that have arrived.
     pub carried: u64,
@@ -24,7 +24,7 @@ impl Line {
         Self { byte_ps, queue: VecDeque::new(), front_ps: 0, carried: 0 }
     }
 
-    /// Bytes enter the line at `now_us`, behind those that wait already.
+    /// Puts bytes on the line at `now_us`, after those that wait already.
     pub fn write(&mut self, now_us: u64, bytes: &[u8]) {
         if self.queue.is_empty() {
             // The last byte may have ended within the millisecond: the transmitter was idle since.
@@ -54,30 +54,30 @@ impl Line {
         self.queue.len()
     }
 
-    /// Nothing is on the line.
+    /// Returns `true` if the line is empty.
     pub fn is_idle(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// Forget what is on the line.
+    /// Drops all bytes on the line.
     pub fn clear(&mut self) {
         self.queue.clear();
     }
 }
 
-/// What is wrong with a line at the moment.
+/// Faults of a line at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFault {
     /// Share of bytes that vanish, 0..1.
     pub lost: f64,
-    /// Share of bytes of which a bit is flipped, 0..1.
+    /// Share of bytes with a flipped bit, 0..1.
     pub flipped: f64,
     /// Bytes are held back until this is over.
     pub held: bool,
 }
 
 impl LineFault {
-    /// Do to `bytes` what the fault does; `rng` decides which bytes it meets.
+    /// Applies the fault to `bytes`; `rng` selects the affected bytes.
     pub fn apply(&self, bytes: &mut Vec<u8>, rng: &mut fastrand::Rng) {
         if self.lost > 0.0 {
             bytes.retain(|_| rng.f64() >= self.lost);

@@ -23,7 +23,7 @@ pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
     host::there_and_back(from, &to, 1.6 + 2.0 * rng.f64(), 1, PATH_STEP_MS)
 }
 
-/// What a soak run saw.
+/// Report of a soak run.
 #[derive(Clone, Debug, Default)]
 pub struct SoakReport {
     /// Virtual time, s.
@@ -80,7 +80,7 @@ impl core::fmt::Display for SoakReport {
     }
 }
 
-/// A soak run that can be gone on with.
+/// Soak run that can be continued.
 pub struct Soak {
     world: World,
     listener: Listener,
@@ -89,7 +89,7 @@ pub struct Soak {
     report: SoakReport,
     state: ControllerState,
     trajectory: TrajectoryState,
-    /// When the next command, the next fault comes, ms.
+    /// Time of the next command and of the next fault, ms.
     next_command: u64,
     next_fault: u64,
     now: u64,
@@ -135,7 +135,7 @@ impl Soak {
         true
     }
 
-    /// What was seen so far.
+    /// Returns the report so far.
     pub fn report(&self) -> SoakReport {
         SoakReport {
             seconds: self.now as f64 * 1e-3,
@@ -149,7 +149,7 @@ impl Soak {
         self.world.clear_log();
     }
 
-    /// The world, for a look at what led to a violation.
+    /// Returns the world, to analyse a violation.
     pub fn world(&self) -> &World {
         &self.world
     }
@@ -183,7 +183,7 @@ impl Soak {
         }
     }
 
-    /// Mostly what brings the arm on from where it is, sometimes anything.
+    /// Sends a command: mostly a sensible one in the present state, sometimes any.
     fn command(&mut self) {
         let waiting = self.world.host_write_pending() > 0;
         self.next_command = self.now + self.rng.u64(5..1500);
@@ -216,7 +216,7 @@ impl Soak {
         }
     }
 
-    /// From where the arm is to somewhere near and back, in one go.
+    /// Returns a motion from the present position to a near one and back, in one trajectory.
     fn motion(&mut self) -> Vec<u8> {
         let from = self.world.telemetry().joints.map(|j| j.position);
         host::trajectory(&path(&from, self.rng.u64(..)), PATH_STEP_MS, 113).concat()

@@ -1,5 +1,4 @@
-//! Ties the simulated joint bus to a bus that others can join: they see every frame, and what they send takes
-//! part.
+//! Connects the simulated joint bus to a bus that others can join: they see every frame, and their frames take part.
 use core::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, Id};
@@ -27,8 +26,8 @@ impl<B: CanBus> BusTap<B> {
         Self { bus, sent: 0, taken: 0, refused: 0 }
     }
 
-    /// After each `World::step`: what was on the bus goes out, what others sent comes in and is carried in
-    /// the next millisecond.
+    /// Call after each `World::step`: sends the frames of the simulated bus, and takes frames of others, which are
+    /// carried in the next millisecond.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;

@@ -3,7 +3,7 @@ use core::fmt;
 
 use jtc_bus::{JOINTS, Joint};
 
-/// The events, for people.
+/// Description of the events, for display.
 pub const TYPED_EVENTS_HELP: &str =
     "push JOINT TORQUE_NM SECONDS (as in `push 3 12 0.5`), hand FILE (as in `hand lead.csv`)";
 
@@ -17,7 +17,7 @@ const PUSH_MAX_S: f64 = 60.0;
 pub enum TypedEvent {
     /// Someone pushes.
     Push {
-        /// Which joint.
+        /// Joint.
         joint: Joint,
         /// N·m in the joint's positive direction.
         torque: f64,
@@ -26,7 +26,7 @@ pub enum TypedEvent {
     },
     /// A hand leads the arm along the joint positions of a trajectory file, while it is taught.
     Hand {
-        /// As typed.
+        /// Name as typed.
         file: String,
     },
 }
@@ -42,18 +42,18 @@ impl fmt::Display for TypedEvent {
     }
 }
 
-/// Why a typed line is no event.
+/// Reasons why a typed line is not an event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TypedEventError {
-    /// There is no such event.
+    /// The event does not exist.
     Unknown(String),
     /// A push has three words after its name.
     PushWords(usize),
-    /// Which word of a push is wrong, as typed, and what it may be.
+    /// Invalid word of a push, as typed, and its allowed range.
     Value {
-        /// Its name.
+        /// Name.
         what: &'static str,
-        /// As typed.
+        /// Word as typed.
         word: String,
         /// Smallest and largest.
         allowed: (f64, f64),

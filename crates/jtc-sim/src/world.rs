@@ -29,10 +29,10 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Time by which the board measures silence on its line, and when it last heard a byte, µs.
+    /// Time with which the board measures silence on its line, and the time of the last byte, µs.
     line_us: u64,
     heard_us: u64,
-    /// The silence on the line is no longer than this, µs; `None`: as long as in virtual time.
+    /// Longest silence on the line, µs; `None`: as long as in virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -54,11 +54,11 @@ pub struct World {
     good_frames: u64,
     bad_frames: u64,
     log: Log,
-    /// What goes into the board and comes out of it, while somebody wants it.
+    /// Inputs and outputs of the board, if they are watched.
     exchange: Option<Box<Exchange>>,
 }
 
-/// What of the controller was logged last.
+/// Controller state that was logged last.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     state: ControllerState,
@@ -113,7 +113,7 @@ impl World {
         world
     }
 
-    /// One millisecond of everything.
+    /// Simulates a millisecond.
     pub fn step(&mut self) {
         self.step_faults();
         self.receive();
@@ -211,7 +211,7 @@ impl World {
             }
         }
         if let Some(most) = self.silence_us.filter(|_| self.to_device.is_idle()) {
-            // It never goes back.
+            // The time never goes back.
             let before = self.line_us.saturating_sub(TICK_US).max(self.heard_us);
             self.line_us = self.line_us.min(self.heard_us.saturating_add(most)).max(before);
         }
@@ -219,7 +219,7 @@ impl World {
             self.heard_us = self.line_us;
         }
         if let Some(exchange) = &mut self.exchange {
-            // The pin keeps its level where no tick comes.
+            // The pin keeps its level if no tick comes.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
@@ -275,7 +275,7 @@ impl World {
         }
     }
 
-    /// What a reset of the board does to its surroundings.
+    /// Applies the effects of a board reset to its surroundings.
     fn restart(&mut self) {
         self.safety_output = false;
         self.bus.clear();
@@ -284,7 +284,7 @@ impl World {
         self.to_host.clear();
     }
 
-    /// Log what has changed.
+    /// Logs changes.
     fn note(&mut self) {
         let time = self.now_us();
         let telemetry = self.board.telemetry();

@@ -1,4 +1,4 @@
-//! Someone pushes the arm and leads it by the hand.
+//! A person pushes the arm and leads it by hand.
 use jtc_bus::Joint;
 use jtc_core::ControllerState;
 use jtc_sim::{FaultPlan, HandPath, Operator, SimConfig, host};
@@ -12,7 +12,7 @@ fn held(faults: FaultPlan) -> Operator {
     operator
 }
 
-/// There and back by 0.4 rad in every joint, in 4 s.
+/// Returns a path out and back by 0.4 rad in every joint, in 4 s.
 fn path() -> HandPath {
     let at = |i: u32| {
         let s = (core::f64::consts::PI * f64::from(i) / 400.0).sin().powi(2);
@@ -21,7 +21,7 @@ fn path() -> HandPath {
     HandPath::new((0..=400).map(at).collect(), 0.01).unwrap()
 }
 
-/// Largest distance of joint `j` from where it started over `ms`, rad.
+/// Returns the largest distance of joint `j` from its first position over `ms`, rad.
 fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
     (0..ms).fold(0.0, |far: f64, _| {
         operator.step();
@@ -33,7 +33,7 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // Less than a push that the joint would yield to.
+    // Less than a push to which the joint would yield.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");
@@ -60,7 +60,7 @@ fn a_push_of_a_fault_file_concerns_the_joint_counted_from_1() {
 fn j25_a_hand_leads_the_taught_arm_along_its_path_and_lets_go() {
     let mut operator = held(FaultPlan::default());
     operator.world.lead(path());
-    // It waits until the arm is taught.
+    // The hand waits until the arm is taught.
     assert!(farthest(&mut operator, 0, 1000) < 1e-3);
     operator.teach().unwrap();
     let (mut led, mut fastest) = ([0.0f64; 6], 0.0f64);

@@ -1,4 +1,4 @@
-//! Gears that yield, against what mechanics says of two bodies on a spring.
+//! Elastic gears, compared with the mechanics of two bodies on a spring.
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
 use jtc_sim::{Arm, FrictionModel, Gear, SimArm, SimFriction};
@@ -21,7 +21,7 @@ fn undamped(stiffness: f64) -> Gear {
     Gear { stiffness, damping: 0.0 }
 }
 
-/// Kinetic energy of links and motors, energy of springs and of the heights of the links, J.
+/// Returns the kinetic energy of links and motors plus the energy of springs and of the heights of the links, J.
 fn energy(arm: &Arm) -> f64 {
     let parts = arm.parts();
     let dynamics = Dynamics::new(&parts.model, parts.gravity);
@@ -39,7 +39,7 @@ fn energy(arm: &Arm) -> f64 {
             sum += 0.5 * rotor * arm.qd[j].powi(2);
         }
     }
-    // Frames of the joints are those of the links.
+    // The frames of the joints are those of the links.
     let poses = dynamics.forward_kinematics(&arm.q);
     for (link, pose) in parts.model.links[1..].iter().zip(&poses) {
         let com: f64 = (0..3).map(|i| pose.rotation[2][i] * link.origin.xyz[i]).sum();
@@ -65,7 +65,7 @@ fn an_arm_on_undamped_gears_keeps_its_energy() {
     }
 }
 
-/// What the drives put in and the damping takes out is what the energy changes by.
+/// The energy changes by the work of the drives minus the dissipation of the damping.
 #[test]
 fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     let gear = Gear { stiffness: 8_000.0, damping: 15.0 };
@@ -93,7 +93,7 @@ fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     assert!(most > 5.0 && (change - work).abs() < 2e-3 * most, "{change} J, {work} J put in");
 }
 
-/// Each joint in turn with a gear that yields, its motor held: it swings as √(K/J) of its link.
+/// Each joint in turn with an elastic gear, its motor held: it swings at √(K/J) of its link.
 #[test]
 fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     for joint in 0..JOINTS {
@@ -131,7 +131,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     }
 }
 
-/// A motor that is held: its link hangs by torque over stiffness.
+/// With a held motor, the link hangs by torque over stiffness.
 #[test]
 fn a_loaded_link_rests_at_torque_over_stiffness() {
     let gear = Gear { stiffness: 20_000.0, damping: 200.0 };
@@ -148,7 +148,7 @@ fn a_loaded_link_rests_at_torque_over_stiffness() {
     }
 }
 
-/// Stiffer and stiffer gears come near the arm with rigid ones, with friction too.
+/// With increasing stiffness the arm approaches an arm with rigid gears, with friction too.
 #[test]
 fn stiff_gears_move_the_arm_as_rigid_ones_do() {
     for model in [FrictionModel::default(), FrictionModel::Smooth { width: 0.01 }] {

@@ -1,9 +1,9 @@
-//! An arm without brakes that falls, and what becomes of it when the errors are cleared meanwhile (J-16).
+//! An arm without brakes that falls while the errors are cleared (J-16).
 use jtc_bus::{NodeState, Request, Target};
 use jtc_core::{ControllerState, error};
 use jtc_sim::{Operator, SimConfig, Support, host};
 
-/// Held, the upper arm bent forward by this much: gravity pulls it on.
+/// Returns a held arm whose upper arm is bent forward by this angle, so that gravity pulls it further.
 fn held(shoulder: f64) -> Operator {
     let start = [0.0, shoulder, -0.3, 0.0, 0.2, 0.0];
     let config = SimConfig { start, support: Support::Stand, baud: None, ..SimConfig::default() };
@@ -24,7 +24,7 @@ fn asks_to_enable(operator: &Operator) -> bool {
     }
 }
 
-/// The errors are cleared this long after the arm was let go.
+/// Clears the errors at this time after the arm was released.
 fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let mut operator = held(shoulder);
     operator.world.set_safety_input(false);
@@ -34,7 +34,7 @@ fn fall_and_clear(shoulder: f64, after_ms: u64) {
     let (mut asked, mut last) = (None, [0.0; 6]);
     for ms in 0..15_000 {
         if ms % 500 == 0 && operator.state() == ControllerState::Error {
-            // Again and again: drives that fall beyond 1.8 rad/s report over-speed.
+            // Repeatedly, because drives that fall beyond 1.8 rad/s report over-speed.
             operator.world.host_write(&host::clear_all());
         }
         operator.step();

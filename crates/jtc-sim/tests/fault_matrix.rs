@@ -1,16 +1,16 @@
-//! The table of reactions in docs/safety.md is what the controller does. `UPDATE_DOCS=1` writes it again.
+//! The table of reactions in docs/safety.md shows the behaviour of the controller. `UPDATE_DOCS=1` updates it.
 use jtc_sim::matrix::{contact_table, fault_matrix, standstill_table, stopping_table};
 
 #[test]
 fn j12_j14_j16_j21_j22_each_fault_in_each_state_has_the_documented_reaction() {
-    // All in one test: they write the same file.
+    // All in one test, because they write the same file.
     documented("fault matrix", &fault_matrix().unwrap_or_else(|error| panic!("{error}")));
     documented("standstill", &standstill_table().unwrap_or_else(|error| panic!("{error}")));
     documented("stopping", &stopping_table().unwrap_or_else(|error| panic!("{error}")));
     documented("contact", &contact_table().unwrap_or_else(|error| panic!("{error}")));
 }
 
-/// The table between the marks of that name in docs/safety.md is `table`, or is made so.
+/// Checks that the table between the marks of that name in docs/safety.md is `table`, or updates it.
 fn documented(name: &'static str, table: &str) {
     println!("{table}");
     test_kit::page::part("safety.md", name, table);

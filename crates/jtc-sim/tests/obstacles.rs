@@ -1,4 +1,5 @@
-//! The controller and an arm that meets walls, takes up loads, has gears that yield and drives that trip at their own speed.
+//! The controller with an arm that meets walls, picks up loads, and has elastic gears and drives with an over-speed
+//! trip of their own.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, error, joint_error};
 use jtc_sim::{
@@ -25,8 +26,9 @@ fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
     operator.world.inject(Fault { kind, trigger: now, duration_ms: ms });
 }
 
-/// Joint 1 alone turns from 0 to 1 rad and back; a wall stands at 0.5 rad. Its torque is the deepest that the kinetic energy can press
-/// it, v·√(K·J), and what the drive adds; it never pulls; nothing of it is left when it is away.
+/// Joint 1 alone turns from 0 to 1 rad and back; a wall stands at 0.5 rad. The largest torque of the wall is that of
+/// the kinetic energy, v·√(K·J), plus the torque of the drive. The wall never pulls, and its torque is gone when it is
+/// removed.
 #[test]
 fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     let start = [0.0, -0.4, 0.9, 0.2, -0.3, 0.5];
@@ -67,7 +69,7 @@ fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     }
 }
 
-/// A load that is taken up and dropped again: the torque that holds the arm changes by its weight, and comes back.
+/// A load is picked up and dropped again: the torque that holds the arm changes by its weight, and returns.
 #[test]
 fn a_load_that_is_taken_up_is_held_and_dropped() {
     let mut operator = held(config());
@@ -88,7 +90,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
     let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
     for j in 0..6 {
-        // Stiction carries some of it.
+        // Stiction carries a part of it.
         let weight = loaded[j] - empty[j];
         assert!(
             (with[j] - before[j] - weight).abs() < 9.0,
@@ -104,7 +106,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
 }
 
-/// The controller's own check of the speed (J-35) is seen with drives that trip later than they do by default.
+/// The controller's own check of the speed (J-35) can be seen with drives that trip later than the default.
 #[test]
 fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     let run = |over_speed: Option<f64>| {
@@ -127,7 +129,7 @@ fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     assert_eq!(run(Some(50.0)), (true, false));
 }
 
-/// A brake that stays closed holds its joint, whatever its drive does, and opens when the fault is over.
+/// A brake that stays closed holds its joint, for any torque of its drive, and opens when the fault is over.
 #[test]
 fn a_brake_that_stays_closed_holds_the_joint() {
     for support in [Support::Brakes, Support::Stand] {
@@ -144,7 +146,8 @@ fn a_brake_that_stays_closed_holds_the_joint() {
     }
 }
 
-/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved; the drives' positions are those of the motors.
+/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved; the drives' positions are those of the
+/// motors.
 #[test]
 fn an_arm_with_gears_that_yield_is_held_and_moved() {
     let run = || {
@@ -170,7 +173,7 @@ fn an_arm_with_gears_that_yield_is_held_and_moved() {
     assert!(twist.abs() > 2e-4 && twist.abs() < 0.02, "joint 2 is loaded: {twist} rad");
 }
 
-/// A fault without a duration that a tick could show is there in one tick.
+/// A fault without a duration is present for one tick, if a tick can show it.
 #[test]
 fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     let mut operator = held(config());
@@ -184,8 +187,9 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// Gears that yield twist between the encoder of the joint and that of the motor. Whatever the arm does and meets, that is taken neither for
-/// an encoder that has jumped nor for a speed of another scale, wherever the drives have their encoder.
+/// Elastic gears twist between the encoder of the joint and that of the motor. For any motion and contact of the arm,
+/// the twist is detected neither as a jump of an encoder nor as a speed of another scale, in both places of the drives'
+/// encoder.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in
@@ -210,7 +214,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
         if trial % 2 == 0 {
             inject(&mut operator, FaultKind::Push { joint, torque }, Some(20 + (500.0 * rng.f64()) as u64));
         } else {
-            // Where the joint is, on the side that it moves to.
+            // At the position of the joint, on the side to which it moves.
             let speed = operator.world.truth().qd[joint.index()];
             let side = if speed >= 0.0 { Side::Above } else { Side::Below };
             let rad = operator.world.truth().q[joint.index()] + 0.05 * speed.signum();
@@ -228,7 +232,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
             let telemetry = operator.world.telemetry();
             assert_eq!(telemetry.errors & error::EXTERNAL_JOINTS, 0, "{what}");
             if operator.state() == ControllerState::Error {
-                // A shove that no joint can stop: it is over its speed.
+                // A push that no joint can stop: the joint exceeds its speed.
                 let fast = telemetry.joints.iter().any(|joint| joint.internal & joint_error::VELOCITY != 0);
                 assert!(fast, "{what}: {:?}", telemetry.joints.map(|j| (j.internal, j.velocity, j.torque)));
                 break;

@@ -1,9 +1,10 @@
-//! The world's controller beside another board with the same inputs, and the plant under torques without a bus.
+//! The world's controller compared with another board that gets the same inputs, and the plant under torques without a
+//! bus.
 use jtc_core::{Config, ControllerState, Parameters};
 use jtc_sim::{Board, Fault, FaultKind, FaultPlan, Operator, Pins, Plant, SimConfig, Support, Trigger};
 
-/// A second board that is given what the world's was given does what that did, bit for bit, with lost ticks and a reset by the watchdog
-/// on the way.
+/// A second board with the inputs of the world's board has the same outputs, bit for bit, with lost ticks and a reset
+/// by the watchdog on the way.
 #[test]
 fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     let overrun =
@@ -45,7 +46,8 @@ fn a_board_with_the_inputs_of_the_worlds_has_its_outputs() {
     assert_eq!(board.watchdog_resets, 1);
 }
 
-/// Gravity compensation holds the arm where it is, no torque lets it fall, and what the drives do not reach is not there.
+/// Gravity compensation holds the arm at its position, zero torque lets it fall, and torques beyond the drives' limits
+/// are cut off.
 #[test]
 fn a_plant_without_its_bus_moves_under_the_torques_that_it_is_given() {
     let start = [0.0, 0.6, -1.0, 0.3, 0.4, 0.0];

@@ -1,4 +1,4 @@
-//! The flight recorder in whole sessions: what it holds, and that a replay gives the same again (J-56).
+//! The flight recorder in whole sessions: its contents, and a replay with the same results (J-56).
 use std::collections::HashMap;
 
 use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
@@ -10,7 +10,7 @@ use jtc_wire::{ExecCommand, LogState, RawPoint, fixed};
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 
-/// What became of the ticks of a log.
+/// Results of the ticks of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counts {
     ticks: u64,
@@ -23,10 +23,10 @@ fn blocks(world: &World) -> Vec<Block> {
     world.recorder().blocks().copied().collect()
 }
 
-/// Replays the log and compares each tick with what was computed then.
+/// Replays the log and compares each tick with the values computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // Nothing but settings and points comes from the controller of the session: what it remembers is in the snapshots.
+    // Only settings and points are taken from the controller of the session: its memory is in the snapshots.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -39,7 +39,7 @@ fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
             Outcome::Same => {
                 counts.same += 1;
                 let Some(seen) = seen.get(&tick) else { continue };
-                // Records belong to the link.
+                // `records_lost` is excluded, because the link sets it.
                 let then = Telemetry { records_lost: 0, ..*seen };
                 assert_eq!(Telemetry { records_lost: 0, ..step.telemetry }, then, "tick {tick}");
             }
@@ -82,7 +82,7 @@ fn j56_random_sessions_with_faults_replay_bit_for_bit() {
     assert!(all.same > 100_000, "{all:?}");
 }
 
-/// A controller that holds the arm, and the path that it has.
+/// Returns a controller that holds the arm, with a path loaded.
 fn loaded() -> Operator {
     let config = SimConfig { start: FROM, baud: None, ..SimConfig::default() };
     let mut operator = Operator::new(config);
@@ -91,7 +91,7 @@ fn loaded() -> Operator {
     operator
 }
 
-/// What a run along the path commands, tick by tick; `sends`: what a host sends in each.
+/// Returns the commands of a run along the path, tick by tick; `sends`: bytes that a host sends in each tick.
 fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
@@ -108,7 +108,7 @@ fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
 #[test]
 fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     let (_, undisturbed) = run(|_| Vec::new());
-    // One page after the other, as fast as they come.
+    // Page after page, as fast as the answers come.
     let (_, read) =
         run(
             |ms| {
@@ -118,15 +118,15 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     assert!(undisturbed == read, "a torque differs");
 }
 
-/// Two seconds before an error and what follows it, with more traffic than a controller executes, whatever part of a snapshot's time is
-/// lost at the beginning.
+/// Keeps two seconds before an error and the time after it, with more traffic than a controller executes, for any part
+/// of a snapshot's time that is lost at the beginning.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // Frames that take a few instructions each, and parameters, which call for a snapshot.
+        // Frames that take a few instructions each, and parameters, which require a snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -141,12 +141,12 @@ fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     assert!(least >= 2_300, "{least} ticks");
 }
 
-/// Ticks in these blocks.
+/// Returns the number of ticks in these blocks.
 fn ticks(blocks: &[Block]) -> usize {
     Log::new(blocks).filter(|record| matches!(record, Record::Tick { .. })).count()
 }
 
-/// One point of the trajectory is another: what was the same up to there is not the same from there on.
+/// A changed point of the trajectory: the replay is equal up to that point, and differs from there on.
 #[test]
 fn j56_the_first_tick_that_differs_is_named() {
     const POINT: usize = 120;
@@ -168,7 +168,7 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // The point acts from the point before it on; what it changes reaches the torque on the bus within some ticks.
+    // The point acts from the point before it on; its effect reaches the torque on the bus within a few ticks.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;
     assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");

@@ -1,4 +1,4 @@
-//! The short form of the soak run, and that it repeats.
+//! The short form of the soak run, and its repeatability.
 use jtc_sim::soak::Soak;
 
 #[test]

@@ -1,9 +1,9 @@
-//! An arm whose gears stick: at rest the controller must not hunt.
+//! An arm whose gears have stiction: at rest the controller must not hunt.
 //!
-//! With bristle friction a joint stops where stiction holds it, a little beside the command. An integral that goes on there raises
-//! the torque until the joint breaks away and stops on the other side: the torque swings by twice the stiction for ever, at some
-//! tenths of a hertz or, by the encoder's steps, faster. The test looks at the torque command averaged over 50 ms, which leaves the
-//! swing and takes the single encoder step out.
+//! With bristle friction a joint stops as soon as stiction holds it, slightly off the command. An integral that
+//! continues there raises the torque until the joint breaks away and stops on the other side. The torque swings by
+//! twice the stiction for ever, at a few tenths of a hertz or, because of the encoder's steps, faster. The test uses
+//! the torque command averaged over 50 ms, which keeps the swing and removes the single encoder step.
 use jtc_core::JOINTS;
 use jtc_sim::{FrictionModel, LuGre, Operator, SimConfig, host};
 
@@ -38,7 +38,7 @@ fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     range.map(|(low, high)| high - low)
 }
 
-/// An integral that goes on at rest swings joints 1 to 3 by 7 to 8 N·m here.
+/// An integral that continues at rest swings joints 1 to 3 by 7 to 8 N·m here.
 #[test]
 fn j41_no_hunting_in_stiction() {
     for seed in [1, 2, 3] {

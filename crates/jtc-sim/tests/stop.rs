@@ -1,15 +1,15 @@
-//! A Stop or a Pause acts in the tick after its last byte, whatever else the line brings (J-04).
+//! A Stop or a Pause acts in the tick after its last byte, regardless of other bytes on the line (J-04).
 //!
-//! Each test lets two worlds run that differ in the line only: in one it is quiet but for the Stop, in the other it is not. From
-//! the tick after the last byte of the Stop on, both must command the same, bit for bit.
+//! Each test runs two worlds that differ only in the line: in one it carries only the Stop, in the other also other
+//! bytes. From the tick after the last byte of the Stop on, both must command the same, bit for bit.
 use jtc_core::{ControllerState, TrajectoryState};
 use jtc_sim::{Operator, SimConfig, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, Response, fixed};
 
-/// What a host writes, and how many ms after the beginning.
+/// Bytes that a host writes, each with its time in ms after the beginning.
 type Script = Vec<(u64, Vec<u8>)>;
 
-/// An arm on the way, at 115 200 Bd or whatever is asked for.
+/// Returns an arm on its path, at 115 200 Bd or at the given rate.
 fn moving(baud: Option<u32>) -> Operator {
     let mut operator = Operator::new(SimConfig { baud, ..SimConfig::default() });
     operator.bring_up().expect("it comes up");
@@ -22,7 +22,8 @@ fn moving(baud: Option<u32>) -> Operator {
     operator
 }
 
-/// Runs the script; returns the operator in the millisecond in which byte `end` of it has arrived, and which one that is.
+/// Runs the script; returns the operator in the millisecond in which byte `end` of the script has arrived, and the
+/// number of that millisecond.
 fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
     let mut operator = moving(baud);
     let before = operator.world.statistics().serial_to_device;
@@ -38,7 +39,7 @@ fn play(baud: Option<u32>, script: &Script, end: u64) -> (Operator, u64) {
     unreachable!()
 }
 
-/// The command ends at byte `end` of the script; the arm must slow down as on a quiet line.
+/// Checks that the command whose last byte is byte `end` of the script slows the arm down as on a quiet line.
 fn acts_at_once(baud: Option<u32>, script: &Script, end: u64, command: ExecCommand) -> Operator {
     let (mut busy, ms) = play(baud, script, end);
     assert_eq!(busy.world.telemetry().trajectory, TrajectoryState::Execute, "still on the way");
@@ -87,7 +88,7 @@ fn j04_a_stop_behind_hundreds_of_frames() {
 
 #[test]
 fn j04_a_stop_behind_four_thousand_frames() {
-    // 24 000 bytes: two seconds at this rate. At the highest one, more than the board can hold.
+    // 24 000 bytes: two seconds at this rate. At the highest rate, more than the board can hold.
     for (baud, frames) in [(115_200, 4000), (15_000_000, 4000), (15_000_000, 200_000)] {
         let bytes = [fixed::CLEAR_OCCURRED_ERRORS.repeat(frames), fixed::STOP.to_vec()].concat();
         let end = bytes.len() as u64;
@@ -100,7 +101,7 @@ fn j04_a_stop_behind_four_thousand_frames() {
     }
 }
 
-/// A line outruns the execution of the shortest frames only above 960 kBd, so that nothing but records is lost below.
+/// A line is faster than the execution of the shortest frames only above 960 kBd, so that below only records are lost.
 #[test]
 fn j04_short_frames_are_executed_as_fast_as_they_come() {
     let mut operator = moving(Some(921_600));
@@ -147,7 +148,7 @@ fn j04_a_stop_in_noise() {
 #[test]
 fn j04_a_stop_behind_a_false_header_and_a_long_frame() {
     let points = host::there_and_back(&[0.0; 6], &[0.1; 6], 1.0, 2, 10);
-    // Of a client that knows the extensions: on a plain line the segment would stop the arm as well (J-30).
+    // From a client with extensions: on a plain line the segment would also stop the arm (J-30).
     let long = [&fixed::GET_INFO[..], &host::trajectory(&points, 10, 400).concat()].concat();
     for front in [&[0x9B, 0x04, 0xEA, 0x56][..], &[0x9B], &long, &long[..long.len() - 3]] {
         let bytes = [front, &fixed::STOP].concat();
@@ -165,24 +166,24 @@ fn j04_a_stop_cancels_an_execute_that_waits() {
         .wait("Stop", 600, |world| world.telemetry().trajectory == TrajectoryState::Stop)
         .expect("it stops");
     operator.listener.responses.clear();
-    // An Execute behind gains that are executed one a tick, and a Stop behind it.
+    // An Execute after gains that take one tick each, and a Stop after it.
     let frames = [&fixed::PID_PARAM_USE_DEFAULT.repeat(30)[..], &fixed::EXECUTE, &fixed::STOP].concat();
     operator.world.host_write(&frames);
     for _ in 0..1500 {
         operator.step();
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Stop, "nothing moves");
     }
-    // The upload came on a plain line, so its Execute is refused by a number that existing hosts know (J-51).
+    // The upload came on a plain line, so its Execute is refused with a status that existing hosts know (J-51).
     assert_eq!(exec_records(&operator), [DataStatus::IncorrectValue, DataStatus::NoError]);
     assert_eq!(operator.listener.responses.len(), 32, "one record a frame");
 }
 
-/// An existing proxy sends new waypoints while the arm moves: again and again, and nothing else, until they are taken.
+/// An existing proxy sends new waypoints while the arm moves, and repeats only them until they are accepted.
 #[test]
 fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     for baud in [Some(115_200), None] {
         let mut operator = moving(baud);
-        // What its user has asked for since the start is more than 2 s old.
+        // The last extension request since the start is more than 2 s old.
         operator.run(2_100);
         assert_eq!(operator.world.telemetry().trajectory, TrajectoryState::Execute);
         let mut refused = 0;
@@ -203,7 +204,8 @@ fn j30_a_host_that_repeats_segment_0_stops_the_arm_and_is_taken() {
     }
 }
 
-/// An existing proxy that is told to go beyond a limit waits for ever for a segment that is refused, and forwards no other word.
+/// An existing proxy that is told to go beyond a limit waits for ever for a refused segment, and forwards no other
+/// command.
 #[test]
 fn j36_an_existing_host_outlives_a_trajectory_that_breaks_a_limit() {
     for baud in [Some(115_200), None] {

@@ -1,4 +1,4 @@
-//! How well the arm follows when it is not quite the arm that the controller believes in.
+//! Tracking of an arm that differs slightly from the controller's model.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::{ExecCommand, RawPoint};
@@ -19,7 +19,7 @@ fn held(seed: u64) -> Operator {
     operator
 }
 
-/// RMS of commanded minus measured position over a run, rad.
+/// Returns the RMS of commanded minus measured position over a run, rad.
 fn run(operator: &mut Operator) -> [f64; 6] {
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let (mut sum, mut count) = ([0.0; 6], 0.0);
@@ -72,7 +72,7 @@ fn j32_the_recorded_trajectory_is_followed_within_two_milliradians_rms() {
     }
 }
 
-/// RMS of commanded minus true position when the torque of a tick begins to act, rad.
+/// Returns the RMS of commanded minus true position at the time when the torque of a tick begins to act, rad.
 fn true_error(config: SimConfig) -> [f64; 6] {
     let mut operator = Operator::new(SimConfig { start: FROM, baud: None, ..config });
     operator.bring_up().unwrap();
@@ -94,7 +94,8 @@ fn true_error(config: SimConfig) -> [f64; 6] {
     }
 }
 
-/// The simulated drives' measurements are two ticks old: with any other setting the arm is beside its path by the way of the rest.
+/// The simulated drives' measurements are two ticks old: with another setting the arm deviates from its path by its
+/// motion in the difference.
 #[test]
 fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     let error = |delay_ticks: u8| {
@@ -112,7 +113,7 @@ fn j62_the_simulated_arm_follows_best_with_a_delay_of_two_ticks() {
     }
 }
 
-/// Drives that deliver less follow as well with a gain that makes up for it, and worse without.
+/// Drives that deliver less torque follow as well with a gain that compensates for it, and worse without.
 #[test]
 fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     let error = |delivers: f64, gain: f64| {
@@ -130,7 +131,8 @@ fn j61_a_torque_gain_makes_up_for_drives_that_deliver_less() {
     assert!(worst(&without) > 1.5 * worst(&ideal), "{without:?} {ideal:?}");
 }
 
-/// Late answers are nearly as good as those in time: the arm is about as near to its path, whatever the delay is set to.
+/// Late answers are nearly as good as answers in time: the arm is about as near to its path, for any setting of the
+/// delay.
 #[test]
 fn j63_late_answers_are_as_good_as_those_in_time() {
     let error = |seed: u64, answer_jitter_ms: u8, delay_ticks: u8| {

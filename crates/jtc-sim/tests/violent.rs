@@ -1,12 +1,12 @@
-//! Whatever throws the simulated arm about, it stays in its range, give or take what its end stops yield.
+//! A violently thrown simulated arm stays in its range, except that its end stops yield a little.
 use jtc_core::{Friction, Parameters};
 use jtc_sim::{Arm, FrictionModel, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
-/// What the end stops may yield, rad: a joint of the default arm strikes them with up to 80 rad/s.
+/// Largest travel of the end stops when they yield, rad: a joint of the default arm strikes them with up to 80 rad/s.
 const YIELD: f64 = 0.5;
 
-/// Links times `mass`, rotors of `rotor` kg·m².
+/// Returns an arm with links of `mass` times the default masses and rotors of `rotor` kg·m².
 fn arm(mass: f64, rotor: f64) -> SimArm {
     let mut arm = SimArm::default();
     for link in &mut arm.model.links {
@@ -24,7 +24,8 @@ fn in_range(arm: &Arm, what: &str) {
     }
 }
 
-/// Pushes of up to 400 N·m on every joint at once, cold and multiplied friction, brakes that close and open on the way.
+/// Throws the arm about: pushes of up to 400 N·m on every joint at once, cold and multiplied friction, brakes that
+/// close and open meanwhile.
 fn throw_about(parts: &SimArm, seed: u64, what: &str) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut arm = Arm::new(parts.clone(), [1.2; 6], [0.0; 6]);
@@ -89,7 +90,7 @@ fn a_brake_that_closes_on_a_fast_joint_lets_the_end_stop_end_its_way() {
         }
         assert_eq!(arm.qd, [0.0; 6]);
         if speed == 5.0 {
-            // 25/(2·40) rad: it does not come to the stop.
+            // 25/(2·40) rad: the joint does not reach the stop.
             assert!((0.30..0.33).contains(&arm.q[4]), "{} rad", arm.q[4]);
         }
     }

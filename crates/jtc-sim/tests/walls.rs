@@ -1,4 +1,4 @@
-//! Walls that the arm meets, and loads that it takes up and drops, against what mechanics says.
+//! Walls that the arm meets, and loads that it picks up and drops, compared with mechanics.
 #[path = "../../jtc-plan/tests/robots/mod.rs"]
 #[allow(dead_code, reason = "the tests of jtc-plan use more")]
 mod robots;
@@ -11,7 +11,7 @@ use proptest::prelude::*;
 const TICK: f64 = 1e-3;
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Without friction and end stops.
+/// Returns the arm without friction and end stops.
 fn bare(parts: SimArm) -> SimArm {
     SimArm {
         friction: std::array::from_fn(|_| SimFriction::Frictionless),
@@ -20,7 +20,7 @@ fn bare(parts: SimArm) -> SimArm {
     }
 }
 
-/// An arm of these joints with links of these masses (kg) and sizes (m).
+/// Returns an arm of these joints with links of these masses (kg) and sizes (m).
 fn of_links(mut model: ArmModel, masses: [f64; JOINTS], size: f64, rotors: [f64; JOINTS]) -> SimArm {
     for (k, mass) in masses.into_iter().enumerate() {
         let middle = model.joints[k + 1].xyz.map(|x| 0.5 * x);
@@ -31,8 +31,8 @@ fn of_links(mut model: ArmModel, masses: [f64; JOINTS], size: f64, rotors: [f64;
     SimArm { model, rotor_inertia: rotors, ..SimArm::default() }
 }
 
-/// The default arm; the UR5 with its published dimensions and masses; an arm as small and light as a Z1. The light one has the lightest
-/// rotors that the simulator knows.
+/// Returns the default arm; the UR5 with its published dimensions and masses; an arm as small and light as a Z1. The
+/// light one has the lightest rotors that the simulator supports.
 fn arms() -> [(&'static str, SimArm); 3] {
     use std::f64::consts::FRAC_PI_2;
     let light = robots::by_dh([
@@ -68,7 +68,7 @@ fn flange(arm: &SimArm, q: &[f64; JOINTS]) -> [f64; 3] {
 
 const POSE: [f64; JOINTS] = [0.3, 0.4, -0.7, 0.4, 0.6, -0.2];
 
-/// Torque over depth is the stiffness, whatever the integration does on the way.
+/// Torque over depth is the stiffness, for any course of the integration.
 #[test]
 fn a_pushed_joint_rests_in_its_wall_at_torque_over_stiffness() {
     for (name, parts) in arms() {
@@ -134,14 +134,16 @@ fn stiff_walls_on_every_joint_are_stable_on_every_arm() {
                         assert!((arm.q[j] - POSE[j]).abs() < 0.3, "{name}: {:?} after {ms} ms", arm.q);
                     }
                 }
-                // Bounces without damping keep it; the light arm loses and gains at the edges of its walls.
+                // Bounces without damping keep the energy; the light arm loses and gains some at the edges of its
+                // walls.
                 assert!(highest < 1.03 * first, "{name}, {stiffness}, {damping}: {highest} J of {first} J");
             }
         }
     }
 }
 
-/// A flange that rests on a table: the joint torques of the wall are those that hold its force, by virtual work from positions alone.
+/// A flange that rests on a table: the joint torques of the wall balance its force, by virtual work from positions
+/// alone.
 #[test]
 fn the_force_of_a_plane_acts_through_the_flange() {
     for (name, parts) in arms() {
@@ -153,7 +155,7 @@ fn the_force_of_a_plane_acts_through_the_flange() {
         let inside = |x: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] + depth * normal[i] / length) };
         arm.set_walls(&[Wall::Plane { position, normal, stiffness, damping: 0.0 }]);
         assert_eq!(arm.wall_torque(), [0.0; JOINTS], "{name}: at the surface");
-        // The arm goes in by moving the wall out: the same wall, begun outside the arm.
+        // The arm enters the wall because the wall is moved: the same wall, begun outside the arm.
         let mut before = POSE;
         let away = |q: &[f64; JOINTS]| -> f64 {
             (0..3).map(|i| (flange(&parts, q)[i] - inside(position)[i]) * normal[i] / length).sum()
@@ -186,7 +188,7 @@ fn the_force_of_a_plane_acts_through_the_flange() {
     }
 }
 
-/// An arm that falls onto a table comes to rest on it, as deep as force over stiffness.
+/// An arm that falls onto a table comes to rest on it, at a depth of force over stiffness.
 #[test]
 fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     for (name, parts) in arms() {
@@ -196,7 +198,7 @@ fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
         let stiffness = 20_000.0;
         let mut arm = Arm::new(parts.clone(), [0.0; JOINTS], POSE);
         arm.set_walls(&[Wall::Plane { position, normal: [0.0, 0.0, 2.0], stiffness, damping: 300.0 }]);
-        // All gravity but that of 5 kg at the flange is carried by the drives, with some damping.
+        // The drives carry all gravity except that of 5 kg at the flange, with some damping.
         let load = Payload { mass: 5.0, ..Payload::NONE };
         let held = Dynamics::new(&parts.model, GRAVITY);
         arm.set_carried(&[load]);
@@ -211,7 +213,7 @@ fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     }
 }
 
-/// A wall may begin where the arm is already; then it begins at its surface, and nothing is thrown.
+/// A wall may begin inside the arm; then its surface begins at the arm, and nothing is thrown.
 #[test]
 fn a_wall_that_begins_inside_the_arm_throws_nothing() {
     let mut arm = Arm::new(SimArm { gravity: [0.0; 3], ..bare(SimArm::default()) }, [0.0; JOINTS], POSE);
@@ -219,7 +221,7 @@ fn a_wall_that_begins_inside_the_arm_throws_nothing() {
     arm.set_walls(&[wall]);
     (0..100).for_each(|_| arm.step(&[0.0; JOINTS], TICK));
     assert_eq!(arm.q, POSE);
-    // The surface follows as the arm leaves: on its way back it meets the wall where it turned.
+    // The surface follows as the arm leaves: on its way back the arm meets the wall at the point at which it turned.
     arm.qd[0] = -0.5;
     (0..200).for_each(|_| arm.step(&[0.0; JOINTS], TICK));
     let turned = arm.q[0];
@@ -230,13 +232,13 @@ fn a_wall_that_begins_inside_the_arm_throws_nothing() {
         furthest = furthest.max(arm.q[0]);
     }
     assert!(furthest > turned && furthest < turned + 0.02, "{turned} {furthest}");
-    // Taking the same wall once more changes nothing.
+    // Setting the same wall once more changes nothing.
     let before = arm.clone();
     arm.set_walls(&[wall]);
     assert_eq!((arm.wall_torque(), arm.q), (before.wall_torque(), before.q));
 }
 
-/// A wall that the arm does not reach, gears that do not yield and a load that was dropped leave no trace, to the last bit.
+/// A wall that the arm does not reach, rigid gears and a dropped load leave no trace, to the last bit.
 #[test]
 fn what_is_not_there_changes_no_bit() {
     let mut plain = Arm::new(SimArm::default(), [1.0; JOINTS], POSE);
@@ -257,7 +259,7 @@ fn what_is_not_there_changes_no_bit() {
     }
 }
 
-/// Gravity torque of an arm at rest, from the acceleration that it falls with.
+/// Returns the gravity torque of an arm at rest, from the acceleration at which it falls.
 fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
     let mut falling = arm.clone();
     let dt = 1e-7;
@@ -270,8 +272,8 @@ fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
 }
 
 proptest! {
-    /// What is taken up and dropped changes the torque of gravity by that of its mass at its place: by virtual work on the height of its
-    /// centre.
+    /// Picking up and dropping a load changes the torque of gravity by that of the load's mass at its position: by
+    /// virtual work on the height of its centre.
     #[test]
     fn a_dropped_load_changes_the_gravity_torque_by_its_weight(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -308,7 +310,7 @@ proptest! {
         prop_assert_eq!(gravity_torque(&arm, &parts, &payload), without);
     }
 
-    /// However the arm moves in it or leaves it, a wall does not pull: its force is along its normal or 0.
+    /// For any motion of the arm in it or out of it, a wall does not pull: its force is along its normal or 0.
     #[test]
     fn a_wall_never_pulls(
         q in prop::array::uniform6(-1.4..1.4f64),
@@ -319,7 +321,7 @@ proptest! {
     ) {
         let parts = bare(SimArm::default());
         let start = flange(&parts, &q);
-        // Begun well outside the arm, so that the wall is where it says.
+        // Begun well outside the arm, so that the wall is at its configured position.
         let mut arm = Arm::new(parts.clone(), [0.0; JOINTS], q);
         let wall = |z: f64| Wall::Plane {
             position: [start[0] + z, 0.0, 0.0], normal: [-1.0, 0.0, 0.0], stiffness, damping,

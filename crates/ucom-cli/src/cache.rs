@@ -1,4 +1,4 @@
-//! What is remembered of boards, and what their words mean (D-11), as the command line names it.
+//! Cache of board information and signal words (D-11), in the folder that the command line names.
 
 use cli_kit::Failure;
 use host_kit::user_folder;
@@ -9,11 +9,11 @@ use ucom_host::session::Cache;
 
 use crate::args::{CacheArgs, LinkArgs};
 
-/// The signal table that is taken without being named.
+/// Default signal table.
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
-    /// The signal table; without a file an empty one.
+    /// Loads the signal table; without a file an empty one.
     pub fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
@@ -26,12 +26,12 @@ impl LinkArgs {
 }
 
 impl CacheArgs {
-    /// Where names are remembered.
+    /// Returns the cache of names.
     pub fn cache(&self) -> Cache {
         Cache::new(self.directory(), self.fresh)
     }
 
-    /// Where things are remembered; `None` when there is no place for them.
+    /// Returns the folder of the cache; `None` without one.
     fn directory(&self) -> Option<PathBuf> {
         self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }

@@ -15,7 +15,7 @@ use cli_kit::{Output, exit, print_within};
 
 use args::Cli;
 
-/// At the end, a reader that takes nothing for so long is not waited for.
+/// Longest wait for a blocked reader at the end.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
 fn main() -> ExitCode {
@@ -38,7 +38,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let exit = exit::of(failure.kind);
             if !failure.is_shown() {
-                // Nobody reads what stands in stdout already.
+                // Text already in stdout has no reader.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }

@@ -1,4 +1,4 @@
-//! A session as the command line opens it: its bus and profile, Ctrl-C, and notes on stderr.
+//! Session of the command line: bus and profile, Ctrl-C, and notes on stderr.
 
 use cli_kit::{Diagnose, Failure, Lines, Stop};
 use serde_json::{Value, json};
@@ -26,7 +26,7 @@ impl Operator for Console {
 }
 
 impl LinkArgs {
-    /// The profile; without a file the defaults.
+    /// Returns the profile; without a file the defaults.
     pub fn profile(&self) -> Result<Profile, Failure> {
         let Some(path) = &self.profile else { return Ok(Profile::default()) };
         let text =
@@ -36,7 +36,7 @@ impl LinkArgs {
         })
     }
 
-    /// The URL of the bus.
+    /// Returns the URL of the bus.
     pub fn url(&self) -> Result<&str, Failure> {
         self.bus.as_deref().ok_or_else(|| {
             Failure::usage("which bus? there is neither --bus URL nor UCOM_BUS")
@@ -49,12 +49,12 @@ impl LinkArgs {
         Ok(Link::open(self.url()?)?)
     }
 
-    /// A session on the bus.
+    /// Opens a session on the bus.
     pub fn session(&self) -> Result<Driver, Failure> {
         self.session_with(self.profile()?)
     }
 
-    /// The same with another profile than the command line's.
+    /// Like [`Self::session`], with another profile than the command line's.
     pub fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
         let cleanup = CleanupList::default();
         let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
@@ -62,7 +62,7 @@ impl LinkArgs {
     }
 }
 
-/// Numbers that two boards have, as `--json` lists them.
+/// Returns the numbers shared by two boards, as `--json` lists them.
 pub fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
         let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };

@@ -1,4 +1,4 @@
-//! Boards as text and as JSON, alike for all commands.
+//! Boards as text and as JSON, in the same form for all commands.
 
 use cli_kit::table;
 use serde_json::{Value, json};
@@ -6,12 +6,12 @@ use ucom::{BoardInfo, Profile, Status};
 use ucom_host::date_text;
 use ucom_host::master::{BoardSeen, state_name};
 
-/// The names of the bits that are set.
+/// Returns the names of the set bits.
 pub fn bits(status: Status) -> Vec<&'static str> {
     Status::NAMES.iter().filter(|(_, bit)| status.has(*bit)).map(|(name, _)| *name).collect()
 }
 
-/// The numbers of DSP_INFO.
+/// Returns the values of DSP_INFO.
 pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
     let application = info.has_application();
     json!({
@@ -26,14 +26,14 @@ pub fn info_value(number: u8, info: &BoardInfo, profile: &Profile) -> Value {
     })
 }
 
-/// A board with its description.
+/// Returns a board with its description.
 pub fn board_value(board: &BoardSeen, profile: &Profile) -> Value {
     let mut value = info_value(board.number, &board.info, profile);
     value["description"] = json!(board.description);
     value
 }
 
-/// Boards as a table.
+/// Returns boards as a table.
 pub fn board_table(boards: &[BoardSeen], profile: &Profile) -> String {
     let row = |b: &BoardSeen| {
         let (program, day) = match b.info.has_application() {

@@ -1,17 +1,17 @@
-//! Controllers that leave the bus (bus-off) and come back: boards and clients of `ucom sim`.
+//! Controllers that go bus-off and recover: boards and clients of `ucom sim`.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::Sim;
 
-/// ISO 11898-1: boards that were bus-off are back when the wire is sound again, and so is a client.
+/// ISO 11898-1: bus-off boards recover when the wire is intact again, and so does a client.
 #[test]
 fn bus_off_is_not_for_ever() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     let mut peer = sim.peer();
     sim.fault("disturbed share=1 for_s=2");
-    // Each frame of the client and of the boards is tried until its sender is bus-off.
+    // Each frame of the client and of the boards is repeated until its sender is bus-off.
     let during = sim.ucom(&["scan"]);
     assert_ne!(during.code, 0, "{}", during.out);
     std::thread::sleep(std::time::Duration::from_millis(2_000));
@@ -21,7 +21,8 @@ fn bus_off_is_not_for_ever() {
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
-/// A client learns of its own bus-off, not only the simulator's stderr: as an error frame, and `ucom` in words with what to do.
+/// A client is told of its own bus-off, not only the simulator's stderr: as an error frame, and as a message of `ucom`
+/// with the next step.
 #[test]
 fn the_bus_off_controller_is_named() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

@@ -14,7 +14,7 @@ fn the_simulator_ends_with_0_on_a_signal() {
     }
 }
 
-/// P-1, D-T1: a scan only asks, and sees boards with and without numbers.
+/// P-1, D-T1: a scan only sends requests, and finds boards with and without numbers.
 #[test]
 fn p1_scan_only_asks() {
     let sim = Sim::start(&["--boards", "5", "--flash-ids", "0x21,0x42,0x63,0x04,0x7F"]);
@@ -36,7 +36,7 @@ fn p1_scan_only_asks() {
     assert!(of_pc.is_empty(), "{of_pc:?}");
 }
 
-/// P-2: chains of 0, 1 and 31 boards; the inventory is written, compared, and kept when it differs.
+/// P-2: chains of 0, 1 and 31 boards; the inventory is written, compared, and kept if it differs.
 #[test]
 fn p2_init_of_chains_and_their_inventory() {
     let sim = Sim::start(&["--boards", "0"]);
@@ -60,7 +60,7 @@ fn p2_init_of_chains_and_their_inventory() {
     assert_eq!(first["flash_date"], "2008-03-14");
     let inventory = std::fs::read_to_string(sim.path("inventory.toml")).unwrap();
     assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
-    // Somebody swapped two boards.
+    // Two boards were swapped.
     std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
     let output = sim.ucom(&["--json", "init"]).ends(1);
     let text = output.json()["findings"][0].as_str().unwrap().to_owned();
@@ -120,7 +120,7 @@ fn names_inputs_and_motion() {
     assert!((1450..1550).contains(&position), "{so}");
     let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
-    // D-35: what was written is only assumed.
+    // D-35: written values are only assumed.
     let par = sim.json(&["par", "1", "kp=150"], 0);
     assert_eq!(
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
@@ -136,17 +136,17 @@ fn names_inputs_and_motion() {
     );
 }
 
-/// P-17, D-08, D-50: while one PC runs the boards a second one is refused; when it dies the boards become safe.
+/// P-17, D-08, D-50: while a PC runs the boards a second one is refused; when the first dies the boards become safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
     let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
-    // Listening is welcome: the names are asked for before the loop runs, or known.
+    // Listening is allowed: the names are requested before the loop runs, or known.
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
-    // So is asking who is there: the running PC takes the answers for what they are.
+    // Requests for identity are allowed, too: the running PC interprets the answers correctly.
     let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
@@ -157,7 +157,7 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
-    // kill -9: nobody sends a stop, the board itself must stop.
+    // kill -9: no stop is sent, and the board itself must stop.
     ended_by(run, "-KILL");
     peer.wait("601#00000000");
     let status = sim.json(&["status", "1"], 0);
@@ -225,7 +225,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
     }
 }
 
-/// P-20: a board that reads the protocol otherwise is measured.
+/// P-20: a board that reads the protocol differently is measured.
 #[test]
 fn p20_probe_finds_big_endian_boards() {
     let chain = tempfile::tempdir().unwrap();
@@ -240,7 +240,7 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// Ctrl-C while a board moves stops it at once; its own supervision is only for a PC that has died.
+/// Ctrl-C while a board moves stops it at once; the board's own supervision is only for a dead PC.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -257,7 +257,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(output.code, 0, "{}", output.err);
 }
 
-/// D-15, D-34: an input that is set without a running loop of ours goes alone; those beside it are not written.
+/// D-15, D-34: an input that is set while our loop does not run is sent alone; other inputs are not written.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -267,7 +267,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     assert_eq!(peer.wait("341#"), "341#0000DC05");
 }
 
-/// D-36: boards with one image, and so one Program ID and date, are not moved by each other's names.
+/// D-36: boards with the same image, Program ID and date are not moved by each other's names.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
     let sim = Sim::numbered(&[]);
@@ -279,7 +279,7 @@ fn d36_one_image_on_boards_that_differ() {
     let other = io(&["--json", "io", "7"]);
     assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
-    // What another chain has left under the same program, date and board.
+    // Files of another chain with the same program, date and board.
     let kept = |board: &str| {
         let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
@@ -295,7 +295,7 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// Nothing is half done because one of several boards is not there, and what was done is reported.
+/// A missing board among several stops the command before any change, and completed changes are reported.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -310,18 +310,18 @@ fn several_boards_are_changed_only_when_all_answer() {
     }
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
-    // The number goes, and no status that nobody has sent is shown.
+    // The number is lost, and no status is shown that was not received.
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("forgotten its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
     let output = sim.json(&["status", "1", "--clear", "INIT"], 0);
     assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
-    // The next board has lost its start signal by that.
+    // The next board has lost its start signal by this.
     let output = sim.json(&["io", "all"], 4);
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
-/// D-T21: two boards with one flash number report at the same moment with the same bits: one frame, and one board too many.
+/// D-T21: two boards with one flash number report at the same moment with the same bits: one frame for two boards.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);
@@ -336,7 +336,7 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames leave as they are; what changes boards only when that is reported, and then all or none.
+/// Single frames are sent unchanged; frames that change boards only with that confirmation, and then all or none.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -354,7 +354,7 @@ fn single_frames_can_be_sent() {
     sim.ucom(&["send", "xyz"]).ends(2);
 }
 
-/// A name that is given twice is a mistake: which of the two is meant is open.
+/// A name that is given twice is an error, because it is ambiguous.
 #[test]
 fn a_name_given_twice_is_refused() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -367,7 +367,7 @@ fn a_name_given_twice_is_refused() {
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number give away how they report, and nothing else; that is reported.
+/// Boards without a number reveal how they report, and no more; the command reports that.
 #[test]
 fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);

@@ -6,7 +6,7 @@ use crate::common;
 use common::{Sim, ended_by};
 use serde_json::json;
 
-/// D-T2, D-T5, D-T10, D-T11: what only asks passes on simulated boards, of either byte order.
+/// D-T2, D-T5, D-T10, D-T11: tests that only send requests pass on simulated boards, in both byte orders.
 #[test]
 fn simulated_boards_conform() {
     for endian in ["little", "big"] {
@@ -30,7 +30,7 @@ fn simulated_boards_conform() {
         assert_eq!(output["passed"], 2, "{output}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
-        // One board that is named, and the one that is meant.
+        // Exactly one board must be named, and it must be the intended one.
         let image = dir.path().join("image.bin");
         std::fs::write(&image, [0xA5; 256]).unwrap();
         let image = image.to_str().unwrap();
@@ -41,7 +41,7 @@ fn simulated_boards_conform() {
     }
 }
 
-/// What changes boards is refused while a control loop runs, and no option covers it.
+/// Commands that change boards are refused while a control loop runs, and no option overrides that.
 #[test]
 fn running_loops_are_stopped_first() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -53,7 +53,7 @@ fn running_loops_are_stopped_first() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// D-22: the formula, literally; what the rules make of it stands beside what came.
+/// D-22: the formula, literally; the result that the rules require is shown next to the actual one.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -64,11 +64,11 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // One broadcast frame.
+    // A single broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);
-    // Without INIT the number is gone, as expected.
+    // Without INIT the number is lost, as expected.
     let output = sim.json(&["status", "2", "--raw", "0x08:0x00"], 0);
     assert_eq!(
         (&output["boards"][0]["after"], &output["boards"][0]["as_expected"]),

@@ -1,4 +1,4 @@
-//! How commands end: readers that do not read, a second Ctrl-C, losses, and what is left of a start that failed.
+//! Ends of commands: blocked readers, a second Ctrl-C, losses, and the state after a failed start.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,13 +12,13 @@ use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;
 
-/// D-50: nobody reads stdout, whose pipe is full from the start: heartbeats go out, boards keep running and are stopped at
-/// the end, and what was not printed is reported.
+/// D-50: stdout has no reader, and its pipe is full from the start. Heartbeats are sent, boards keep running and are
+/// stopped at the end, and the lost output is reported.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::numbered(&["--boards", "1"]);
     let (reader, mut writer) = std::io::pipe().unwrap();
-    // What a pipe holds.
+    // Capacity of a pipe.
     writer.write_all(&[b'\n'; 65_536]).unwrap();
     let mut peer = sim.peer();
     let mut command = sim.command();
@@ -44,7 +44,7 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// A reader that takes nothing does not keep `so` from receiving Ctrl-C; one that has gone ends it.
+/// A blocked reader does not keep `so` from receiving Ctrl-C; a reader that has disconnected ends it.
 #[test]
 fn outputs_that_nobody_reads() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -68,7 +68,7 @@ fn outputs_that_nobody_reads() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// The first Ctrl-C cancels; the second one ends at once with 5 and shows what is left undone and what to do.
+/// The first Ctrl-C cancels; the second one ends at once with 5 and shows the remaining steps.
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -81,7 +81,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
         let child = sim.spawn(words);
         peer.wait(wait_for);
         std::thread::sleep(Duration::from_millis(100));
-        // Nothing answers any more: what is to be undone takes its time.
+        // The boards no longer answer: the clean-up takes time.
         sim.signal("-STOP");
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
@@ -96,7 +96,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     }
 }
 
-/// Signals that come almost together are one, and one cancels in order.
+/// Signals that come almost together count as one, and one signal cancels in order.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -107,18 +107,18 @@ fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// D-51: a board that is lost while others are still being started is one that was lost.
+/// D-51: a board that is lost while others are being started counts as lost.
 #[test]
 fn d51_losses_during_the_start_count() {
     let sim = Sim::numbered(&["--boards", "3"]);
-    // Boards send a heartbeat a second; this PC is less patient.
+    // Boards send a heartbeat a second; this PC has a shorter timeout.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
     let output = sim.ucom(&words).ends(5);
     assert!(output.out.contains("\"stopped\"") && output.err.contains("a board was lost"), "{}", output.err);
 }
 
-/// D-37: the outputs of each board are made safe, whatever another one does.
+/// D-37: the outputs of each board are made safe, even if another board fails.
 #[test]
 fn d37_outputs_are_made_safe_although_a_board_is_silent() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -135,7 +135,7 @@ fn d37_outputs_are_made_safe_although_a_board_is_silent() {
     assert!(output.err.contains("board 1: "), "{}", output.err);
 }
 
-/// P-19: a refusal or a failure leaves applications as they were found.
+/// P-19: a refusal or a failure leaves applications in their earlier state.
 #[test]
 fn p19_a_refused_run_leaves_nothing_started() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -156,7 +156,7 @@ fn p19_a_refused_run_leaves_nothing_started() {
     assert_eq!(bytes(), before);
 }
 
-/// The reset of one board asks first whether it is there.
+/// The reset of one board first checks that the board answers.
 #[test]
 fn a_reset_of_nobody_is_refused() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -169,7 +169,8 @@ fn a_reset_of_nobody_is_refused() {
     sim.ucom(&["info", "1"]).ends(0);
 }
 
-/// D-26, D-51: a board that has rebooted under way is one that was lost, and is not reported to be stopped: 5, and its number.
+/// D-26, D-51: a board that has rebooted during the run counts as lost, and is not reported as stopped: 5, and its
+/// number.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -188,7 +189,7 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// The same where every board answers in the end: a report that nobody asked for is no success.
+/// Like the test above, if every board answers in the end: an unrequested report is still a failure.
 #[test]
 fn d26_a_reboot_counts_even_if_the_board_answers() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -202,7 +203,7 @@ fn d26_a_reboot_counts_even_if_the_board_answers() {
     assert!(output.err.contains("a board has rebooted"), "{}", output.err);
 }
 
-/// A board that does not answer keeps no other one from being stopped: the stop is broadcast before any question.
+/// A silent board does not keep others from being stopped: the stop is broadcast before any request.
 #[test]
 fn a_stop_of_all_does_not_hang_on_one_board() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
@@ -231,7 +232,7 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     ended_by(run, "-INT").ends(5);
 }
 
-/// Ctrl-C while a board is started only to be asked for its names: it is not left started.
+/// Ctrl-C while a board is started only to read its names: the board does not stay started.
 #[test]
 fn a_start_for_names_that_is_cancelled_is_undone() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -247,7 +248,7 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
     }
 }
 
-/// Nobody reads stderr, whose pipe is full: the second Ctrl-C ends the process all the same, and so does a failure.
+/// No reader of stderr, and a full pipe: the second Ctrl-C ends the process all the same, and so does a failure.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -273,7 +274,8 @@ fn a_blocked_stderr_does_not_keep_the_process() {
     }
 }
 
-/// What acts on boards ends with 5 where its result was lost, after it has done all of it; what only prints ends at once.
+/// A command that acts on boards completes, and ends with 5 if its result was lost; a command that only prints ends at
+/// once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
@@ -291,14 +293,14 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         let mut command = sim.command();
         let child = command.args(words).stdin(Stdio::piped()).stdout(full()).stderr(Stdio::piped()).spawn();
         let child = child.unwrap();
-        // Something is on the bus to be printed.
+        // A frame for the output is on the bus.
         std::thread::sleep(Duration::from_millis(300));
         peer.send("641#0000");
         let output = ended(child).ends(code);
         assert!(output.err.contains("No space left"), "{words:?}: {}", output.err);
     }
     assert_eq!(sim.status_byte("1"), 0x1B, "stopped all the same");
-    // A reader that has gone is no error.
+    // A reader that has disconnected is not an error.
     for words in [&["decode", "--live"][..], &["record", "-"], &["--json", "monitor"]] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
@@ -312,7 +314,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// The second Ctrl-C ends every command alike: 5, and what is left undone.
+/// The second Ctrl-C ends every command in the same way: 5, and the remaining steps.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -325,7 +327,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // Nobody reads what it prints, and its pipe is full: the first one is received and not obeyed.
+        // No reader of the output, and a full pipe: the first signal is received without effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();
@@ -338,7 +340,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
         let output = ended_by(child, "-INT");
-        // Who could obey the first one at once has ended by itself.
+        // A process that could obey the first signal has ended by itself.
         let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
         assert!(
             alike || (words[0] == "replay" && output.code == 0),
@@ -349,7 +351,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
     }
 }
 
-/// A decoder that waits for its stdin receives Ctrl-C all the same; what came before is decoded.
+/// A decoder that waits for its stdin still receives Ctrl-C; earlier input is decoded.
 #[test]
 fn a_decoder_of_stdin_hears_ctrl_c() {
     let sim = Sim::start(&["--boards", "0"]);

@@ -1,4 +1,4 @@
-//! A terminal that is closed (SIGHUP) and `kill` (SIGTERM) end commands as Ctrl-C does.
+//! A closed terminal (SIGHUP) and `kill` (SIGTERM) end commands like Ctrl-C.
 #![cfg(unix)]
 
 use crate::common;
@@ -8,7 +8,7 @@ use std::time::Duration;
 use cli_kit::trial::{ended, signal};
 use common::{Sim, ended_by};
 
-/// A terminal that is closed ends what runs and what is programmed, as Ctrl-C does.
+/// A closed terminal ends running control loops and programming, like Ctrl-C.
 #[test]
 fn a_hangup_stops_in_order() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -25,7 +25,7 @@ fn a_hangup_stops_in_order() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2]);
 }
 
-/// `ci --for` stops the board, `monitor` ends, and a recording is whole.
+/// `ci --for` stops the board, `monitor` ends, and a recording is complete.
 #[test]
 fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -33,7 +33,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // Long enough for a whole snapshot to have come on a loaded computer: without one the loop has shown nothing.
+        // Long enough for a whole snapshot on a loaded computer: without a snapshot the loop has shown no values.
         peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");
@@ -63,8 +63,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     }
 }
 
-/// A recorder that is killed at once loses no more than a second, in each form; that the rest is missing is reported where the form
-/// shows it.
+/// A recorder that is killed loses at most one second, in each format; the missing rest is reported if the format shows
+/// it.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -76,7 +76,7 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
-        // Two packages every 10 ms and more, for more than a second.
+        // Two packages at least every 10 ms, for more than a second.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("broken off"), "{ending}: {}", output.err);

@@ -1,11 +1,11 @@
-//! What is taken for firmware: records, raw bytes in a `.bin`, and nothing else unasked.
+//! Accepted firmware: records, raw bytes in a `.bin`, and other files only on request.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// A text is refused with its place before anything is sent, and what goes where is shown.
+/// A text file is refused with the place of the error before any frame is sent; images and targets are shown.
 #[test]
 fn d40_a_text_is_never_flashed() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -39,7 +39,7 @@ fn d40_a_text_is_never_flashed() {
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// Nothing that a damaged file of records is answered with leads to its characters on the board; `--raw` does not either.
+/// No hint about a damaged record file leads to its characters on the board; `--raw` does not either.
 #[test]
 fn d46_raw_does_not_flash_records() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -77,7 +77,7 @@ fn d46_raw_does_not_flash_records() {
     assert!(peer.all(50).is_empty(), "nothing was sent");
 }
 
-/// A right count record ends a file of S-records; gaps are filled where that is asked for, and the hint names the option.
+/// A correct count record ends a file of S-records; gaps are filled on request, and the hint names the option.
 #[test]
 fn count_records_and_gaps() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -99,7 +99,8 @@ fn count_records_and_gaps() {
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
-/// S-records of the boards' tool chain count words, those of other tools bytes: the records show which, or `--addresses` does.
+/// S-records of the boards' tool chain count words, those of other tools bytes: the records show it, or `--addresses`
+/// sets it.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -125,7 +126,7 @@ fn s_records_count_words_or_bytes() {
     let output = update("bytes.s19", file(16, 4), &[], 0);
     assert!(output.contains("64 bytes from word 0x20, addresses in bytes"), "{output}");
     assert!(output.contains("only so the records follow each other"), "{output}");
-    // Two records may have a hole between them that is meant.
+    // Two records may have an intended gap between them.
     peer.all(100);
     let output = update("two.s19", file(16, 2), &[], 2);
     assert!(output.contains("0x48") && output.contains("--addresses byte"), "{output}");

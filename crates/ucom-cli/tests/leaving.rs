@@ -1,5 +1,5 @@
-//! Boards that leave their control loop by themselves while `ucom run` supervises them (D-37): reported at once, as an event of
-//! `--json`, by values that are stale, and by exit code 5.
+//! Boards that leave their control loop while `ucom run` supervises them (D-37): reported at once, as an event of
+//! `--json`, by outdated values, and by exit code 5.
 
 use crate::common;
 
@@ -13,7 +13,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::patience::Patience;
 
-/// A `ucom --json run` under way and its events.
+/// A running `ucom --json run` and its events.
 struct Running {
     child: Child,
     events: Receiver<Value>,
@@ -34,7 +34,7 @@ impl Running {
         running
     }
 
-    /// The next event of this kind.
+    /// Returns the next event of this kind.
     fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {
@@ -50,7 +50,7 @@ impl Running {
         self.ended()
     }
 
-    /// It ends by itself.
+    /// Waits until the command ends by itself.
     fn ended(mut self) -> (i32, String) {
         let mut err = String::new();
         self.child.stderr.take().unwrap().read_to_string(&mut err).unwrap();
@@ -62,7 +62,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// The board misses the PC's heartbeats (D-50) and is in its loop no more, while the other one goes on.
+/// The board misses the PC's heartbeats (D-50) and leaves its loop, while the other one continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -74,7 +74,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!(so["stale"], true, "{so}");
     let so = run.until(of(2, "so"));
     assert_eq!(so["stale"], false, "{so}");
-    // Old values grow older, and are never shown with a new time.
+    // The age of old values grows, and they never get a new time.
     let (first, second) = (run.until(of(1, "so")), run.until(of(1, "so")));
     assert_eq!((first["time_s"].clone(), &second["stale"]), (second["time_s"].clone(), &Value::Bool(true)));
     assert!(second["age_s"].as_f64() > first["age_s"].as_f64(), "{first} {second}");
@@ -86,7 +86,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2], "stopped");
 }
 
-/// Another PC stops all boards: each is named, without `--json` in words.
+/// Another PC stops all boards: each is named, without `--json` as text.
 #[test]
 fn d37_boards_that_another_pc_stops_are_named() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -105,14 +105,14 @@ fn d37_boards_that_another_pc_stops_are_named() {
     sim.peer().wait("382#");
     std::thread::sleep(Duration::from_millis(300));
     sim.peer().send("600#00000000");
-    // At once, while it goes on.
+    // At once, while the run continues.
     assert!(lines.any(|line| line.contains("board 2 has left its control loop by itself")));
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-INT");
     assert_eq!(child.wait().unwrap().code(), Some(5));
 }
 
-/// Boards that fall silent for good are stopped by policy, and nothing is left to supervise: the run ends by itself.
+/// Boards that stay silent are stopped by policy, and no board is left to supervise: the run ends by itself.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

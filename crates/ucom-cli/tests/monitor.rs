@@ -1,4 +1,4 @@
-//! `ucom monitor` at a terminal, from its begin to its end, and its lines for whoever is none.
+//! `ucom monitor` at a terminal, from its start to its end, and its lines for other readers.
 #![cfg(unix)]
 
 use crate::common;
@@ -15,7 +15,8 @@ fn monitor(sim: &Sim) -> std::process::Command {
     command
 }
 
-/// At 80 columns flash number, program and status bits are there, at 40 state, bits and keys; `s` stops all control loops.
+/// At 80 columns flash number, program and status bits are visible, at 40 state, bits and keys; `s` stops all control
+/// loops.
 #[test]
 fn the_view_shows_boards_and_its_stop_key_stops() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -47,7 +48,7 @@ fn the_view_shows_boards_and_its_stop_key_stops() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// A board that falls silent while it runs is named before anything else.
+/// A board that falls silent while it runs is named first.
 #[test]
 fn d51_a_board_that_falls_silent_leads_the_view() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -66,7 +67,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// The view ends with its terminal, lines end with their reader.
+/// The view ends with its terminal, and line output ends with its reader.
 #[test]
 fn it_ends_when_nobody_looks_any_more() {
     let sim = Sim::numbered(&["--boards", "1"]);

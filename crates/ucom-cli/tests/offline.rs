@@ -1,4 +1,4 @@
-//! Commands that need no bus: exit codes, JSON, pages.
+//! Commands without a bus: exit codes, JSON, pages.
 
 use crate::common;
 
@@ -39,7 +39,7 @@ fn nobody_on_the_bus_ends_with_3_and_says_what_to_do() {
     assert_eq!(output.json()["healthy"], false);
 }
 
-/// C-3: the frame `000#` is a frame.
+/// C-3: `000#` is a valid frame.
 #[test]
 fn decode_prints_names_of_frames() {
     let output = ucom_with(&["decode"], "000#\n141#2100011934126E38\n2A1#\n").ends(0);
@@ -54,7 +54,7 @@ fn decode_prints_names_of_frames() {
     let output = ucom_with(&["--json", "decode", "-"], "(1.5) can0 1C1#0202\n").ends(0);
     let value = output.json();
     assert_eq!((value["function"].as_str(), value["mask"].as_u64()), (Some("PC_SETSTATUS"), Some(2)));
-    // A string is followed over its packages.
+    // A string is followed across its packages.
     let text = "141#2100011934126E38\n141#0200\n141#55436F4D32206865\n141#61642070616E\n";
     let output = ucom_with(&["decode"], text).ends(0);
     assert!(output.out.lines().last().unwrap().contains("\"UCoM2 head pan\""), "{}", output.out);
@@ -83,7 +83,7 @@ fn a_dbc_without_boards_needs_no_bus() {
     assert!(output.out.starts_with("VERSION") && output.out.contains("BO_ "), "{}", output.out);
 }
 
-/// A result that went nowhere is no success; a reader that has gone is none that was kept waiting.
+/// A result that cannot be printed is a failure; a reader that has disconnected is not.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_result_that_cannot_be_printed_is_an_error() {
@@ -102,7 +102,7 @@ fn a_result_that_cannot_be_printed_is_an_error() {
     }
 }
 
-/// What is there is not written over unasked, and nothing is written when nothing was measured.
+/// Existing files are not overwritten without a request, and no file is written without measurements.
 #[test]
 fn files_are_kept_and_nothing_is_made_up() {
     let dir = tempfile::tempdir().unwrap();
@@ -117,7 +117,7 @@ fn files_are_kept_and_nothing_is_made_up() {
         &["--json", "dbc", "none", "--out", &dbc],
         &["--json", "record", &log, "--for", "0.1"],
         &["--json", "record", &mcap, "--for", "0.1"],
-        // A recording would bring its own profile with it.
+        // A recording would have its own profile.
         &["--json", "record", &new, "--for", "0.1"],
     ] {
         let output = ucom(&[words, &bus].concat()).ends(4);
@@ -125,7 +125,7 @@ fn files_are_kept_and_nothing_is_made_up() {
         assert_eq!(error["code"], "exists", "{words:?}: {}", output.out);
         assert!(error["hint"].as_str().unwrap().contains("--overwrite"), "{words:?}: {}", output.out);
     }
-    // Nobody is there: also with --overwrite there is nothing to write.
+    // No board is connected: even with --overwrite there is no data to write.
     for words in [&["--json", "probe", "--out", &toml, "--overwrite"][..], &["--json", "probe"]] {
         let output = ucom(&[words, &bus].concat()).ends(3);
         assert_eq!(output.json()["error"]["code"], "no-boards", "{}", output.out);
@@ -136,7 +136,7 @@ fn files_are_kept_and_nothing_is_made_up() {
     assert_ne!(std::fs::read_to_string(dbc).unwrap(), "mine");
 }
 
-/// Programs that ask for JSON get it for wrong usage, too.
+/// Programs that request JSON get it for wrong usage, too.
 #[test]
 fn wrong_usage_is_json_where_that_is_asked_for() {
     for words in [&["--json", "scann"][..], &["ci", "2,3", "x=1", "--json"], &["info", "--json", "99"]] {
@@ -153,7 +153,7 @@ fn wrong_usage_is_json_where_that_is_asked_for() {
     assert!(output.err.contains(".asc") && !file.exists(), "{}", output.err);
 }
 
-/// A recording whose writer was killed: what is whole is reported, and that it is not all.
+/// A recording whose writer was killed: its complete part is reported, and that it is incomplete.
 #[test]
 fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
     let dir = tempfile::tempdir().unwrap();

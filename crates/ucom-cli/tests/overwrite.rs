@@ -1,11 +1,12 @@
-//! `--overwrite` writes over a file and lifts no check of the bus; `--force` lifts a check of the bus and writes over no file.
+//! `--overwrite` overwrites a file and skips no check of the bus; `--force` skips a check of the bus and overwrites no
+//! file.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, ended_by, ucom};
 
-/// The advice of the file's check, followed while boards run, resets nothing.
+/// The hint of the file check, followed while boards run, resets no board.
 #[test]
 fn writing_over_a_file_never_resets_a_running_chain() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -33,7 +34,7 @@ fn writing_over_a_file_never_resets_a_running_chain() {
     assert!(!output.err.contains("rebooted"), "{}", output.err);
 }
 
-/// Each command that writes a file: `--force` alone writes over none, and `--overwrite` does.
+/// Each command that writes a file: `--force` alone overwrites no file, and `--overwrite` does.
 #[test]
 fn force_writes_over_no_file() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -61,7 +62,7 @@ fn force_writes_over_no_file() {
     }
 }
 
-/// `record` has no check of the bus: its `--force` of older scripts is `--overwrite`, and no help shows it.
+/// `record` has no check of the bus: its `--force` of older scripts means `--overwrite`, and no help shows it.
 #[test]
 fn record_takes_force_for_overwrite() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -1,4 +1,5 @@
-//! The commands of README.md and of the pages of docs/ are typed as they stand there, against `ucom sim`, and print what is shown.
+//! The commands of README.md and of the pages of docs/ are typed as written, against `ucom sim`, and print the shown
+//! output.
 #![cfg(target_os = "linux")]
 
 #[test]

@@ -10,7 +10,7 @@ const TABLE: &str = "[program.ci]\nset_position = { scale = 0.01, unit = \"deg\"
                      [program.so]\nposition = { scale = 0.01, unit = \"deg\" }\nnobody = {}\n\
                      [program.par]\nkd = { scale = 0.1, unit = \"mA s/deg\" }\nmin_position = { scale = 0.5 }\n";
 
-/// A chain with numbers, a signal table of the first board, and all applications up.
+/// A chain with numbers, a signal table of the first board, and all applications started.
 fn started() -> (Sim, String) {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "all"]).ends(0);
@@ -20,7 +20,7 @@ fn started() -> (Sim, String) {
     (sim, table)
 }
 
-/// D-11: values are in the units of the signal table, both ways; the word itself can always be given.
+/// D-11: values are in the units of the signal table, both ways; the raw word is always accepted.
 #[test]
 fn d11_values_have_the_units_of_the_signal_table() {
     let (sim, table) = started();
@@ -34,7 +34,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
         refused["error"]["message"],
         "board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg"
     );
-    // Without the table it would be the word 61, 0.61 degrees.
+    // Without the table it would be the word 61, that is 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
     assert!(message.contains("the unit is missing: `61deg`"), "{bare}");
@@ -54,22 +54,22 @@ fn d11_values_have_the_units_of_the_signal_table() {
     for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
-    // Scaled without a unit: a bare number would be the word where the table is missing.
+    // Scaled without a unit: without the table a bare number would be the raw word.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
     assert!(output["error"]["message"].as_str().unwrap().contains("names no unit"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
-    // A number that would wrap is refused as any other value.
+    // A number that would wrap is refused like any other value.
     assert!(sim.ucom(&["ci", "1", "set_position=40000"]).ends(4).err.contains("outside -32768..32767"));
     let dbc = sim.ucom(&["--edges", &table, "dbc", "1"]).ends(0);
     assert!(dbc.err.contains("has no SO `nobody`"), "{}", dbc.err);
     let dbc = dbc.out;
     assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
-    // A table that makes no sense is reported with its place.
+    // An invalid table is reported with the place of the error.
     let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
     assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
 }
 
-/// D-11: who gives a table thinks in units; a program that is not in it takes only words themselves.
+/// D-11: with a table values need units; a program that is not in the table accepts only raw words.
 #[test]
 fn d11_a_table_without_the_program_refuses_bare_numbers() {
     let (sim, _) = started();
@@ -90,7 +90,7 @@ fn d11_a_table_without_the_program_refuses_bare_numbers() {
     assert_eq!(peer.wait("3C1#"), "3C1#00000C00");
 }
 
-/// A file that is there is only written over when that is asked for.
+/// An existing file is overwritten only on request.
 #[test]
 fn files_are_not_written_over() {
     let (sim, _) = started();
@@ -107,7 +107,7 @@ fn files_are_not_written_over() {
     }
 }
 
-/// A place where nothing can be written is found out before anything is sent, and a file that was made for nothing is gone.
+/// An unwritable place is detected before any frame is sent, and a file created for no result is removed.
 #[test]
 fn outputs_are_opened_before_anything_is_sent() {
     let (sim, _) = started();
@@ -125,14 +125,14 @@ fn outputs_are_opened_before_anything_is_sent() {
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
     assert_eq!(peer.all(100), [""; 0]);
-    // Nobody is board 9: the files that were opened for it are gone.
+    // There is no board 9: the files opened for it are removed.
     let file = sim.path("new");
     sim.ucom(&["par", "9", "--save", &file]).ends(3);
     sim.ucom(&["dbc", "9", "--out", &file]).ends(3);
     assert!(!std::path::Path::new(&file).exists());
 }
 
-/// D-35: nothing answers to a parameter, so the application must still be there afterwards; else the value is unknown.
+/// D-35: no answer confirms a parameter, so the application must still answer afterwards; else the value is unknown.
 #[test]
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();
@@ -143,7 +143,7 @@ fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     assert!(message.contains("written before: board 1"), "{output}");
 }
 
-/// D-35: what was written before is remembered, and never taken for what is there.
+/// D-35: earlier written values are remembered, and never shown as the current ones.
 #[test]
 fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let (sim, _) = started();
@@ -156,7 +156,7 @@ fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     assert!(text.contains("\n      kp: 0x0078   # 120;") && text.contains("\n      # kd:"), "{text}");
 }
 
-/// A whole file is checked before anything is written; every mistake comes with its line.
+/// The whole file is checked before any parameter is written; every error is reported with its line.
 #[test]
 fn a_file_is_applied_whole_or_not_at_all() {
     let (sim, _) = started();
@@ -168,7 +168,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     let checked = sim.json(&["par", "--apply", &file, "--dry-run"], 0);
     assert_eq!(checked["written"], false);
     let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
-    // The mistake is in the second board: the first gets nothing either.
+    // The error is in the second board: the first one gets no parameters either.
     let end = good.rfind("kp: 0x0078").unwrap();
     let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
     let output = apply(&of_second("kq: 1")).ends(4);
@@ -205,7 +205,8 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert_eq!(written, ["3C1#00007800", "3C2#00007800"]);
 }
 
-/// Section 7: initial inputs, then those of the file, its parameters, and only then the loop. The command line wins.
+/// Section 7: initial inputs, then those of the file, its parameters, and only then the loop. The command line
+/// overrides the file.
 #[test]
 fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     let (sim, _) = started();
@@ -223,7 +224,7 @@ fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     assert_eq!(output.json()["error"]["code"], "params");
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["301", "341", "3C1", "541"].contains(&&f[..3])), "{received:?}");
-    // Without known names the application is started to be asked, and stopped again.
+    // Without known names the application is started to read them, and stopped again.
     let words = ["--json", "run", "1", "--fresh", "--params", &file("70000"), "--for", "1"];
     assert_eq!(sim.ucom(&words).ends(4).json()["error"]["code"], "params");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
@@ -250,7 +251,7 @@ fn pages_and_templates() {
     assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
 }
 
-/// A board of the file that does not answer is no board to be left out, whichever boards are meant.
+/// A board of the file that does not answer must not be left out, for any selection of boards.
 #[test]
 fn a_run_of_all_boards_misses_those_of_the_file() {
     let (sim, _) = started();

@@ -6,7 +6,7 @@ use crate::common;
 use common::Sim;
 use test_kit::patience::Patience;
 
-/// A chain of three, and the second board has lost its number.
+/// A chain of three boards; the second board has lost its number.
 fn rebooted() -> Sim {
     let mut sim = Sim::numbered(&["--boards", "3"]);
     sim.fault("power-loss board=2 for_s=0.2");
@@ -34,19 +34,19 @@ fn d21_a_board_gets_its_number_back() {
     assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
     let all = sim.json(&["scan"], 0);
     assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
-    // A board that is well stays so, and so do its neighbours.
+    // A board with its number is unchanged, and so are its neighbours.
     let output = sim.ucom(&["repair", "2"]).ends(0);
     assert!(output.out.contains("board 2 has its number"), "{}", output.out);
     assert_eq!(sim.json(&["scan"], 0)["boards"], all["boards"]);
 }
 
-/// The exit codes: 4 another board stands there, 3 no answer, 2 nobody knows which board is meant.
+/// The exit codes: 4 if another board is there, 3 without an answer, 2 if the board is ambiguous.
 #[test]
 fn repairs_that_are_refused() {
     let sim = rebooted();
     let output = sim.json(&["repair", "1", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
-    // The board that would take the number is not the one that is meant: it does not keep it.
+    // The board that would take the number is not the intended one: it does not keep the number.
     let output = sim.json(&["repair", "2", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     assert_eq!(sim.json(&["scan"], 0)["boards"].as_array().unwrap().len(), 2);
@@ -54,7 +54,7 @@ fn repairs_that_are_refused() {
     assert!(output.err.contains("--flash-id"), "{}", output.err);
     sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
     sim.ucom(&["repair", "2"]).ends(0);
-    // All have their numbers: nobody takes this one.
+    // All boards have their numbers: none takes this one.
     let output = sim.json(&["repair", "9", "--flash-id", "0x77"], 3);
     assert_eq!(output["error"]["code"], "no-answer", "{output}");
 }

@@ -12,7 +12,7 @@ use common::Sim;
 use serde_json::Value;
 use test_kit::http::Http;
 
-/// Starts an agent with these words; its first line.
+/// Starts an agent with these words, and returns its first line.
 fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     let mut command = program(env!("CARGO_BIN_EXE_ucom"), "UCOM_");
     command.args(["--json", "serve", "--listen", "127.0.0.1:0"]).args(words);
@@ -29,7 +29,7 @@ fn serve(dir: &Path, words: &[&str]) -> (Child, Value) {
     (child, ready)
 }
 
-/// The agent as the one sees it who may read its token file.
+/// Returns a client with the right to read the token file.
 fn http(ready: &Value) -> Http {
     let url = ready["url"].as_str().expect("its address");
     let tokens = std::fs::read_to_string(ready["token_file"].as_str().expect("its file")).expect("tokens");
@@ -66,7 +66,7 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // The link is asked for, and what it is printed to may keep it.
+    // The link is requested, and the reader of the output may keep it.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);
@@ -89,7 +89,7 @@ fn the_link_with_the_token_is_printed_on_a_terminal() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// What the agent has started does not run on without it, and a bus that goes ends it.
+/// Boards that the agent has started stop with it, and the loss of the bus ends the agent.
 #[test]
 fn what_an_agent_has_started_is_stopped_with_it() {
     let sim = Sim::numbered(&["--boards", "2"]);

@@ -1,4 +1,4 @@
-//! Two boards with one number: every command names it and changes nothing, `stop` stops both.
+//! Two boards with one number: every command reports it and changes no board, `stop` stops both.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,7 @@ fn sharing() -> Sim {
     sim
 }
 
-/// D-24: exit code 4, both flash numbers, the next command; nothing is sent but questions and heartbeats.
+/// D-24: exit code 4, both flash numbers, the next command; only requests and heartbeats are sent.
 #[test]
 fn d24_every_command_names_it_and_changes_nothing() {
     let sim = sharing();
@@ -55,7 +55,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
         "{doctor}"
     );
-    // Numbered anew, all is well.
+    // After a new numbering all is well.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }

@@ -1,11 +1,11 @@
-//! Boards and buses from which nothing comes: what was asked, where, why, and the next command are always reported.
+//! Silent boards and buses: the request, the place, the reason and the next command are always reported.
 
 use crate::common;
 
 use cli_kit::trial::ended;
 use common::Sim;
 
-/// A recorder of a silent bus reports so once, to people only; with frames there is nothing to report.
+/// A recorder of a silent bus reports it once, to users only; with frames it reports nothing.
 #[test]
 fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
@@ -22,7 +22,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let its = recorded.clone();
     let ask = std::thread::spawn(move || {
-        // Until the recorder is on the bus and has its frame, however loaded the machine is.
+        // Wait until the recorder is on the bus and has its frame, on any machine.
         while !its.load(std::sync::atomic::Ordering::Relaxed) {
             peer.send("240#");
             std::thread::sleep(std::time::Duration::from_millis(25));

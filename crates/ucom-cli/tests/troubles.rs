@@ -1,5 +1,5 @@
-//! The part of docs/troubles.md that is about `ucom`: each case is run by the real program against `ucom sim`.
-//! `UPDATE_DOCS=1` writes it again.
+//! The part of docs/troubles.md about `ucom`: the real program runs each case against `ucom sim`. `UPDATE_DOCS=1`
+//! writes it again.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -27,7 +27,7 @@ fn the_page_of_troubles_has_what_ucom_prints() {
     page.finish();
 }
 
-/// What a person at this chain types, with both streams in one, as on a terminal.
+/// Commands of a user at this chain, with both streams in one, as on a terminal.
 trait Desk {
     fn shell(&self, shown: &str) -> Command;
     fn seen(&self, code: Option<i32>, text: &str) -> Printed;
@@ -49,7 +49,7 @@ impl Desk for Sim {
         }
         let address = self.url.split(['/']).next().unwrap().trim_start_matches("socketcand:").to_owned();
         let real = shown.replace("localhost:29536", &address);
-        // The command takes the place of the shell, so that a signal reaches it.
+        // The command replaces the shell, so that a signal reaches it.
         shell
             .args(["-c", &format!("exec 2>&1\nexec {real}")])
             .current_dir(self.dir.path())
@@ -85,7 +85,7 @@ impl Desk for Sim {
     }
 }
 
-/// Without what differs from run to run: numbers, and heartbeats that a busy computer finds late.
+/// Removes values that differ from run to run: numbers, and heartbeats that a busy computer receives late.
 fn of_a_moment(printed: Printed) -> Printed {
     let text: String = printed
         .text
@@ -157,7 +157,7 @@ fn firmware(page: &mut Page) {
     });
 }
 
-/// Two threads write to one pipe here: the result may come before or after the last note. Behind it comes the error.
+/// Two threads write to one pipe here: the result may come before or after the last note. The error comes after both.
 fn result_last(mut printed: Printed) -> Printed {
     let result = "not stopped for certain: 1\n";
     if let Some(before) = printed.text.find(&format!("\n{result}")) {

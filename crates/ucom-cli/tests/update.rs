@@ -1,4 +1,4 @@
-//! `ucom update` against `ucom sim`: outcomes, exit codes, and what is left behind.
+//! `ucom update` against `ucom sim`: outcomes, exit codes, and remaining files.
 #![cfg(unix)]
 
 use crate::common;
@@ -35,7 +35,7 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
-/// D-41: with `--name-target` the header names the board, else it is for any.
+/// D-41: with `--name-target` the header names the board, else it is for any board.
 #[test]
 fn d41_the_header_names_the_board_if_wanted() {
     let sim = Sim::numbered(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
@@ -52,20 +52,20 @@ fn d41_the_header_names_the_board_if_wanted() {
     }
 }
 
-/// The exit codes 2 and 4: nothing is sent that changes a board.
+/// Exit codes 2 and 4: no board is changed.
 #[test]
 fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // Another board than the one that is meant.
+    // Another board than the intended one.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
-    // A list needs to know who is who.
+    // A list needs the identity of each board.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
@@ -76,11 +76,11 @@ fn d46_refusals_change_nothing() {
     sim.ucom(&["update", "1", &file]).ends(4);
     ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
-    // Nobody there.
+    // No such board.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
-/// Exit code 1: the board reported an error before anything was erased; 5: after.
+/// Exit code 1: the board reported an error before the erase; 5: after it.
 #[test]
 fn d46_errors_before_and_after_the_erase() {
     let mut sim = chain("2");
@@ -96,7 +96,8 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// An update session: all boards of the inventory, one fails, the others are done; the next run only does the rest.
+/// An update session: all boards of the inventory, one fails, the others succeed; the next run does only the remaining
+/// one.
 #[test]
 fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
@@ -105,10 +106,10 @@ fn an_update_session_goes_on_and_is_resumed() {
     sim.ucom(&["update", "1-3", &file]).ends(3);
     let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
-    // Board 2 comes back with power off and on: without a number, and repaired by the update itself or by an init.
+    // Board 2 comes back after a power cycle: without a number, and repaired by the update itself or by an init.
     drop(sim);
     let sim = chain("3");
-    // A day of its own: of today's both runs would be of different days at midnight, and U-3 compares days, too.
+    // With a fixed date: at midnight the two runs would have different dates, and U-3 compares dates, too.
     let file = file_in(&sim);
     let update = |boards| sim.json(&["update", boards, &file, "--date", "2009-06-01"], 0);
     assert_eq!(update("1,3")["boards"][1]["outcome"], "verified");
@@ -127,7 +128,7 @@ fn p12_cancel_leaves_the_board_usable() {
     let file = sim.file("app.bin", &image(60 * 1024, 7));
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
-    // Well into the second cycle: 961 blocks with their READY each are the first.
+    // In the second cycle: the first cycle has 961 blocks with a READY each.
     peer.wait_for(1200, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
@@ -147,7 +148,8 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let update = sim.spawn(&["update", "1", &file]);
     peer.wait_for(1100, "181#");
     ended_by(update, "-KILL");
-    // What the killed one had handed to its adapter still leaves, on a busy machine for some time: until then it is on the bus.
+    // Frames that the killed process had handed to its adapter are still sent, on a busy machine for some time: until
+    // then it is on the bus.
     while !peer.all(1000).is_empty() {}
     let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
@@ -188,7 +190,7 @@ fn d46_a_bus_that_fails_leaves_the_report() {
     }
 }
 
-/// The same as text: outcome, cause and what to do.
+/// Like the test above, as text: outcome, cause and next step.
 #[test]
 fn d46_a_bus_that_fails_is_told_in_words() {
     let sim = chain("1");
@@ -204,7 +206,7 @@ fn d46_a_bus_that_fails_is_told_in_words() {
     drop(dir);
 }
 
-/// Ctrl-C before anything is erased: exit code 4, outcome `cancelled`, and the board has what it had.
+/// Ctrl-C before the erase: exit code 4, outcome `cancelled`, and the board keeps its program.
 #[test]
 fn p12_cancelled_before_the_erase() {
     let sim = chain("1");
@@ -223,7 +225,7 @@ fn p12_cancelled_before_the_erase() {
     assert_eq!(program_id(&sim, "1"), before);
 }
 
-/// D-08: a dry run looks for another PC, too.
+/// D-08: a dry run checks for another PC, too.
 #[test]
 fn d08_a_dry_run_sees_another_pc() {
     let mut sim = chain("1");
@@ -234,7 +236,7 @@ fn d08_a_dry_run_sees_another_pc() {
     assert_eq!(report["boards"][0]["error"]["code"], "foreign-master", "{report}");
 }
 
-/// One transfer for several boards; the one that is not meant keeps what it has.
+/// One transfer for several boards; the board outside the group keeps its program.
 #[test]
 fn d46_a_group_is_one_transfer() {
     let sim = chain("4");
@@ -250,7 +252,7 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// Two images: each goes where the profile's plan sends it, and the report has both; what does not fit is refused.
+/// Two images: each goes to the target of the profile's plan, and the report has both; wrong combinations are refused.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();
@@ -289,7 +291,7 @@ fn d40_two_images_by_plan() {
             images[0]["program_id"] == report["program_id"]
                 && images[1]["program_id"] != report["program_id"]
         );
-        // One of them is missing, or another option than this plan's is given.
+        // An image is missing, or an option of another plan is given.
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app]).ends(2);
         assert!(output.err.contains(option) && output.err.contains(plan), "{}", output.err);
         let output = sim.ucom(&["--profile", &profile, "update", "1", &app, "--second", &other]).ends(2);
@@ -299,7 +301,7 @@ fn d40_two_images_by_plan() {
     }
 }
 
-/// U-10 with raw files: written, not verified, and output so; verified against a Program ID that is named.
+/// U-10 with raw files: written, not verified, and reported so; verified against a named Program ID.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -307,7 +309,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = profile.path().to_str().unwrap();
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
-    // What a tool chain makes: header and data of each cycle in a file of its own.
+    // Output of a tool chain: header and data of each cycle in separate files.
     let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {
@@ -338,7 +340,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
         (&false.into(), &serde_json::Value::Null)
     );
     assert!(report["unverifiable"]["hint"].as_str().unwrap().contains("--expect-program-id"), "{report}");
-    // The second file is in no answer of the board: it is written each time (D-62).
+    // No answer of the board covers the second file: it is written each time (D-62).
     let report = with(&["--expect-program-id", "0x4B3F"]).ends(0).json();
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
     let report = with(&["--expect-program-id", "0x4B3F", "--force"]).ends(0).json();
@@ -347,7 +349,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
 }
 
-/// `all` is also who is in the inventory: boards that have lost their numbers are missing, not left out.
+/// `all` includes the inventory: boards that have lost their numbers are reported as missing, not skipped.
 #[test]
 fn all_is_the_inventory_too() {
     let sim = chain("4");
@@ -359,7 +361,7 @@ fn all_is_the_inventory_too() {
     assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
-    // Commands that act on the boards that are there name those that are not.
+    // Commands for the connected boards name the missing ones.
     let output = sim.ucom(&["start", "all"]).ends(0);
     assert!(
         output.err.contains("0x42") || output.err.matches("has no number").count() == 2,
@@ -368,7 +370,7 @@ fn all_is_the_inventory_too() {
     );
 }
 
-/// Ctrl-C while it is still asked who is there: nothing was erased, exit code 4, outcome `cancelled`.
+/// Ctrl-C during the identification: no board was erased, exit code 4, outcome `cancelled`.
 #[test]
 fn p12_cancelled_while_it_scans() {
     let sim = chain("2");
@@ -384,7 +386,7 @@ fn p12_cancelled_while_it_scans() {
     assert_eq!(report["boards"].as_array().unwrap().len(), 2, "{report}");
 }
 
-/// An image whose Program ID is known must have the one that is named: refused before anything is sent.
+/// An image with a known Program ID must have the named one: otherwise it is refused before any frame is sent.
 #[test]
 fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");

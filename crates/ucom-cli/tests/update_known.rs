@@ -1,4 +1,4 @@
-//! `ucom update` of boards that show the program already: what the inventory knows decides (D-62, U-3).
+//! `ucom update` of boards that already show the program: the record in the inventory decides (D-62, U-3).
 #![cfg(unix)]
 
 use crate::common;
@@ -24,7 +24,7 @@ fn of(report: &Value) -> (&str, bool) {
     (board["outcome"].as_str().unwrap(), board["verified"].as_bool().unwrap())
 }
 
-/// D-62: data memory is written each time, as the board cannot show it.
+/// D-62: data memory is written each time, because the board cannot show it.
 #[test]
 fn d62_data_memory_is_never_taken_as_proven() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -41,7 +41,7 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: the same bytes at another address are written; where nothing is known nothing is sent, and nothing is verified.
+/// D-62: the same bytes at another address are written; without a record no frame is sent, and no board is verified.
 #[test]
 fn d62_another_address_is_written() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -56,7 +56,7 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // The numbers are given anew: the record stays with its board.
+    // The boards get new numbers: the record stays with its board.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
@@ -79,7 +79,7 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
 }
 
-/// D-62: an update that was killed leaves no record, not even one of what was there before.
+/// D-62: a killed update leaves no record, not even one of the previous program.
 #[test]
 fn d62_a_killed_update_leaves_no_record() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -89,7 +89,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // The first block of the first cycle: nothing is erased before the second one.
+    // The first block of the first cycle: the erase starts only with the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());
@@ -97,7 +97,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert_eq!(of(&sim.json(&["update", "1", &first], 4)), ("program-up-to-date", false));
 }
 
-/// D-62: where the record cannot be removed, nothing is erased.
+/// D-62: if the record cannot be removed, the memory is not erased.
 #[test]
 fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -106,7 +106,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // The inventory has been read, and no other PC is looked for yet.
+    // The inventory has been read, and the check for another PC has not started.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);
@@ -116,7 +116,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     assert_eq!(sim.json(&["info", "1"], 0)["boards"][0]["program_id"], shown);
 }
 
-/// U-3: the same image of another day is not written again, unless its date is asked for.
+/// U-3: the same image with another date is not written again, unless its date is requested.
 #[test]
 fn u3_a_campaign_may_pass_midnight() {
     let sim = Sim::numbered(&["--boards", "2"]);

@@ -1,6 +1,7 @@
-// Requests to an agent, and what its refusals say. Free of what the agent drives: the pages of an arm and of a chain share it.
+// Requests to an agent, and its refusals. Independent of the device of the agent: shared by the pages of an arm and of
+// a chain.
 
-/** Why something was not done, as agents answer it. */
+/** Reason of a refusal, as agents answer. */
 export interface Problem {
   code: string;
   message: string;
@@ -12,7 +13,7 @@ export interface Problem {
   limit?: number | null;
 }
 
-/** A request that was not done. */
+/** A failed request. */
 export class ApiError extends Error {
   readonly status: number;
   readonly problem: Problem;
@@ -29,12 +30,12 @@ export class ApiError extends Error {
     return this.status === 405 || (this.status === 404 && this.problem.code === 'no-such-path');
   }
 
-  /** Nobody was let in with this token, or without one. */
+  /** The agent refused this token, or a request without one. */
   get wantsToken(): boolean {
     return this.status === 401 || this.status === 403;
   }
 
-  /** No answer came at all. */
+  /** No answer arrived. */
   get isNoConnection(): boolean {
     return this.status === 0;
   }
@@ -47,21 +48,21 @@ export interface Ask {
   body?: unknown;
   /** Longest time for the answer, ms. */
   within?: number;
-  /** Outlives the page: for what is sent while it closes. */
+  /** Outlives the page: for requests sent while it closes. */
   keepalive?: boolean;
-  /** Waits for no other request: Stop, Pause, and what a key is held for. */
+  /** Waits for no other request: Stop, Pause, and held keys. */
   ahead?: boolean;
   /** Without the token. */
   bare?: boolean;
-  /** Makes nothing move: a Stop leaves it in its turn. */
+  /** Moves nothing: a Stop does not drop it from the queue. */
   ends?: boolean;
-  /** Is given up where a Stop needs its connection. */
+  /** Cancelled if a Stop needs its connection. */
   yields?: boolean;
 }
 
-/** So many requests are open at once beside those that go ahead: a browser opens six to one agent, and lets the next wait without a word. */
+/** Most open requests, in addition to those sent ahead: a browser opens six connections to one agent, and silently queues the next. */
 export const OPEN_MAX = 3;
-/** A command that has waited for its turn so long is not sent any more, ms: whoever asked for it looks at something else by then. */
+/** Longest wait of a command for its turn, ms: after that the command is dropped, because the user looks at a changed page by then. */
 export const WAIT_MAX_MS = 2000;
 
 type Fetch = (input: string, init: RequestInit) => Promise<Response>;
@@ -73,7 +74,7 @@ export function address(path: string, query: Query = {}): string {
   return `${path}?${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join('&')}`;
 }
 
-/** The refusal in an answer, whatever form it has. */
+/** Returns the refusal in an answer of any format. */
 export function problemOf(status: number, text: string): Problem {
   try {
     const value: unknown = JSON.parse(text);
@@ -81,7 +82,7 @@ export function problemOf(status: number, text: string): Problem {
       return { ...(value as Problem), next: (value as Problem).next ?? '' };
     }
   } catch {
-    // Not JSON: answered by something in between, or by a router that knows no such path.
+    // Not JSON: answered by a proxy, or by a router without this path.
   }
   if (status === 404) {
     return {
@@ -98,13 +99,13 @@ export function problemOf(status: number, text: string): Problem {
 }
 
 interface Waiting {
-  /** A question, or what makes nothing move. */
+  /** `true` for a query, or for a command that moves nothing. */
   stays: boolean;
   go(): void;
   drop(why: string): void;
 }
 
-/** No answer came, or not the whole of it. */
+/** No answer arrived, or only a part of it. */
 function unreached(error: unknown): ApiError {
   const late = error instanceof DOMException && error.name === 'TimeoutError';
   return new ApiError(0, {
@@ -138,7 +139,7 @@ export class Api {
     this.#fetch = fetch ?? ((input, init) => globalThis.fetch(input, init));
   }
 
-  /** What waits for its turn and may move something is not sent any more, and what yields makes room. */
+  /** Drops waiting commands that may move the device, and cancels requests that yield. */
   recall(why: string): void {
     const commands = this.#waiting.filter((each) => !each.stays);
     this.#waiting = this.#waiting.filter((each) => each.stays);
@@ -147,7 +148,7 @@ export class Api {
     this.#yielding.clear();
   }
 
-  /** Sends, and returns the answer as it came. Throws ApiError for everything else. */
+  /** Sends a request, and returns the raw answer. Throws ApiError for everything else. */
   async send(method: string, path: string, ask: Ask = {}): Promise<Response> {
     if (ask.ahead || ask.keepalive) return this.#send(method, path, ask);
     if (this.#open >= OPEN_MAX) await this.#turn(method === 'GET' || ask.ends === true);
@@ -155,7 +156,7 @@ export class Api {
     try {
       return await this.#send(method, path, ask);
     } finally {
-      // Whoever is next has this place.
+      // The next waiting request gets this place.
       const next = this.#waiting.shift();
       if (next) next.go();
       else this.#open -= 1;

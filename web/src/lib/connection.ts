@@ -1,6 +1,6 @@
-// The stream of an agent: one WebSocket that is opened again whenever it is gone, and goes on at the last event.
+// The stream of an agent: one WebSocket that is reopened after each loss, and continues at the last event.
 
-/** What every agent's status has. */
+/** Common part of every agent's status. */
 export interface BaseStatus {
   agent: string;
   last_event: number;
@@ -18,7 +18,7 @@ export interface EventsMessage<E extends Entry = Entry> {
   missed: boolean;
 }
 
-/** As much of a WebSocket as is needed. */
+/** The part of a WebSocket that is needed. */
 export interface Socket {
   onopen: ((event: never) => void) | null;
   onmessage: ((event: { data: unknown }) => void) | null;
@@ -29,7 +29,7 @@ export interface Socket {
 
 export interface Surroundings {
   open(path: string, protocols: string[]): Socket;
-  /** ms, from whenever. */
+  /** ms, from any start. */
   now(): number;
   later(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
@@ -37,19 +37,19 @@ export interface Surroundings {
 
 export type Phase = 'connecting' | 'open' | 'waiting' | 'closed';
 
-/** Without a message for so long the connection counts as lost, ms: the agent sends one each half second at least. */
+/** Time without a message after which the connection counts as lost, ms: the agent sends at least one each half second. */
 export const SILENT_MS = 1400;
-/** A socket that does not open for so long is given up, ms. */
+/** Longest time to open a socket, ms. */
 const OPENING_MS = 4000;
 const WAIT_MS = [200, 400, 800, 1500, 2000];
 
 export interface Handlers<S extends BaseStatus> {
   status(status: S): void;
   events(message: EventsMessage): void;
-  /** Every other message, by its kind. */
+  /** Handles every other message, by its kind. */
   other?(message: { kind: string }): void;
   phase(phase: Phase): void;
-  /** A socket did not open: the reason is asked for elsewhere, a browser does not report it. */
+  /** A socket did not open: the reason must be requested separately, because a browser does not report it. */
   refused(): void;
 }
 
@@ -80,12 +80,12 @@ export class Connection<S extends BaseStatus> {
     return this.#around.now() - this.#heard;
   }
 
-  /** What is shown is what is: a message came not long ago. */
+  /** Returns `true` if the displayed state is current: a message arrived recently. */
   get isLive(): boolean {
     return this.#phase === 'open' && this.silence < SILENT_MS;
   }
 
-  /** Opens the stream, with the token there is now. */
+  /** Opens the stream, with the current token. */
   start(): void {
     this.stop();
     this.#attempt = 0;
@@ -99,7 +99,7 @@ export class Connection<S extends BaseStatus> {
     this.#enter('closed');
   }
 
-  /** Tries at once, where a later attempt is waited for: the network is back, or somebody looks at the page. */
+  /** Tries at once instead of waiting for the next attempt: the network is back, or the page is visible again. */
   hurry(): void {
     if (this.#phase !== 'waiting') return;
     this.#around.never(this.#timer);
@@ -107,7 +107,7 @@ export class Connection<S extends BaseStatus> {
     this.#open();
   }
 
-  /** Opens it anew where nothing has been received for long: a network that is gone closes no socket. */
+  /** Reopens the socket after a long silence: a lost network closes no socket. */
   check(): void {
     if (this.#phase === 'open' && this.silence > 2 * SILENT_MS) this.#gone(true);
   }
@@ -164,7 +164,7 @@ export class Connection<S extends BaseStatus> {
     }
   }
 
-  /** Another agent counts its events anew: what it has is asked for from the beginning, and this message is not taken. */
+  /** Another agent restarts its event numbers: its events are requested from the beginning, and this message is dropped. */
   #know(agent: string): boolean {
     const other = this.#agent !== undefined && this.#agent !== agent;
     this.#agent = agent;
@@ -190,7 +190,7 @@ export class Connection<S extends BaseStatus> {
   }
 }
 
-/** A browser's own. */
+/** Returns the browser's own functions. */
 export function browser(): Surroundings {
   return {
     open: (path, protocols) => {

@@ -1,9 +1,9 @@
-// Numbers with their units, the same everywhere. What is not known is a dash: never an old value.
+// Numbers with their units, in one format. An unknown value is a dash: never an old value.
 
 export const NONE = '–';
 export const DEGREES = 180 / Math.PI;
 
-/** A true minus sign, and no negative zero. */
+/** Formats with a true minus sign, and without a negative zero. */
 export function number(value: number | null | undefined, digits: number): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
   const text = value.toFixed(digits);
@@ -24,7 +24,7 @@ export function speedSign(unit: AngleUnit): string {
   return unit === 'deg' ? '°/s' : 'rad/s';
 }
 
-/** In the unit that people see. */
+/** Converts to the displayed unit. */
 export function fromRad(rad: number, unit: AngleUnit): number {
   return unit === 'deg' ? rad * DEGREES : rad;
 }
@@ -33,7 +33,7 @@ export function toRad(value: number, unit: AngleUnit): number {
   return unit === 'deg' ? value / DEGREES : value;
 }
 
-/** What people type: a decimal comma and a true minus are fine. NaN where it is no number. */
+/** Parses a typed number: a decimal comma and a true minus are accepted. NaN if invalid. */
 export function parse(text: string): number {
   const plain = text.trim().replace('\u2212', '-').replace(',', '.');
   return plain === '' ? NaN : Number(plain);

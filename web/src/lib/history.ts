@@ -1,4 +1,4 @@
-// The last minutes of what was measured, for plots and figures: a ring of rows, oldest first when read.
+// The last minutes of measured values, for plots and figures: a ring of rows, oldest first when read.
 
 export class History {
   readonly channels: number;
@@ -17,7 +17,7 @@ export class History {
     return this.#count;
   }
 
-  /** The first value of a row is its time; values that are not known are NaN. */
+  /** The first value of a row is its time; unknown values are NaN. */
   push(row: ArrayLike<number>): void {
     this.#data.set(row, this.#next * this.channels);
     this.#next = (this.#next + 1) % this.#room;
@@ -28,7 +28,7 @@ export class History {
     this.#next = this.#count = 0;
   }
 
-  /** Columns of the rows from a time on. NaN becomes null: a gap and no value. */
+  /** Returns columns of the rows from a time on. NaN becomes null: a gap without a value. */
   since(time: number, columns: readonly number[]): (number | null)[][] {
     const out: (number | null)[][] = columns.map(() => []);
     for (let i = 0; i < this.#count; i += 1) {

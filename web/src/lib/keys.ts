@@ -1,6 +1,6 @@
-// The space bar stops everywhere but where a space is typed.
+// The space bar stops everywhere except in text fields.
 
-/** As much of an element as is needed. */
+/** The properties of an element that are needed. */
 export interface Focused {
   tagName: string;
   type?: string;
@@ -9,7 +9,7 @@ export interface Focused {
 
 const TYPED = new Set(['text', 'search', 'url', 'tel', 'email', 'password', 'date', 'time', '']);
 
-/** Whether keys are text here. Buttons, sliders and switches take no text: there the space bar stops, and Enter presses. */
+/** Returns `true` if keys enter text here. Buttons, sliders and switches take no text: there the space bar stops, and Enter presses. */
 export function takesText(element: Focused | null | undefined): boolean {
   if (!element) return false;
   if (element.isContentEditable) return true;
@@ -18,7 +18,7 @@ export function takesText(element: Focused | null | undefined): boolean {
   return tag === 'INPUT' && TYPED.has((element.type ?? '').toLowerCase());
 }
 
-/** "Tablet", "Phone", "Computer": what others read as the name of who commands. */
+/** "Tablet", "Phone", "Computer": name of the lease holder for other clients. */
 export function deviceKind(agent: string, touchPoints: number, width: number): string {
   if (/iPhone|Android.*Mobile/i.test(agent)) return 'Phone';
   if (/iPad|Android|Tablet/i.test(agent) || (/Macintosh/.test(agent) && touchPoints > 1)) return 'Tablet';

@@ -1,32 +1,33 @@
-// How late messages are: a network that delays everything by the same time loses nothing, and what is shown is old all the same.
+// Delay of messages: a network that delays all messages by the same time loses none, but the displayed state is old.
 
-/** Times of so many spans are kept; after that two clocks may have drifted apart, ms. */
+/** Length of a span, ms; times are kept for `SPANS` spans, after which two clocks may have drifted apart. */
 const SPAN_MS = 60_000;
 const SPANS = 10;
-/** So many questions bound the difference from below before that counts: one may have been long on its way. */
+/** Least number of probes for a lower bound of the difference: a single probe may have been delayed. */
 const PROBES = 3;
-/** For so long, ms. */
+/** Time for which a probe counts, ms. */
 const PROBED_MS = 120_000;
 
 /**
- * Compares the clock of an agent, as its messages have it, with this browser's; both count ms from whenever. The message that came soonest bounds the difference
- * from above. An answer was made behind the question: that bounds it from below, and shows a delay that all messages have. Where the two contradict each other a
- * clock has stood still, and what was known of it is forgotten.
+ * Compares the clock of an agent, from the times in its messages, with this browser's; both count ms from any start.
+ * The fastest message bounds the difference from above. An answer was created after its request: that bounds the
+ * difference from below, and shows a delay of all messages. If the two bounds contradict each other, a clock has stood
+ * still, and all earlier bounds are dropped.
  */
 export class Lateness {
   /** Least difference in each span that had messages, the newest last. */
   #spans: { span: number; least: number }[] = [];
-  /** Differences that the true one is not below, and when that was seen. */
+  /** Lower bounds of the difference, and the time of each. */
   #floors: { at: number; floor: number }[] = [];
 
-  /** A question of `sent` was answered, at `made` by the agent's clock. */
+  /** A request sent at `sent` was answered, at `made` by the agent's clock. */
   probe(sent: number, made: number): void {
     const floor = sent - made;
     if (this.#spans.length > 0 && floor > this.#least() + 1) this.#spans = [];
     this.#floors = [...this.#floors.filter(({ at }) => at > sent - PROBED_MS), { at: sent, floor }];
   }
 
-  /** A message that was made at `made` by the agent's clock came at `now`; how late, ms, at the most, or beside the soonest as long as nothing was asked. */
+  /** Returns the largest delay, ms, of a message created at `made` and received at `now`; without probes, relative to the fastest. */
   take(made: number, now: number): number {
     const span = Math.floor(now / SPAN_MS);
     const difference = now - made;
@@ -38,7 +39,7 @@ export class Lateness {
     return difference - floor;
   }
 
-  /** What the agent's clock shows at `now`, or a little less: as long as the soonest message was on its way. */
+  /** Returns the agent's clock at `now`, or slightly less: by the delay of the fastest message. */
   agentTime(now: number): number | undefined {
     return this.#spans.length === 0 ? undefined : Math.floor(now - this.#least());
   }

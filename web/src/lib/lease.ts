@@ -1,4 +1,5 @@
-// The lease: one client commands at a time. Taken by the first command, renewed while the page is in use, let go by hand or with the page.
+// The lease: one client commands at a time. Taken by the first command, renewed while the page is in use, released by
+// hand or with the page.
 import { type Api, ApiError } from './api.ts';
 
 export type Policy = 'continue' | 'pause' | 'stop';
@@ -17,7 +18,7 @@ export const RENEW_MS = 3000;
 export interface LeaseWishes {
   name(): string;
   policy(): Policy;
-  /** Phase or `wantedBy` is another one. */
+  /** Phase or `wantedBy` has changed. */
   changed(): void;
 }
 
@@ -34,14 +35,14 @@ export class Lease {
     this.#wishes = wishes;
   }
 
-  /** Takes the lease where this client does not have it. Two commands at once take it once. */
+  /** Takes the lease if this client does not have it. Two commands at once take it once. */
   take(): Promise<void> {
     if (this.phase === 'held') return Promise.resolve();
     this.#taking ??= this.#post(false).finally(() => (this.#taking = undefined));
     return this.#taking;
   }
 
-  /** Asks whoever commands for it, and keeps the place in the queue by renewing. */
+  /** Asks the holder for the lease, and keeps the place in the queue by renewing. */
   ask(): Promise<void> {
     return this.#post(true);
   }
@@ -52,7 +53,7 @@ export class Lease {
     this.#enter(grant.held ? 'held' : 'waiting', grant.key);
   }
 
-  /** Renews it, or shows that it is still waited for. Returns whether this client commands. */
+  /** Renews the lease, or the place in its queue. Returns `true` if this client holds the lease. */
   async renew(): Promise<boolean> {
     if (!this.key) return false;
     const key = this.key;
@@ -64,14 +65,14 @@ export class Lease {
       if (lost) this.#enter('none', undefined);
       else this.#enter(state.held ? 'held' : 'waiting', key);
     } catch (error) {
-      // Without an answer it may still be ours; with a refusal it is not.
+      // Without an answer the lease may still be ours; after a refusal it is not.
       if (!(error instanceof ApiError) || error.isNoConnection) return this.phase === 'held';
       if (this.key === key) this.#enter('none', undefined);
     }
     return this.phase === 'held';
   }
 
-  /** A command was refused: somebody else has it, or nobody knows this key any more. */
+  /** A command was refused: another client has the lease, or the agent no longer knows this key. */
   lost(): void {
     this.#enter('none', undefined);
   }

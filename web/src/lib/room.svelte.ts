@@ -1,8 +1,8 @@
-// How much room the page has.
+// Available room of the page.
 
 const query = matchMedia('(min-width: 1000px)');
 
-/** `wide`: what is stands beside what is asked, else above it. As the style sheets have it. */
+/** `wide`: the state is shown next to the commands, else above them. Same limit as in the style sheets. */
 export const room = $state({ wide: query.matches });
 
 query.addEventListener('change', () => (room.wide = query.matches));

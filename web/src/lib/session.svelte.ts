@@ -1,4 +1,4 @@
-// What every page has: connection, token, lease, Stop, messages, events. Free of what the agent drives.
+// Shared parts of every page: connection, token, lease, Stop, messages, events. Independent of the device of the agent.
 import { getContext, setContext } from 'svelte';
 
 import { Api, ApiError, type Ask, type Problem } from './api.ts';
@@ -21,11 +21,11 @@ export interface SessionStatus extends BaseStatus {
   role: 'viewer' | 'operator';
   last_halt?: number;
   lease?: LeaseView | null;
-  /** ms since the last status of what the agent drives. */
+  /** ms since the last status of the device. */
   age_ms?: number | null;
   lost?: string | null;
   simulated?: boolean;
-  /** The agent's own time when this was made, ms. */
+  /** The agent's own time when this was created, ms. */
   at_ms?: number | undefined;
 }
 
@@ -35,17 +35,17 @@ export interface Toast {
   title: string;
   text: string;
   problem?: Problem;
-  /** A word beside the message that does something about it. */
+  /** A button next to the message with a remedy. */
   action?: { word: string; act: () => void };
 }
 
 export interface Line {
-  /** This page's own: agents count anew when they are started. */
+  /** Number of this page: agents restart their numbers. */
   id: number;
   unix_s: number;
   text: string;
   tone: 'info' | 'good' | 'warn' | 'error';
-  /** By whom or of what, in a word. */
+  /** Origin of the event, in a word. */
   of: string;
 }
 
@@ -57,32 +57,32 @@ export interface StopState {
   text: string;
 }
 
-/** What a page's words need to know of what it drives. */
+/** Texts about the controlled device. */
 export interface Driven {
   /** `arm` or `chain`. */
   thing: string;
-  /** What works for everybody who may look, a sentence. */
+  /** Actions open to all viewers, a sentence. */
   works: string;
-  /** What may be done with a viewer's token. */
+  /** Actions allowed with a viewer's token. */
   viewerMay: string;
-  /** What becomes of what runs when this browser goes: what the agent knows, the usual first, with the words that end the sentence `left`. */
+  /** Policies for a running motion after a disconnect of this browser, the usual first, with the words that end the sentence `left`. */
   policies: readonly [[Policy, string], ...[Policy, string][]];
   left: string;
 }
 
-/** What becomes of the words of an event. */
+/** Turns an event into a line. */
 export type Describe = (entry: Entry) => Omit<Line, 'id' | 'unix_s'> | undefined;
 
-/** Somebody has to have touched the page within this time, or something of ours has to be going on, for the lease to be renewed, ms. */
+/** Time after a touch of the page within which the lease is renewed, ms; a running job of this page renews it as well. */
 const IN_USE_MS = 120_000;
 const LINES_MAX = 400;
-/** The agent's time is asked for so often until it is known, ms. */
+/** Period of requests for the agent's time until it is known, ms. */
 const PROBE_MS = 1000;
-/** What may move something is not sent where the lease took longer, ms. */
+/** Longest wait for the lease after which a command that may move the device is still sent, ms. */
 const LEASE_MAX_MS = 3000;
-/** A Stop that was not sent is spoken of for so long at least, ms. */
+/** Least time for which a failed Stop is shown, ms. */
 const FAILED_MS = 20_000;
-/** Status values older than this are not those of now, ms. */
+/** Age above which status values count as outdated, ms. */
 const OLD_MS = 1500;
 
 function load(name: string): string | null {
@@ -95,7 +95,7 @@ function save(name: string, value: string): void {
 
 const KEY = Symbol('session');
 
-/** For the components that every page has. */
+/** For the components of every page. */
 export function provideSession<S extends SessionStatus>(session: Session<S>): void {
   setContext(KEY, session);
 }
@@ -113,17 +113,17 @@ export class Session<S extends SessionStatus> {
   phase = $state<Phase>('connecting');
   /** Messages arrive. */
   live = $state(false);
-  /** What is driven answers the agent. */
+  /** The device answers the agent. */
   fresh = $state(false);
-  /** Messages come steadily, and this much too late, s; 0 where that is not why nothing is known of now. */
+  /** Delay of steady messages, s; 0 if a delay is not the reason for the unknown state. */
   late = $state(0);
-  /** s without connection, whole. */
+  /** Whole seconds without connection. */
   lostFor = $state(0);
   status = $state.raw<S | undefined>(undefined);
   role = $state<'viewer' | 'operator'>('viewer');
   hasToken = $state(false);
   denied = $state<Problem | undefined>(undefined);
-  /** The token dialog is open, for this reason. */
+  /** Reason for which the token dialog is open. */
   asksToken = $state<string | undefined>(undefined);
   leasePhase = $state<LeasePhase>('none');
   wantedBy = $state<string | undefined>(undefined);
@@ -135,11 +135,11 @@ export class Session<S extends SessionStatus> {
   name = $state(load('name') ?? deviceKind(navigator.userAgent, navigator.maxTouchPoints, screen.width));
   policy = $state<Policy>('stop');
 
-  /** Something that this page has begun goes on. */
+  /** `true` while a job of this page runs. */
   isBusy: () => boolean = () => false;
-  /** Nothing runs that would be left to itself without a lease: else the lease lapses, and its policy is what becomes of that. */
+  /** `true` if no motion would continue without a lease: otherwise the lease expires, and its policy applies. */
   isAtRest: () => boolean = () => false;
-  /** What the last Stop did, as the page words it; empty: nothing is said. */
+  /** Result of the last Stop, in the words of the page; empty: no message. */
   saysOfStop: () => { text: string; failed: boolean } = () => ({ text: this.stopState.text, failed: this.stopState.phase === 'failed' });
   readonly #statusHandlers: ((status: S) => void)[] = [];
   readonly #eventHandlers: ((entry: Entry, isNew: boolean) => void)[] = [];
@@ -150,12 +150,12 @@ export class Session<S extends SessionStatus> {
   readonly of: Driven;
   readonly #describe: Describe;
   #probes = 0;
-  /** Stops that are being sent, or tried again. */
+  /** Number of Stops that are being sent, or repeated. */
   #stopping = 0;
   #touched = 0;
   #toastId = 0;
   #lineId = 0;
-  /** When the last status came, and how much later than it should have. */
+  /** Time of the last status, and its delay. */
   #statusAt = -Infinity;
   #late = 0;
   #halt = 0;
@@ -163,7 +163,7 @@ export class Session<S extends SessionStatus> {
   #agent = '';
   #lostAt = performance.now();
   #probing = false;
-  /** The token of which it was said that it is not accepted; empty: none. */
+  /** Token that was reported as not accepted; an empty string: no token was sent. */
   #refused: string | undefined;
 
   constructor(describe: Describe, of: Driven) {
@@ -215,17 +215,17 @@ export class Session<S extends SessionStatus> {
     this.#eventHandlers.push(handler);
   }
 
-  /** Called with what the stream has beside status and events. */
+  /** Called with messages of the stream other than status and events. */
   onMessage(handler: (message: { kind: string }) => void): void {
     this.#messageHandlers.push(handler);
   }
 
-  /** Called when what is shown is no more what is. */
+  /** Called when the displayed state is outdated. */
   onLoss(handler: () => void): void {
     this.#lossHandlers.push(handler);
   }
 
-  /** Called when events were missed: what goes on is to be asked for. */
+  /** Called when events were missed: the current job must be requested. */
   onMissed(handler: () => void): void {
     this.#missedHandlers.push(handler);
   }
@@ -243,7 +243,7 @@ export class Session<S extends SessionStatus> {
       if (!document.hidden) this.connection.hurry();
     });
     addEventListener('pagehide', () => {
-      // What runs is not left to itself: without a word the lease lapses, and what becomes of it is what was chosen.
+      // A running job keeps its lease here: the lease then expires, and the chosen policy applies.
       if (this.lease.phase === 'waiting' || this.isAtRest()) void this.lease.release(true).catch(() => {});
     });
   }
@@ -279,20 +279,20 @@ export class Session<S extends SessionStatus> {
     this.connection.start();
   }
 
-  /** The number that a command is to carry which was asked for now: what has been stopped since then, it does not move. */
+  /** Number for a command that is requested now: a Stop since then prevents its motion. */
   get askedAfter(): number | undefined {
     const shown = this.status?.last_halt;
     return shown === undefined ? undefined : Math.max(shown, this.#halt);
   }
 
-  /** The agent's time, as near as this page knows it: a command that names it is refused where it comes late. */
+  /** The agent's time, as accurate as this page knows it: the agent refuses a command with this time if it arrives late. */
   get agentTime(): number | undefined {
     return this.#lateness.agentTime(performance.now());
   }
 
   /**
-   * Stops, ahead of all else; tried again where the network drops it. What became of it is in `stopState`, which is that of the last touch alone: as long as
-   * nobody has confirmed it, it says so.
+   * Stops, ahead of all other requests; tries again if the network drops the request. The result is in `stopState`, for
+   * the last touch only: until the agent confirms the Stop, `stopState` shows that it is unconfirmed.
    */
   async stop(): Promise<void> {
     const at = performance.now();
@@ -331,19 +331,19 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** Nothing more is said of the last Stop, unless it is still being sent. */
+  /** Removes the message of the last Stop, unless it is still being sent. */
   forgetStop(): void {
     if (this.#stopping === 0) this.stopState = { phase: 'idle', at: 0, answered: 0, text: '' };
   }
 
-  /** Pauses; needs no lease. */
+  /** Pauses the motion; needs no lease. */
   async pause(): Promise<boolean> {
     return (await this.attempt('Pause', () => this.#halting('/api/pause', 3000), (sent) => {
       this.#halt = Math.max(this.#halt, sent?.halt ?? 0);
     })) !== undefined;
   }
 
-  /** Stop and Pause; a token that is not accepted any more does not keep anybody from them who needs none. */
+  /** Sends Stop or Pause; an expired token does not block clients that need none. */
   async #halting(path: string, within: number): Promise<{ halt?: number } | undefined> {
     try {
       return await this.api.json<{ halt?: number }>('POST', path, { within, ahead: true });
@@ -356,8 +356,9 @@ export class Session<S extends SessionStatus> {
   }
 
   /**
-   * Sends a command, with the lease; what may move also says what this page showed when it was asked for, which is now, or `after` for a later part of the same
-   * wish. Returns the answer, or undefined where it was refused: why is a message on the page then.
+   * Sends a command, with the lease. A command that may move the device also carries the state that this page showed
+   * when the user requested it: now, or `after` for a later part of the same request. Returns the answer, or undefined
+   * after a refusal, whose reason is a message on the page.
    */
   async command<T = unknown>(
     what: string, method: string, path: string, ask: Ask & { moves?: boolean; after?: number | undefined; quiet?: boolean } = {},
@@ -374,7 +375,7 @@ export class Session<S extends SessionStatus> {
       try {
         return { value: await this.api.json<T>(method, path, query ? { ...ask, query } : ask) };
       } catch (error) {
-        // The lease lapsed while the page rested: taken again, once.
+        // The lease expired while the page was idle: it is taken again, once.
         if (!had || !(error instanceof ApiError) || error.problem.code !== 'denied' || error.problem.next.includes('three seconds')) throw error;
         if (await this.lease.renew()) throw error;
         await this.lease.take();
@@ -384,7 +385,7 @@ export class Session<S extends SessionStatus> {
     return this.attempt(what, act, undefined, ask.quiet);
   }
 
-  /** Does it, and says why not where it fails. */
+  /** Calls `act`, and shows the reason of a failure. */
   async attempt<T>(what: string, act: () => Promise<T>, then?: (value: T) => void, quiet = false): Promise<T | undefined> {
     try {
       const value = await act();
@@ -435,7 +436,7 @@ export class Session<S extends SessionStatus> {
 
   #take(status: S): void {
     if (this.status?.agent !== status.agent) {
-      // Another agent counts its Stops anew, and its time.
+      // Another agent restarts its Stop numbers, and its time.
       this.#halt = 0;
       this.#lateness.forget();
     }
@@ -455,7 +456,7 @@ export class Session<S extends SessionStatus> {
       this.#agent = message.agent;
       this.#known = -1;
     }
-    // What happened before the page was opened is history, and no news.
+    // Events from before the page was opened are not new.
     const isFirst = this.#known < 0;
     const fresh: Line[] = [];
     for (const entry of message.events) {
@@ -473,7 +474,7 @@ export class Session<S extends SessionStatus> {
     if (fresh.length > 0) this.lines = [...this.lines, ...fresh].slice(-LINES_MAX);
   }
 
-  /** Whether what is shown is what is. */
+  /** Updates `live` and `fresh`. */
   #look(): void {
     this.connection.check();
     const live = this.connection.isLive;
@@ -489,12 +490,12 @@ export class Session<S extends SessionStatus> {
     if (fresh !== this.fresh) {
       this.fresh = fresh;
       if (!fresh) {
-        // Whoever asked for what still waits has seen something else.
+        // The user requested the waiting commands for a state that is outdated.
         this.api.recall('The connection was lost');
         for (const handler of this.#lossHandlers) handler();
       }
     }
-    // Said long enough, and what was to be stopped rests; a job that begins ends it at once.
+    // The failure was shown long enough, and the device rests; a new job hides it at once.
     if (this.stopState.phase === 'failed' && performance.now() - this.stopState.answered > FAILED_MS && this.isAtRest()) this.forgetStop();
     const lostFor = live ? 0 : Math.floor((performance.now() - this.#lostAt) / 1000);
     if (lostFor !== this.lostFor) this.lostFor = lostFor;
@@ -514,11 +515,11 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** Asks for the agent's time, so that a delay which all messages have is seen. */
+  /** Requests the agent's time, so that a delay of all messages is detected. */
   async #probeTime(): Promise<void> {
     if (!this.live || document.hidden) return;
     this.#probes += 1;
-    // Often until it is known, and then now and then.
+    // Often until the time is known, then occasionally.
     if (this.#probes > 4 && this.#probes % 5 !== 0) return;
     const [sent, agent] = [performance.now(), this.status?.agent];
     try {
@@ -529,7 +530,7 @@ export class Session<S extends SessionStatus> {
     }
   }
 
-  /** A browser does not say why a socket was refused; an ordinary request does. */
+  /** A browser does not report why a socket was refused; an ordinary request does. */
   async #probe(): Promise<void> {
     if (this.#probing) return;
     this.#probing = true;
@@ -538,7 +539,7 @@ export class Session<S extends SessionStatus> {
     } catch (error) {
       if (error instanceof ApiError && !error.isNoConnection) {
         this.denied = error.problem;
-        // Asked once for each token: whoever closes that finds it beside the state.
+        // Asked once for each token: a user who closes the dialog finds it next to the state.
         const token = this.tokens.get() ?? '';
         if (error.wantsToken && this.#refused !== token) {
           this.#refused = token;

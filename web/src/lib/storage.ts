@@ -1,4 +1,4 @@
-// What a browser keeps. Where it keeps nothing (blocked by its owner, or full) a page forgets when it closes, and works.
+// Storage of a browser. Without it (blocked or full) a page works, and forgets when it closes.
 
 export interface Store {
   getItem(name: string): string | null;
@@ -6,7 +6,7 @@ export interface Store {
   removeItem(name: string): void;
 }
 
-/** A store of the browser's behind one of this page's own, which stands in where the browser's fails. */
+/** Returns the browser's storage with a fallback of this page, which is used if the browser's fails. */
 export function guarded(open: () => Store): Store {
   const own = new Map<string, string>();
   const attempt = <T>(act: (store: Store) => T, instead: T): T => {

@@ -1,4 +1,4 @@
-// Light, dark, or as the system has it.
+// Light, dark, or as set in the system.
 
 import { device } from './storage.ts';
 
@@ -13,7 +13,7 @@ export function savedTheme(): Theme {
   return saved === 'light' || saved === 'dark' ? saved : 'auto';
 }
 
-/** From now on, and as the system changes. */
+/** Applies the theme now, and when the system changes. */
 export function applyTheme(theme: Theme): void {
   chosen = theme;
   if (theme === 'auto') device.removeItem(NAME);
@@ -21,7 +21,7 @@ export function applyTheme(theme: Theme): void {
   show();
 }
 
-/** Whether the page is dark now. */
+/** Returns `true` if the page is dark now. */
 export function isDark(theme: Theme): boolean {
   return theme === 'dark' || (theme === 'auto' && system.matches);
 }

@@ -4,7 +4,7 @@ import type { Store } from './storage.ts';
 
 const NAME = 'openjtc-token';
 
-/** The token in the fragment of an address, and the fragment without it. */
+/** Returns the token in the fragment of an address, and the fragment without it. */
 export function tokenIn(hash: string): { token: string | undefined; rest: string } {
   const parts = hash.replace(/^#/, '').split('&').filter(Boolean);
   const own = parts.find((part) => part.startsWith('token='));
@@ -13,7 +13,7 @@ export function tokenIn(hash: string): { token: string | undefined; rest: string
   return { token: token || undefined, rest: rest ? `#${rest}` : '' };
 }
 
-/** As it is where it is no address: it is a token that nobody accepts then. */
+/** Returns the text unchanged if it is not a valid encoding: no agent accepts it as a token then. */
 function decoded(text: string): string {
   try {
     return decodeURIComponent(text);
@@ -22,7 +22,7 @@ function decoded(text: string): string {
   }
 }
 
-/** Where the token is kept. */
+/** Storage of the token. */
 export class TokenStore {
   readonly #session: Store;
   readonly #device: Store;
@@ -40,7 +40,7 @@ export class TokenStore {
     return this.#device.getItem(NAME) !== null;
   }
 
-  /** For this tab alone: what the device remembers stays. */
+  /** Sets the token for this tab only: the device keeps its own. */
   use(token: string): void {
     this.#session.setItem(NAME, token);
   }

@@ -1,7 +1,7 @@
-// The tones of what is shown; words say the same.
+// Tones of displayed states; the text has the same meaning.
 
-/** A state's colour and shape; each shape is another one, for those who do not see colours. */
+/** A state's colour and shape; each shape is different, for users who do not see colours. */
 export type Tone = 'off' | 'hold' | 'move' | 'pause' | 'teach' | 'error' | 'lost';
 
-/** What an event is. */
+/** Tone of an event. */
 export type EventTone = 'info' | 'good' | 'warn' | 'error';

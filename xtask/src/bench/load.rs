@@ -1,13 +1,13 @@
-//! Whether a machine is quiet enough for a verdict on what was measured on it.
+//! Load of the machine: is it quiet enough for a verdict on the measurements?
 use std::time::Instant;
 
 /// Most of one processor that other programs may take while figures are judged.
 pub const OTHERS_MAX: f64 = 0.1;
 
-/// What the processors have done, to see what others do meanwhile.
+/// Processor times, to measure the load by other programs.
 pub struct Load {
     began: Instant,
-    /// Seconds of all programs and of this one with those that it has run, where the system says so.
+    /// Seconds of all programs, and of this one with its child processes, if the system reports them.
     busy: Option<(f64, f64)>,
 }
 
@@ -34,7 +34,7 @@ fn busy() -> Option<(f64, f64)> {
     // user, nice, system; irq, softirq, steal: all but the idle ones.
     let all = sum(all.get(1..4)?)? + sum(all.get(6..9)?)?;
     let own = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // Behind the name, which may hold blanks: utime, stime, cutime and cstime are fields 14 to 17 of the line.
+    // After the name, which may hold blanks: utime, stime, cutime and cstime are fields 14 to 17 of the line.
     let own: Vec<&str> = own.rsplit_once(')')?.1.split_whitespace().collect();
     let own = sum(own.get(11..15)?)?;
     Some((all / USER_HZ, own / USER_HZ))

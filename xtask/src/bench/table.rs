@@ -2,7 +2,7 @@
 use super::{Failed, Figures};
 use crate::size;
 
-/// Whether a figure should stay below its target or reach it.
+/// Target of a figure.
 #[derive(Clone, Copy)]
 enum Target {
     /// Ours ≤ factor × anchor.
@@ -11,11 +11,11 @@ enum Target {
     AtMost(f64),
     /// Ours ≥ value.
     AtLeast(f64),
-    /// Only to look at.
+    /// For information only.
     None,
 }
 
-/// One line of the table.
+/// Row of the table.
 struct Row {
     title: &'static str,
     ours: &'static str,
@@ -257,12 +257,13 @@ const ROWS: &[Row] = &[
     ),
 ];
 
-/// How many targets there are.
+/// Returns the number of targets.
 pub fn targets() -> usize {
     ROWS.iter().filter(|row| !matches!(row.target, Target::None)).count()
 }
 
-/// Prints every row, with the cause where its measurement failed; returns how many targets were missed. What was measured on a machine that is not `quiet` is not judged.
+/// Prints every row, with the cause if its measurement failed; returns the number of missed targets. Measurements of a machine that is
+/// not `quiet` are not judged.
 pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
     println!("\n| figure | ours | anchor | ratio | target | met |\n|---|---|---|---|---|---|");
     let mut missed = 0;
@@ -330,7 +331,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Every figure of the table is there but those of one measurement, which failed.
+    /// Every figure of the table exists except those of one failed measurement.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));
@@ -351,7 +352,7 @@ mod tests {
             }
         }
         assert!(gone > 0 && there > 20, "{gone} {there}");
-        // A figure that nobody tried to measure did not fail.
+        // A figure that was not measured did not fail.
         let (text, _) = ROWS[0].judge(&Figures::new(), &Failed::default(), true);
         assert!(text.ends_with("| not measured |"), "{text}");
     }

@@ -1,4 +1,4 @@
-//! `cargo xtask bench tracking`: the control law beside that of the existing firmware, in docs/tracking.md.
+//! `cargo xtask bench tracking`: the control law compared with that of the existing firmware, in docs/tracking.md.
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -47,7 +47,7 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page says that a goal is met where its figures do, and names the joints that miss it, with what bounds them.
+    /// The page calls a goal met if its figures meet it, and names the joints that miss it, with the limiting quantity.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));

@@ -58,7 +58,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     run(root.dpkg().args(["--verify", "jtc", "ucom"]))?;
     used(root)?;
     units(root)?;
-    // What an agent would have left.
+    // Files that an agent would have left.
     let state = root.path().join("var/lib/jtc/cell1");
     fs::create_dir_all(&state)?;
     fs::write(state.join("tokens.toml"), "")?;
@@ -128,7 +128,7 @@ fn used(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// The unit is right, its user is there, and nothing is enabled.
+/// Checks that the unit is valid, its user exists, and no unit is enabled.
 fn units(root: &Root) -> Result<()> {
     for folder in ["etc/systemd/system", "etc/rc2.d"] {
         for file in shell::files(&root.path().join(folder), &["service"]) {
@@ -142,7 +142,7 @@ fn units(root: &Root) -> Result<()> {
     }
     let users = fs::read_to_string(root.path().join("etc/passwd"))?;
     ensure!(users.lines().any(|line| line.starts_with("jtc:")), "the user jtc was not made");
-    // It has to find a mistake before it counts that it finds none.
+    // The check must find a mistake before its silence counts.
     let broken = root.path().join("etc/systemd/system/jtc-broken.service");
     fs::write(&broken, "[Service]\nExecStart=/usr/bin/no-such-program\nNoSuchKey=1\n")?;
     let found = complaints(root, "jtc-broken.service")?;
@@ -157,7 +157,7 @@ fn units(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// What systemd finds in a unit of ours. Of other units, where the copied Debian lacks what they need, nothing is asked.
+/// Returns systemd's complaints about a unit of this project. Other units, whose dependencies the copied Debian may lack, are not checked.
 fn complaints(root: &Root, unit: &str) -> Result<Vec<String>> {
     let verified = root.command("systemd-analyze").args(["verify", "--man=no", unit]).output()?;
     let text = String::from_utf8_lossy(&verified.stderr).into_owned();

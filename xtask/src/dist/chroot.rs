@@ -10,9 +10,9 @@ use anyhow::{Context, Result, bail, ensure};
 use super::tree::sha256;
 use crate::shell::{self, Scratch, apt_install, run, works};
 
-/// Folders of which nothing is compared: what dpkg remembers and writes down, and what lasts no longer than the computer runs.
+/// Folders that are not compared: dpkg's own records, and files that do not survive a reboot.
 const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
-/// What the programs that change users keep of the file before.
+/// Backups by the programs that change users.
 const BACKUPS: [&str; 7] = [
     "etc/passwd-",
     "etc/group-",
@@ -22,9 +22,9 @@ const BACKUPS: [&str; 7] = [
     "etc/subgid-",
     "etc/.pwd.lock",
 ];
-/// Packages that the trial uses where this computer has them, beside the essential ones.
+/// Packages that the trial uses if this computer has them, in addition to the essential ones.
 const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
-/// What nobody reads there.
+/// Files without use in the trial.
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
@@ -34,7 +34,7 @@ pub struct Root(Scratch);
 /// A package of this computer, as dpkg knows it.
 struct Installed {
     essential: bool,
-    /// Names of its dependencies: for each one those of which one is enough.
+    /// Names of its dependencies: for each dependency a list of alternatives.
     depends: Vec<Vec<String>>,
 }
 
@@ -72,12 +72,12 @@ impl Root {
         Ok(root)
     }
 
-    /// Where it is.
+    /// Returns the path.
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 
-    /// What dpkg of the new root knows: the same of the copied packages as that of this computer.
+    /// Writes dpkg's records of the new root: for the copied packages the records of this computer.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
         for folder in ["info", "updates", "triggers", "alternatives"] {
@@ -94,7 +94,7 @@ impl Root {
         Ok(())
     }
 
-    /// What the scripts of essential packages make when they are installed.
+    /// Makes the files that the scripts of essential packages make at their installation.
     fn complete(&self) -> Result<()> {
         for (file, from) in [("passwd", "passwd.master"), ("group", "group.master")] {
             fs::copy(Path::new("/usr/share/base-passwd").join(from), self.path().join("etc").join(file))?;
@@ -241,7 +241,7 @@ fn shell_architecture() -> Result<&'static str> {
     Ok(super::programs::own()?.debian)
 }
 
-/// A file, link or folder as it is; what a package names and this computer has not is left out.
+/// Copies a file, link or folder unchanged; skips names of a package that this computer does not have.
 fn copy(from: &Path, to: &Path) -> Result<()> {
     let Ok(data) = from.symlink_metadata() else { return Ok(()) };
     if let Some(folder) = to.parent() {

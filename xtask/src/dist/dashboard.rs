@@ -7,19 +7,19 @@ use crate::shell::root;
 /// The libraries whose scripts are a part of the built files; the others of web/package.json build and test them.
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
-/// One of them.
+/// Library of the dashboard.
 pub struct Library {
-    /// Its name in the registry npm.
+    /// Name in the registry npm.
     pub name: String,
     /// The version that the lock file has.
     pub version: String,
-    /// Its licence, the identifier of SPDX.
+    /// Licence, the identifier of SPDX.
     pub licence: String,
     /// The text of its licence.
     pub text: String,
 }
 
-/// All of them. The texts are kept beside this program, so that a release can be made without Node.js.
+/// Returns all libraries. The texts are stored next to this program, so that a release can be made without Node.js.
 pub fn libraries() -> Result<Vec<Library>> {
     let lock = root().join("web/package-lock.json");
     let lock: Value =

@@ -1,4 +1,4 @@
-//! The format of Debian packages (deb(5)), the same bytes whoever makes one. The sums of their files are left to dpkg, which makes them.
+//! Format of Debian packages (deb(5)), reproducible byte for byte. The sums of their files are left to dpkg, which makes them.
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, ensure};
@@ -7,15 +7,15 @@ use super::tree::Tree;
 
 /// A package.
 pub struct Deb<'a> {
-    /// Its name.
+    /// Name.
     pub name: &'a str,
-    /// Its version with Debian's revision.
+    /// Version with Debian's revision.
     pub version: &'a str,
-    /// What it runs on: `amd64`, `arm64`.
+    /// Architecture: `amd64`, `arm64`.
     pub architecture: &'a str,
     /// More fields of the control file, a line each: `Section: science`.
     pub fields: &'a str,
-    /// What it installs.
+    /// Files that it installs.
     pub tree: &'a Tree,
     /// Scripts by name: `postinst`, `postrm`.
     pub scripts: &'a [(&'a str, &'a str)],

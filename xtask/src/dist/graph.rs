@@ -11,44 +11,44 @@ use crate::{firmware, shell};
 /// A crate.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Crate {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Its version.
     pub version: String,
-    /// Its licence, an SPDX expression; `None` where its manifest names none.
+    /// Its licence, an SPDX expression; `None` if its manifest names none.
     pub licence: Option<String>,
-    /// Where its source comes from; `None` for the project's own.
+    /// Source of the crate; `None` for the project's own.
     pub source: Option<String>,
-    /// Who wrote it, as its manifest has it.
+    /// Authors, as listed in its manifest.
     pub authors: Vec<String>,
-    /// Where it is developed.
+    /// Address of its repository.
     pub repository: Option<String>,
     /// The folder of its source.
     pub folder: PathBuf,
-    /// SHA-256 of what the registry has of it.
+    /// SHA-256 of its archive in the registry.
     pub checksum: Option<String>,
 }
 
-/// Crates by `name version`, with what each of them uses.
+/// Crates by `name version`, with the dependencies of each.
 #[derive(Default)]
 pub struct Graph {
     /// The crates.
     pub crates: BTreeMap<String, Crate>,
-    /// What each uses, by the same names.
+    /// Dependencies of each crate, by the same names.
     pub uses: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Which dependencies of a crate count.
+/// Kinds of dependencies that count.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Kind {
-    /// What becomes a part of a program, or makes a part of it while it is compiled.
+    /// Dependencies that become a part of a program, or generate a part of it during compilation.
     Shipped,
-    /// Those of build scripts and tests, too.
+    /// Dependencies of build scripts and tests, too.
     All,
 }
 
-/// What the programs, the Python package and the boards' programs contain. Features are those of the whole workspace: the graph may have more
-/// than a program has, and never less.
+/// Returns the contents of the programs, the Python package and the boards' programs. Features are those of the whole workspace: the
+/// graph may have more than a program has, and never less.
 pub fn shipped() -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in PLATFORMS {
@@ -74,7 +74,7 @@ pub fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     Ok(graph)
 }
 
-/// What cargo resolves for a platform, without the network where it can do without.
+/// Returns cargo's resolution for a platform, without the network if possible.
 fn metadata(manifest: &Path, platform: &str) -> Result<Value> {
     let ask = || {
         let mut cargo = shell::cargo(&[
@@ -102,7 +102,7 @@ fn text(value: &Value) -> Option<String> {
 }
 
 impl Graph {
-    /// Adds what is used by those crates of the workspace that `begins` names.
+    /// Adds the dependencies of the workspace crates that `begins` selects.
     fn add(&mut self, metadata: &Value, kind: Kind, begins: impl Fn(&str) -> bool) -> Result<()> {
         let packages = metadata["packages"].as_array().context("cargo metadata names no packages")?;
         let by_id: BTreeMap<&str, &Value> =

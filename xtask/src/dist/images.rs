@@ -11,19 +11,19 @@ const FLASH: u64 = 0x0800_0000;
 /// Bytes from there to the stored arm, the last two sectors of bank 2, which no image may touch. Where bank 2 begins stand the few words of the
 /// second core of an H745, so that the images of these boards have a gap of erased flash in them.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
-/// What flash that is not written reads as.
+/// Value of flash that is not written.
 const ERASED: u8 = 0xff;
 
 /// The program of a board.
 pub struct Image {
     /// The board's name.
     pub board: &'static str,
-    /// What stands in flash from 0x0800_0000 on.
+    /// Contents of flash from 0x0800_0000 on.
     pub bin: Vec<u8>,
 }
 
-/// Builds the programs of all boards. What lies in flash is the same wherever it is built; the names in the ELF files, which debuggers read, are
-/// not, and so these are no part of a release.
+/// Builds the programs of all boards. The contents of flash are the same in every build folder; the names in the ELF files, which
+/// debuggers read, are not, so the ELF files do not belong to a release.
 pub fn build() -> Result<Vec<Image>> {
     let image = |board| {
         let path = firmware::build(board)?;
@@ -34,7 +34,7 @@ pub fn build() -> Result<Vec<Image>> {
     firmware::BOARDS.into_iter().map(image).collect()
 }
 
-/// What an ELF puts into flash.
+/// Returns the contents of flash from an ELF.
 fn flash(elf: &[u8]) -> Result<Vec<u8>> {
     let file = object::read::elf::ElfFile32::<object::Endianness>::parse(elf)?;
     let mut bin = Vec::new();
@@ -43,7 +43,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         if bytes.is_empty() {
             continue;
         }
-        // Where it is loaded to, which is another place than it is used from.
+        // The load address, which differs from the address at which it is used.
         let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
         let end = address + bytes.len() as u64;
         ensure!(
@@ -83,7 +83,7 @@ pub fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }
 
-/// What each image is: the file, its board, sum and address.
+/// Returns the list of images: the file, its board, sum and address.
 pub fn list(images: &[Image], version: &str) -> Result<String> {
     let images: Vec<_> = images
         .iter()

@@ -11,10 +11,10 @@ use crate::shell;
 /// Beginnings of the names of files in which crates have their licences.
 const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
 
-/// Folders of a crate of which nothing becomes a part of a program.
+/// Folders of a crate that are not shipped in a program.
 const NOT_SHIPPED: [&str; 7] = ["tests", "test", "examples", "benches", "fuzz", "target", "node_modules"];
 
-/// An expression of SPDX; old manifests have `/` where it has `OR`.
+/// Returns an SPDX expression; old manifests have `/` instead of `OR`.
 pub fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
@@ -28,7 +28,7 @@ pub fn third_party(graph: &Graph) -> Result<String> {
         let label = format!("{} {}", found.name, found.version);
         let licence = found.licence.as_deref();
         let licence = licence.with_context(|| format!("{label} names no licence; it cannot be shipped"))?;
-        // Whoever wants its source finds it there, which some licences ask for.
+        // The address of the source, which some licences require.
         let source = format!("https://crates.io/crates/{}/{}", found.name, found.version);
         writeln!(list, "{label}: {}, {source}", expression(licence))?;
         texts.of(found, &label)?;
@@ -45,14 +45,14 @@ pub fn third_party(graph: &Graph) -> Result<String> {
     Ok(list)
 }
 
-/// What the compiler and the linker put into programs beside crates.
+/// Parts that the compiler and the linker put into programs in addition to crates.
 pub const RUNTIME: [(&str, &str); 3] = [
     ("musl", "MIT"),
     ("llvm-libunwind", "Apache-2.0 WITH LLVM-exception"),
     ("llvm-compiler-rt", "Apache-2.0 WITH LLVM-exception"),
 ];
 
-/// Rust's standard library, and what [`RUNTIME`] lists.
+/// Lists Rust's standard library, and the entries of [`RUNTIME`].
 fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = shell::read(shell::command("rustc").arg("--version"))?;
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! What is in the packages and archives of the commands.
+//! Contents of the packages and archives of the commands.
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -16,7 +16,7 @@ const REVISION: u32 = 1;
 /// Rules of udev, the same in both packages under names of their own.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
-/// What lintian would find, and why it is meant.
+/// Findings of lintian that are intended, with the reasons.
 const OVERRIDES: &str = "\
 # One program for every distribution.
 NAME: statically-linked-binary
@@ -26,7 +26,7 @@ NAME: initial-upload-closes-no-bugs
 NAME: maintainer-script-calls-systemctl
 ";
 
-/// What all packages of a release share.
+/// Data shared by all packages of a release.
 pub struct Release {
     /// The version, such as `0.2.0`.
     pub version: String,
@@ -40,7 +40,7 @@ pub struct Release {
 
 /// A release file.
 pub struct Made {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
@@ -116,7 +116,7 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // Where the program looks for them, beside the folder that it is in.
+            // The program looks for them here, next to its own folder.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);

@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use super::tree::Tree;
 use crate::shell::{self, Scratch};
 
-/// What `program`, which must run on this computer, prints of itself.
+/// Pages that `program`, which must run on this computer, prints.
 pub struct Pages {
     /// Manual pages by their file names, such as `jtc-serve.1`.
     pub manual: Vec<(String, Vec<u8>)>,
@@ -19,7 +19,7 @@ impl Pages {
     /// Asks the program of this name in `folder`.
     pub fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
-        // Options that this user has set by the environment are none of the packages'.
+        // Options that this user has set by the environment do not belong into the packages.
         let ask = || {
             let mut ask = shell::command(&program);
             ask.env_clear();
@@ -43,7 +43,7 @@ impl Pages {
         Ok(Self { manual, bash: completions("bash")?, zsh: completions("zsh")?, fish: completions("fish")? })
     }
 
-    /// Where Debian has them.
+    /// Installs the pages at Debian's paths.
     pub fn install(&self, name: &str, tree: &mut Tree) -> Result<()> {
         for (page, text) in &self.manual {
             tree.put(format!("usr/share/man/man1/{page}.gz"), super::tree::gzip(text)?);
@@ -54,7 +54,7 @@ impl Pages {
         Ok(())
     }
 
-    /// Where the archives have them.
+    /// Adds the pages at the paths of the archives.
     pub fn unpacked(&self, name: &str, tree: &mut Tree) {
         for (page, text) in &self.manual {
             tree.put(format!("man/man1/{page}"), &**text);

@@ -10,12 +10,12 @@ use crate::{paths, python};
 /// The programs, with the package of each.
 pub const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
 
-/// What a program runs on.
+/// Platform of a program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Platform {
-    /// As the Linux kernel and Rust call it.
+    /// Name used by the Linux kernel and Rust.
     pub machine: &'static str,
-    /// As Debian calls it.
+    /// Name used by Debian.
     pub debian: &'static str,
     /// Rust's target of static programs.
     pub triple: &'static str,
@@ -46,7 +46,7 @@ pub fn own() -> Result<Platform> {
     own.with_context(|| format!("there are no packages for computers like this ({machine}), which would have to run their programs"))
 }
 
-/// Adds the compiler's target where rustup manages the toolchain. `Err`: it cannot be had here.
+/// Adds the compiler's target if rustup manages the toolchain. `Err`: the target is not available here.
 pub fn add_target(triple: &str) -> Result<()> {
     let installed = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))?;
     if installed.lines().any(|target| target == triple) {
@@ -72,7 +72,7 @@ pub fn tools() -> Result<PathBuf> {
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
-/// The switches for `triple` by which no path of this computer stands in what is made, given to a cargo that `command` begins.
+/// Adds the switches for `triple` that keep paths of this computer out of the output, to a cargo that `command` begins.
 pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
     // C and its assembler.
@@ -102,7 +102,7 @@ pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     }
     without_paths(&mut build, platform.triple)?;
     with_tools(&mut build, &tools, time)?;
-    // Nothing is left of what a debugger would read.
+    // All debug information is removed.
     build.env("CARGO_PROFILE_DIST_STRIP", "symbols").env("CARGO_PROFILE_DIST_DEBUG", "false");
     build.env("CARGO_TARGET_DIR", shell::target());
     run(&mut build)?;
@@ -128,7 +128,7 @@ fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     Ok(())
 }
 
-/// An error for a file in which a folder of this computer stands.
+/// Returns an error for a file that contains a folder of this computer.
 pub fn has_no_paths(name: &str, bytes: &[u8]) -> Result<()> {
     for (path, _) in paths::folders()? {
         let path = path.to_string_lossy();

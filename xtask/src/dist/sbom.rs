@@ -1,4 +1,4 @@
-//! What a release is made of, as a bill of materials that programs read (CycloneDX 1.5, JSON).
+//! Contents of a release, as a machine-readable bill of materials (CycloneDX 1.5, JSON).
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
 
@@ -7,7 +7,7 @@ use super::graph::{Crate, Graph};
 use super::{licences, programs};
 use crate::shell::{self, Scratch, run};
 
-/// The bill of `graph` and of what the dashboard's pages contain, the same bytes for the same lock files.
+/// Returns the bill of `graph` and of the libraries in the dashboard's pages; equal lock files give equal bytes.
 pub fn bill(graph: &Graph, version: &str, time: u64) -> Result<String> {
     let scripts = dashboard::libraries()?;
     let crates = graph.crates.values().map(component);

@@ -1,4 +1,4 @@
-//! Files of a package in memory, and archives of them that are the same bytes whoever makes them.
+//! Files of a package in memory, and reproducible archives of them.
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Write as _;
 use std::path::Path;
@@ -11,12 +11,12 @@ use sha2::{Digest as _, Sha256};
 #[derive(Clone, Default, Debug, PartialEq)]
 pub struct Tree(BTreeMap<String, File>);
 
-/// What a file holds, and whether it is a program.
+/// Content and kind of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct File {
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// Whether it can be run.
+    /// `true` if the file is executable.
     pub runs: bool,
 }
 
@@ -43,7 +43,8 @@ impl Tree {
         self.0.iter().map(|(path, file)| (path.as_str(), file))
     }
 
-    /// A tar archive: sorted, of root, each file of `time` (Unix time, s), behind `prefix` (`./` or `name/`). Folders stand in it, too.
+    /// Returns a tar archive: sorted, of root, each file of `time` (Unix time, s), with the path prefix `prefix` (`./` or `name/`).
+    /// Contains folders, too.
     pub fn tar(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         let mut tar = tar::Builder::new(Vec::new());
         let mut folders = BTreeSet::new();
@@ -65,7 +66,7 @@ impl Tree {
         Ok(tar.into_inner()?)
     }
 
-    /// The same archive, compressed.
+    /// Returns the archive compressed.
     pub fn tar_gz(&self, prefix: &str, time: u64) -> Result<Vec<u8>> {
         compress(&self.tar(prefix, time)?, Compression::default())
     }
@@ -90,7 +91,7 @@ pub fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
 
-/// Without a time and a name. Of a program the best costs three times as long as the default, for one byte in a hundred.
+/// Compresses without a time and a name. For a program the best level takes three times as long as the default and saves 1 %.
 fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
     let mut gzip = GzBuilder::new().mtime(0).operating_system(3).write(Vec::new(), by);
     gzip.write_all(bytes)?;

@@ -1,4 +1,4 @@
-//! The same release made again, by a copy of the checkout in another folder, and compared byte for byte.
+//! Makes a release again, by a copy of the checkout in another folder, and compares it byte for byte.
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     if quick {
         again.arg("--quick");
     }
-    // Of the toolchain only what the checkout names counts.
+    // The toolchain comes from the checkout alone.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARGO") && name != "CARGO_HOME") {
         again.env_remove(name);
     }
@@ -62,7 +62,7 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// The checkout as it is, uncommitted changes and history included, without what was built and the release.
+/// Copies the present checkout, uncommitted changes and history included, without build output and the release.
 fn copy(to: &Path, release: &Path) -> Result<()> {
     run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
     let listed = shell::read(shell::command("git").args([

@@ -8,12 +8,12 @@ use super::packages::Made;
 use super::programs::{self, Platform};
 use crate::shell::{self, Scratch, run};
 
-/// Where its source is; `None` in a checkout without it.
+/// Returns the folder of its source; `None` in a checkout without it.
 pub fn folder() -> Option<PathBuf> {
     Some(shell::root().join("crates/openjtc-py")).filter(|folder| folder.join("pyproject.toml").exists())
 }
 
-/// Text about what others wrote, where `license-files` of pyproject.toml finds it.
+/// Text about third-party parts, at the place that `license-files` of pyproject.toml names.
 const THIRD_PARTY: &str = "LICENSE-THIRD-PARTY.txt";
 
 /// Builds the wheel; it runs with every glibc from 2.17 on.
@@ -50,7 +50,7 @@ pub fn build(platform: Platform, time: u64, third_party: &str) -> Result<Made> {
     Ok(Made { name: wheel.file_name().to_string_lossy().into_owned(), bytes: std::fs::read(wheel.path())? })
 }
 
-/// In no file of a wheel stands a path of this computer, and the licences are among them.
+/// Checks that no file of a wheel contains a path of this computer, and that the licences are among the files.
 fn look_into(tools: &Path, wheel: &Path, unpacked: &Path) -> Result<()> {
     let mut unpack = shell::command(tools.join("python"));
     run(unpack.args(["-m", "zipfile", "-e"]).arg(wheel).arg(unpacked))?;

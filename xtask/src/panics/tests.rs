@@ -73,7 +73,7 @@ fn what_is_not_called_does_not_count() {
     assert_eq!((report.functions, report.instructions), (2, 5));
 }
 
-/// `tick` from 0 to 8 returns and has two halfwords of data or code behind that; the panic is at 8.
+/// `tick` from 0 to 8 returns, followed by two halfwords of data or code; the panic is at 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);

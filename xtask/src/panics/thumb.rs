@@ -1,6 +1,6 @@
-//! Thumb-2 code, as far as it says where control goes next (ARMv7-M Architecture Reference Manual, A7.7).
+//! Thumb-2 code, as far as it decides the next address (ARMv7-M Architecture Reference Manual, A7.7).
 
-/// What an instruction means for the flow of control and for the making of addresses.
+/// Effect of an instruction on the flow of control and on the formation of addresses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
     /// B, `B<cc>`, CBZ, CBNZ or BL to an address.
@@ -63,7 +63,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
             to(signed(offset, 25))
         }
-        // UDF; B with a condition (14 and 15 are none: barriers and the like).
+        // UDF; B with a condition (14 and 15 are not conditions: barriers and the like).
         (0xF000, 0x8000) if first & 0xFFF0 == 0xF7F0 && second & 0xF000 == 0xA000 => Flow::Trap,
         (0xF000, 0x8000) if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;
@@ -74,7 +74,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             0xF2C0 => Flow::High(register, immediate as u16),
             _ => Flow::Other,
         },
-        // LDR to the program counter from anywhere but the stack, where returns come from.
+        // LDR to the program counter from anywhere but the stack, which is used for returns.
         _ if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 0xF != 13 => Flow::Indirect(15),
         _ => Flow::Other,
     }

@@ -5,7 +5,7 @@ use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 #[derive(Debug, Default, PartialEq)]
 pub struct Text {
     pub words: String,
-    /// Where each line of the file begins in `words`, and its number.
+    /// Beginning of each line of the file in `words`, and its number.
     lines: Vec<(usize, usize)>,
 }
 

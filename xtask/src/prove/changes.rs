@@ -1,4 +1,4 @@
-//! What has changed since a run of mutants, so that only this is run again and the rest is taken over.
+//! Changes since a run of mutants: only changed parts run again, the other results are kept.
 use std::collections::BTreeMap;
 use std::fs::{read_to_string, write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 use crate::shell::{command, root};
 
-/// What has changed in a file since it was tested, as `git diff -U0` has it.
+/// Changes of a file since it was tested, as `git diff -U0` has them.
 pub(super) struct Changes {
     pub(super) diff: String,
-    /// Of each piece: first old line, old lines, new lines.
+    /// First old line, old lines and new lines of each piece.
     pieces: Vec<(u64, u64, u64)>,
 }
 
@@ -20,16 +20,16 @@ impl Changes {
     fn of(old: &Path, file: &str) -> Result<Self> {
         let mut git = command("git");
         git.args(["diff", "--no-index", "-U0"]).arg(old).arg(file);
-        // It ends with 1 where there is a difference.
+        // `git diff` ends with 1 if there is a difference.
         let diff = String::from_utf8(git.output().context("cannot start git")?.stdout)?;
         Ok(Self { pieces: diff.lines().filter_map(piece).collect(), diff })
     }
 
-    /// Where an old line is now; `None`: it has changed, or is gone.
+    /// Returns the present number of an old line; `None`: the line was changed or removed.
     fn now(&self, line: u64) -> Option<u64> {
         let mut shifted = line;
         for &(first, old, new) in &self.pieces {
-            // A piece without old lines stands behind the line that it names.
+            // A piece without old lines comes after the line that it names.
             let first = if old == 0 { first + 1 } else { first };
             if line < first {
                 break;
@@ -51,7 +51,7 @@ fn piece(line: &str) -> Option<(u64, u64, u64)> {
     Some((old.split(',').next()?.parse().ok()?, count(old)?, count(new)?))
 }
 
-/// What has changed in the files of a report, whose sources are in it; those that are gone are left out.
+/// Returns the changes of the files of a report, which contains their sources; deleted files are left out.
 pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String, Changes>> {
     let old = results.join("old.rs");
     let mut all = BTreeMap::new();
@@ -65,7 +65,7 @@ pub(super) fn changes(results: &Path, report: &Value) -> Result<BTreeMap<String,
     Ok(all)
 }
 
-/// Add to a report of what has changed, from the one before it, what is as it was.
+/// Adds the unchanged results of the previous report to a report of the changes.
 pub(super) fn complete(part: &mut Value, before: Value, changes: &BTreeMap<String, Changes>) -> Result<()> {
     let Value::Object(files) = &mut part["files"] else { return Ok(()) };
     for (file, changes) in changes {

@@ -1,5 +1,4 @@
-//! docs/evidence.md: generated tables between marks, and sentences that people write about mutants that no test
-//! can see.
+//! docs/evidence.md: generated tables between marks, and manual explanations of mutants that no test can see.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 
@@ -14,7 +13,7 @@ pub fn read() -> Result<String> {
     read_to_string(root().join(PAGE)).with_context(|| format!("cannot read {PAGE}"))
 }
 
-/// Replace what stands between the marks `<!-- name -->` and `<!-- end of name -->`.
+/// Replaces the text between the marks `<!-- name -->` and `<!-- end of name -->`.
 pub fn replace(name: &str, table: &str) -> Result<()> {
     let page = read()?;
     let (before, rest) = parts(&page, name)?;
@@ -23,12 +22,12 @@ pub fn replace(name: &str, table: &str) -> Result<()> {
     write(root().join(PAGE), page).with_context(|| format!("cannot write {PAGE}"))
 }
 
-/// What stands between the marks of `name`.
+/// Returns the text between the marks of `name`.
 pub fn table(page: &str, name: &str) -> Result<String> {
     Ok(parts(page, name)?.1.0.trim().to_owned())
 }
 
-/// Up to the end of the first mark, between the marks, from the last mark on.
+/// Splits the page: up to the end of the first mark, between the marks, from the last mark on.
 fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))> {
     let (open, close) = (format!("<!-- {name} -->"), format!("<!-- end of {name} -->"));
     let missing = || format!("{PAGE} lacks `{open}` … `{close}`");
@@ -37,14 +36,14 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
     Ok((&page[..start], (&page[start..end], &page[end..])))
 }
 
-/// A mutant by what it is, not where: file, its line of source without indentation, what is changed.
+/// Mutant, named independently of its line number: file, its line of source without indentation, change.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Named {
     /// From the root of the workspace.
     pub file: String,
     /// The line in which it begins.
     pub line: String,
-    /// As cargo-gamma describes it.
+    /// Change as described by cargo-gamma.
     pub change: String,
 }
 

@@ -12,13 +12,13 @@ use crate::shell::{self, command, root, run, works};
 
 const RUNS: &str = "20000000";
 const PORTION: u64 = 500_000;
-/// So many executions of a target are led by what it compares as well, which finds keywords and constants; the others
-/// only by the code they reach, which is two to three times as fast.
+/// Executions of a target that are guided by comparisons as well, which finds keywords and constants; the others are
+/// guided only by the reached code, which is two to three times as fast.
 const COMPARING: u64 = 1_000_000;
 /// Name of the table in docs/evidence.md.
 const TABLE: &str = "fuzz";
 
-/// Longer inputs only repeat what shorter ones have, and are slow; what is kept a person can read and git can carry.
+/// Longer inputs only repeat the contents of shorter ones, and are slow; kept inputs must be readable and small enough for git.
 const LENGTH: &str = "-max_len=4096";
 
 /// A command of the nightly toolchain; the pinned toolchain's variables are taken away.
@@ -51,7 +51,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         let directories: Vec<&str> = directories.iter().map(String::as_str).collect();
         let mut done = done;
         while done < wanted {
-            // In portions, so that what was done counts when the run is interrupted.
+            // In portions, so that finished portions count when the run is interrupted.
             let portion = (wanted - done).min(PORTION);
             let build = if done < COMPARING { &COMPARISONS[..] } else { &COVERAGE[..] };
             run(&mut fuzz(&target, build, &directories, &[&format!("-runs={portion}"), LENGTH]))?;
@@ -59,7 +59,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // What code is reached, not how often, and by few inputs.
+            // The merge counts the code that is reached, not how often, and keeps few inputs.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
@@ -78,9 +78,9 @@ fn install() -> Result<()> {
     Ok(())
 }
 
-/// Where inputs are: what is found, what is kept, regressions when there are any.
+/// Returns the folders of inputs: found ones, kept ones, and regressions if there are any.
 fn directories(target: &str) -> Result<Vec<String>> {
-    // What is found grows from run to run beside the build, outside git; git has the kept inputs.
+    // The found inputs grow from run to run in the build folder, outside git; git has the kept inputs.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
     for directory in &directories {
         let path = root().join(directory);
@@ -93,7 +93,7 @@ fn directories(target: &str) -> Result<Vec<String>> {
     Ok(directories)
 }
 
-/// Add `portion` executions of the commit that is checked out to the page, unless what runs is in no commit.
+/// Adds `portion` executions of the checked-out commit to the page, unless the tested code is in no commit.
 fn count(target: &str, portion: u64) -> Result<()> {
     let changed =
         shell::read(command("git").args(["status", "--porcelain", "--", "crates", "fuzz/fuzz_targets"]))?;
@@ -133,11 +133,11 @@ fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
 
 /// Build led by coverage and by comparisons.
 const COMPARISONS: [&str; 0] = [];
-/// Build led by coverage alone, beside the other so that neither is built twice.
+/// Build led by coverage alone, in a separate folder so that neither build is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// The fuzzer on `directories`; new inputs go into the first. Without address sanitizer: there is no unsafe code, and it
-/// is several times as fast.
+/// Returns the fuzzer on `directories`; new inputs go into the first. Without address sanitizer: there is no unsafe code,
+/// and the fuzzer is several times as fast.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!((executions(&table, "stream_parser"), executions(&table, "bus_frame")), (521, 0));
     }
 
-    /// A target runs over its kept inputs in every test run, too, and what is kept belongs to a target.
+    /// Every target runs over its kept inputs in every test run, too, and all kept inputs belong to a target.
     #[test]
     fn every_target_is_built_and_tested() {
         let manifest = read_to_string(root().join("fuzz/Cargo.toml")).unwrap();

@@ -1,5 +1,5 @@
-//! `cargo xtask prove mutants`: mutation testing of the crates that run on a board with cargo-gamma, which builds
-//! all mutants into one set of test programs. What to change is in gamma.toml.
+//! `cargo xtask prove mutants`: mutation testing of the crates that run on a board with cargo-gamma, which builds all
+//! mutants into one set of test programs. The changes to make are in gamma.toml.
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::{create_dir_all, read_to_string, write};
@@ -16,7 +16,7 @@ use crate::shell::{self, cargo, command, run, target, works};
 /// Reports of another version may differ.
 const VERSION: &str = "0.4.0";
 const REPORT: &str = "gamma-report.json";
-/// The commit of which the report is.
+/// File with the commit of the report.
 const COMMIT: &str = "commit";
 /// Crates that run on a board, those with the quickest tests first.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
@@ -25,7 +25,7 @@ const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
 /// At most this share of a crate's mutants may be left alive, with a sentence or without.
 const SURVIVING_MAX: f64 = 0.03;
 
-/// What became of the mutants of a crate.
+/// Results of the mutants of a crate.
 #[derive(Default)]
 struct Tally {
     killed: usize,
@@ -49,7 +49,7 @@ impl Tally {
     }
 }
 
-/// Which mutants of a crate are run.
+/// Selection of mutants of a crate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Which {
     /// All of them.
@@ -121,7 +121,7 @@ fn install() -> Result<()> {
         let mut install = cargo(&["install", "cargo-gamma", "--locked", "--version", VERSION, "--root"]);
         run(install.arg(target().join("tools")))?;
     }
-    // It asks cargo offline for the dependencies of every platform.
+    // cargo-gamma asks cargo offline for the dependencies of every platform.
     run(&mut cargo(&["fetch", "--locked"]))
 }
 
@@ -129,16 +129,16 @@ fn program() -> PathBuf {
     target().join("tools/bin/cargo-gamma")
 }
 
-/// Where the results of a crate are kept.
+/// Returns the folder of a crate's results.
 fn results(package: &str) -> PathBuf {
     target().join("mutants").join(package)
 }
 
-/// Run cargo-gamma for one crate; what it ends with depends on the mutants and is judged from its report.
+/// Runs cargo-gamma for one crate; its exit code depends on the mutants and is judged from its report.
 fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
-    // Its report is of the mutants that were run only: the whole report is kept, and brought up to date.
+    // Its report covers only the mutants of this run: the whole report is kept, and updated.
     let whole = results.join(REPORT);
     let in_part = matches!(which, Which::Survivors | Which::Changed);
     let before = if in_part { Some(read_report(&whole)?) } else { None };
@@ -189,7 +189,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     write(&path, commit).with_context(|| format!("cannot write {}", path.display()))
 }
 
-/// Take over what became of the mutants that were run again.
+/// Copies the outcomes of the mutants that were run again.
 fn update(whole: &mut Value, part: &Value) {
     let mut statuses = BTreeMap::new();
     for mutant in part["files"].as_object().into_iter().flatten().flat_map(|(_, file)| mutants(file)) {
@@ -211,7 +211,7 @@ fn mutants(file: &Value) -> impl Iterator<Item = &Value> {
     file["mutants"].as_array().into_iter().flatten()
 }
 
-/// What became of a mutant. One that never ended is a survivor in the report, with the reason beside it.
+/// Returns the outcome of a mutant. The report lists an endless mutant as a survivor, together with the reason.
 fn outcome(mutant: &Value) -> &str {
     let text = |key: &str| mutant[key].as_str().unwrap_or_default();
     match text("status") {
@@ -225,7 +225,7 @@ fn read_report(path: &Path) -> Result<Value> {
     Ok(serde_json::from_str(&text)?)
 }
 
-/// What became of the mutants of a report.
+/// Counts the outcomes of the mutants of a report.
 fn tally(report: &Value, page: &str) -> Result<Tally> {
     let explained = evidence::explained(page);
     let mut tally = Tally::default();

@@ -1,31 +1,31 @@
-//! What a terminal shows of the bytes that a program sends: as much of a terminal as live views and progress bars use.
+//! Terminal emulation: shows the bytes of a program, with the functions that live views and progress bars use.
 
-/// The cells of a terminal.
+/// Cells of a terminal.
 pub struct Picture {
     cells: Vec<Vec<char>>,
     at: (usize, usize),
-    /// The begin of a sequence or of a letter.
+    /// Start of an escape sequence or of a character.
     begun: Vec<u8>,
 }
 
 impl Picture {
-    /// An empty one.
+    /// Creates an empty picture.
     pub fn new(columns: u16, rows: u16) -> Self {
         let cells = vec![vec![' '; columns.into()]; rows.into()];
         Self { cells, at: (0, 0), begun: Vec::new() }
     }
 
-    /// Its rows, without spaces at their ends.
+    /// Returns its rows, without trailing spaces.
     pub fn rows(&self) -> Vec<String> {
         self.cells.iter().map(|row| row.iter().collect::<String>().trim_end().to_owned()).collect()
     }
 
-    /// Its rows as one text.
+    /// Returns its rows as one text.
     pub fn text(&self) -> String {
         self.rows().join("\n")
     }
 
-    /// Takes what a program sent.
+    /// Processes the bytes of a program.
     pub fn take(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.begun.push(*byte);

@@ -1,4 +1,4 @@
-//! A terminal with a person at it, and a command that runs there.
+//! A terminal with a user, and a command that runs there.
 
 use std::fs::File;
 use std::io::{Read, Write};
@@ -19,7 +19,7 @@ use test_kit::patience::Patience;
 
 use super::Picture;
 
-/// Reads what the command sends until the terminal is closed.
+/// Reads the command's output until the terminal is closed.
 fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
     let mut bytes = [0; 4096];
     let wait = Timespec { tv_sec: 0, tv_nsec: 20_000_000 };
@@ -36,20 +36,20 @@ fn read(mut from: File, closed: &AtomicBool, to: &Sender<Vec<u8>>) {
 
 /// A pseudo-terminal.
 pub struct Terminal {
-    /// What the person types goes here; closed, the terminal hangs up.
+    /// Input typed by the user; when closed, the terminal hangs up.
     person: Option<File>,
     slave: Option<OwnedFd>,
     closed: Arc<AtomicBool>,
     reader: Option<JoinHandle<()>>,
     sent: Receiver<Vec<u8>>,
-    /// What it shows.
+    /// Visible content.
     pub picture: Picture,
-    /// All bytes that came.
+    /// All bytes received.
     pub bytes: Vec<u8>,
 }
 
 impl Terminal {
-    /// Of this size.
+    /// Creates a terminal of this size.
     pub fn new(columns: u16, rows: u16) -> Self {
         let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
         grantpt(&master).and_then(|()| unlockpt(&master)).expect("it is ours");
@@ -57,7 +57,7 @@ impl Terminal {
         let slave = rustix::fs::open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("it opens");
         tcsetwinsize(&slave, Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
             .expect("its size");
-        // A command that had the person's end, too, would keep it from hanging up.
+        // A command that also had the user's end would keep the terminal from hanging up.
         for end in [&master, &slave] {
             fcntl_setfd(end, FdFlags::CLOEXEC).expect("its flags");
         }
@@ -83,7 +83,7 @@ impl Terminal {
         self.slave.as_ref().expect("it has not hung up").try_clone().expect("a handle")
     }
 
-    /// Starts a command with this terminal as its own, from which all it reads and to which all it prints, as a shell starts it.
+    /// Starts a command with this terminal as its controlling terminal, stdin and output, as a shell does.
     pub fn start(&self, command: &Command) -> Child {
         let mut own = Command::new("setsid");
         own.arg("--ctty").arg(command.get_program()).args(command.get_args());
@@ -101,12 +101,13 @@ impl Terminal {
         own.spawn().expect("it starts")
     }
 
-    /// The person types.
+    /// Types these keys.
     pub fn press(&mut self, keys: &str) {
         self.person.as_mut().expect("it has not hung up").write_all(keys.as_bytes()).expect("it takes keys");
     }
 
-    /// Takes in what the command sent, until the picture is as it is waited for; panics with the picture if that never comes.
+    /// Processes the command's output until the picture fulfils the condition; panics with the picture if that never
+    /// happens.
     pub fn until(&mut self, what: &str, reached: impl Fn(&Picture) -> bool) {
         let mut patience = Patience::begin();
         while !reached(&self.picture) {
@@ -117,7 +118,7 @@ impl Terminal {
         }
     }
 
-    /// The same for words.
+    /// Like [`Self::until`], for words.
     pub fn until_it_shows(&mut self, words: &str) {
         self.until(words, |picture| picture.text().contains(words));
     }
@@ -127,15 +128,15 @@ impl Terminal {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Hangs up, as a window that is closed: nobody has the other end any more.
+    /// Hangs up, like a closed window: no process has the other end any more.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
-        // The thread that reads has the last handle.
+        // The reading thread has the last handle.
         self.closed.store(true, Ordering::Relaxed);
         self.reader.take().map(JoinHandle::join);
     }
 
-    /// Waits for the end of the command: its exit code. What it printed last is in the picture.
+    /// Waits for the end of the command and returns its exit code. Its last output is in the picture.
     pub fn ends(&mut self, child: &mut Child) -> i32 {
         let mut patience = Patience::begin();
         let code = loop {
@@ -152,7 +153,7 @@ impl Terminal {
         code
     }
 
-    /// Lines are read as before, and keys are shown.
+    /// Returns `true` if lines are read as before, and keys are shown.
     pub fn is_as_before(&self) -> bool {
         let modes = tcgetattr(self.end()).expect("its modes").local_modes;
         modes.contains(LocalModes::ICANON | LocalModes::ECHO)

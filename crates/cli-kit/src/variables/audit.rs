@@ -1,4 +1,4 @@
-//! A walk over all options of a command line: each variable must be of an allowed kind.
+//! Audit of all options of a command line: each variable must be of an allowed kind.
 
 use std::collections::BTreeMap;
 
@@ -6,24 +6,24 @@ use clap::{Arg, ArgAction, Command, CommandFactory};
 
 use super::Variables;
 
-/// Why an option may have a variable.
+/// Reason why an option may have a variable.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Kind {
-    /// It names a port, a bus, an address, a host or a folder.
+    /// Name of a port, a bus, an address, a host or a folder.
     Place,
-    /// It names a file that is read, or one that belongs to the machine or the chain.
+    /// Name of a file that is read, or of a file that belongs to the machine or the chain.
     File,
-    /// It names a file or folder that one command writes.
+    /// Name of a file or folder that one command writes.
     Output,
-    /// It chooses the form of what is printed.
+    /// Format of the output.
     Format,
-    /// The rate of the line.
+    /// Rate of the line.
     Line,
-    /// A limit of time or of a disk of one command, which changes no motion.
+    /// Limit of time or disk space of one command, which changes no motion.
     Limit,
     /// A setting of a simulator.
     Simulator,
-    /// It makes a command send less.
+    /// Caution: makes a command send less.
     Caution,
 }
 
@@ -42,8 +42,9 @@ const PLACES: [&str; 11] = [
     "ORIGIN",
 ];
 
-/// All faults of the variables of a command line; empty when there is none. `allowed` lists each variable with the reason why it may
-/// exist; `without` lists options, as `update --data`, that name a file and have no variable all the same.
+/// Returns all faults of the variables of a command line; empty without faults. `allowed` lists each variable with
+/// the reason why it may exist; `without` lists options, as `update --data`, that name a file and still have no
+/// variable.
 pub fn faults<Cli: CommandFactory>(
     prefix: &str,
     variables: &Variables,
@@ -89,7 +90,7 @@ pub fn faults<Cli: CommandFactory>(
     faults
 }
 
-/// What stands in the lists and nowhere else.
+/// Finds entries of the lists that exist nowhere else.
 fn lists(
     root: &Command,
     variables: &Variables,
@@ -137,7 +138,7 @@ fn lists(
     faults
 }
 
-/// Why an option is not of this kind.
+/// Returns the reason why an option is not of this kind.
 fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     let is_flag = matches!(arg.get_action(), ArgAction::SetTrue | ArgAction::SetFalse);
     match kind {
@@ -151,7 +152,7 @@ fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     }
 }
 
-/// Two options of one variable are the same option of two commands.
+/// Returns `true` if two options of one variable are the same option of two commands.
 fn mean_the_same(kind: Kind, one: &Arg, other: &Arg) -> bool {
     let help = |arg: &Arg| arg.get_help().map(ToString::to_string);
     one.get_long() == other.get_long()
@@ -164,7 +165,7 @@ fn value_name(arg: &Arg) -> Option<String> {
     names.first().map(ToString::to_string)
 }
 
-/// All options with the words of their command, `update --data`; a global one once.
+/// Collects all options with the words of their command, `update --data`; a global option once.
 fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a Arg)>) {
     for arg in command.get_arguments().filter(|arg| words.is_empty() || !arg.is_global_set()) {
         if let Some(long) = arg.get_long() {
@@ -176,7 +177,7 @@ fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a
     }
 }
 
-/// All commands with their words.
+/// Returns all commands with their words.
 fn commands(root: &Command) -> Vec<(String, &Command)> {
     fn walk<'a>(command: &'a Command, words: &str, all: &mut Vec<(String, &'a Command)>) {
         all.push((words.to_owned(), command));

@@ -109,12 +109,12 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The parser's own environment is that of the test: the error is made by the words, and the variable is found for it.
+    // The parser's own environment is that of the test: the words cause the error, and the variable is found for it.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");
 }
 
-/// Each fault that an option could bring with it is found.
+/// Finds each possible fault of an option.
 #[test]
 fn the_audit_finds_options_that_must_not_have_a_variable() {
     assert_eq!(faults::<Cli>("TRY_", &VARIABLES, &ALLOWED, &[]), [""; 0]);

@@ -15,7 +15,7 @@ use serde_json::json;
 use crate::args::ArmCommand;
 pub use show::poses as poses_table;
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn arm(command: &ArmCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ArmCommand::Import(args) => import::import(args, out),
@@ -56,7 +56,7 @@ fn check(file: &Path, out: &Output) -> Result<(), Failure> {
     if refused { Err(Failure::shown(ErrorKind::Refused)) } else { Ok(()) }
 }
 
-/// A line for each finding; what is to be done stands once behind those that it is the same for.
+/// Formats a line for each finding; findings with the same next step are followed by it once.
 fn as_text(findings: &[ArmFinding]) -> String {
     let mut text = String::new();
     for (i, f) in findings.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! `jtc bench`: joints that are not there (J-53).
+//! `jtc bench`: absent joints (J-53).
 
 use cli_kit::{Failure, Output};
 use jtc_core::JOINTS;
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::args::{BenchCommand, LinkArgs};
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn bench(command: &BenchCommand, out: &Output) -> Result<(), Failure> {
     match command {
         BenchCommand::Absent { joints, deg, link } => {
@@ -52,7 +52,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// The absent joints in words.
+/// Describes the absent joints.
 pub fn words(absent: &[Option<f64>; JOINTS]) -> String {
     let all = Joint::ALL.iter().zip(absent);
     let all: Vec<String> =
@@ -64,7 +64,7 @@ fn as_text(absent: &[Option<f64>; JOINTS]) -> String {
     format!("absent: {}", words(absent))
 }
 
-/// The absent joints for programs.
+/// Returns the absent joints as JSON.
 pub fn as_json(absent: &[Option<f64>; JOINTS]) -> Value {
     let all = Joint::ALL.iter().zip(absent);
     let all: Vec<Value> = all

@@ -1,4 +1,4 @@
-//! `jtc traj continue`: on from where a run was broken off.
+//! `jtc traj continue`: resumes an interrupted run.
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
@@ -12,7 +12,7 @@ use super::named_arm;
 use super::run::{Course, perform};
 use crate::args::ContinueArgs;
 
-/// Finds the place, and runs the rest from there.
+/// Finds the resume point, and runs the remainder from there.
 pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     let recording = Recording::read(&args.run).map_err(Failure::nothing_sent)?;
     if let Some(cut) = &recording.cut {
@@ -40,13 +40,13 @@ pub fn continued(args: &ContinueArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Ok(Job::made(arm, words, out)), Some(&mut make), out)
 }
 
-/// What is left of a run, and of the runs that were to follow it.
+/// Remainder of a run, and the runs after it.
 struct Left {
-    /// The trajectory that was broken off, and where; `None` where only whole runs are left.
+    /// Interrupted trajectory and its resume point; `None` if only whole runs are left.
     current: Option<(Trajectory, BrokenOff)>,
-    /// What the runs behind it are of.
+    /// Trajectory of the following runs.
     then: Trajectory,
-    /// How many these are.
+    /// Number of these runs.
     runs: u32,
 }
 
@@ -72,7 +72,7 @@ impl Left {
         }
     }
 
-    /// Gives a job the rest, and what is run behind it.
+    /// Gives a job the remainder and the runs after it.
     fn make(&self, job: &mut Job, status: &Status, out: &Output) -> Result<(), Failure> {
         let rest = match &self.current {
             None => None,
@@ -91,7 +91,7 @@ impl Left {
                 Some(_) => format!("then the whole trajectory is run {times}, as was asked for"),
                 None => format!("the run that was broken off came to its end; the whole trajectory is run {times}, as was asked for"),
             });
-            // Before anything moves.
+            // Before the arm moves.
             let verdict = job.verdict(&self.then, None, UploadOptions::default());
             if !verdict.is_ok() {
                 return Err(job.refuse(&verdict, out));
@@ -104,7 +104,7 @@ impl Left {
     }
 }
 
-/// The trajectory that was run.
+/// Returns the trajectory of the run.
 fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajectory, Failure> {
     if let Some(file) = &args.trajectory {
         return Ok(Loaded::load(file, Some(&arm.joint_names)).map_err(Failure::nothing_sent)?.trajectory);
@@ -119,7 +119,7 @@ fn whole(args: &ContinueArgs, recording: &Recording, arm: &Arm) -> Result<Trajec
     })
 }
 
-/// The path time to go on from, ms, with the reason on stderr.
+/// Returns the path time of the resume point, ms, with the reason on stderr.
 fn place(
     job: &Job,
     whole: &Trajectory,

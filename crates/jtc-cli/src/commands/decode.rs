@@ -9,10 +9,10 @@ use serde_json::{Value, json};
 
 use super::status;
 
-/// Longest piece of noise that is shown byte by byte.
+/// Longest run of noise that is shown byte by byte.
 const SHOWN: usize = 32;
 
-/// Decodes stdin to its end. Exit code 2 when nothing in it is a frame.
+/// Decodes stdin to its end. Exit code 2 if it contains no frame.
 pub fn decode(out: &Output) -> Result<(), Failure> {
     let mut input = Vec::new();
     std::io::stdin().lock().read_to_end(&mut input)?;
@@ -72,7 +72,8 @@ fn hex(bytes: &[u8]) -> String {
     all.join(" ")
 }
 
-/// The byte streams of an input with their names; one without a name, unless the input marks directions.
+/// Returns the byte streams of an input with their names; a single one without a name, unless the input marks
+/// directions.
 fn streams(input: &[u8]) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let Some(text) =
         std::str::from_utf8(input).ok().filter(|t| t.chars().all(|c| !c.is_control() || c.is_whitespace()))

@@ -21,17 +21,17 @@ use crate::failure::output_lost;
 use crate::progress::Progress;
 use crate::tape::Tape;
 
-/// Seed of the demo: anyone's demo gives the same figures.
+/// Seed of the demo: every demo gives the same figures.
 const SEED: u64 = 1;
-/// Before and after the motion, what is recorded too.
+/// Time before and after the motion that is recorded too.
 const MARGIN: Duration = Duration::from_millis(400);
 /// Drives take 4 s for their first enable.
 const BRING_UP: Duration = Duration::from_secs(30);
 
-/// Files of the demo, in the order in which they are shown.
+/// Files of the demo, in the order of the output.
 const NAMES: [&str; 4] = ["report.html", "recording.mcap", "recording.csv", "picture.svg"];
 
-/// What the run leaves behind.
+/// Results of the run.
 struct Run {
     info: RecordingInfo,
     samples: Vec<Sample>,
@@ -104,7 +104,7 @@ pub fn demo(args: &DemoArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A port to `world` that takes a sample at each tick while it is recording.
+/// Returns a port to `world` that takes a sample at each tick while it is recording.
 fn observed(
     world: World,
     speed: SimSpeed,

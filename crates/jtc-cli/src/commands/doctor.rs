@@ -1,4 +1,4 @@
-//! `jtc doctor`: what is wrong with link, bus and set-up, in words with the next command.
+//! `jtc doctor`: faults of link, bus and set-up, with the next command.
 
 use std::time::Duration;
 
@@ -12,25 +12,25 @@ use serde_json::json;
 use super::status;
 use crate::args::LinkArgs;
 
-/// Listening at the rate asked for: 50 statuses.
+/// Listening time at the requested rate: 50 statuses.
 const LISTEN: Duration = Duration::from_secs(2);
-/// Listening at each other rate.
+/// Listening time at each other rate.
 const TRY: Duration = Duration::from_millis(300);
 
-/// Looks at everything; ends with 0 when nothing is a problem, 3 without a link, else 1.
+/// Checks everything; ends with 0 without a problem, 3 without a link, else 1.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let name = link.name()?;
     out.note(format!("listening on {name} at {} Bd", link.baud));
     let mut session = link.session()?;
     let mut seen = session.examine(LISTEN)?;
-    // A drive that answers although its joint is set absent has no bit of its own (J-53).
+    // A drive that answers although its joint is set absent has no separate bit (J-53).
     let external = seen.status.is_some_and(|status| status.errors & jtc_wire::error::EXTERNAL_JOINTS != 0);
     seen.absent = match &seen.status {
         Some(_) if external => absent(session.absent().unwrap_or_default()),
         Some(status) => jtc_host::words::absent(status),
         None => Vec::new(),
     };
-    // A stop and a jump of an encoder are under torque only.
+    // A held stop and an encoder jump occur only under torque.
     if seen.status.as_ref().is_some_and(jtc_host::words::has_torque) {
         seen.reactions = session.reactions();
     }
@@ -75,7 +75,7 @@ fn no_link(seen: &Observation) -> bool {
 fn other_rate(name: &str, own: u32, out: &Output) -> Option<u32> {
     RATES.into_iter().filter(|r| *r != own).find(|rate| {
         out.note(format!("no frame in what comes; trying {rate} Bd"));
-        // A Stop at a wrong rate would not get to the controller.
+        // A Stop at a wrong rate would not reach the controller.
         let port = SerialPort::open_without_door(name, *rate).ok();
         port.and_then(|p| Session::new(p).examine(TRY).ok()).is_some_and(|seen| seen.statuses > 0)
     })

@@ -34,7 +34,7 @@ pub fn dynamics(args: &DynamicsArgs, out: &Output) -> Result<(), Failure> {
         let written = if out.is_json() {
             writeln!(stdout, "{}", json!({ key(args.what): result }))
         } else {
-            // One digit before the point and sixteen after it: 17 significant ones, enough to give the same f64 back.
+            // 17 significant digits, one before the point and sixteen after it: enough to reproduce the same f64.
             let words: Vec<String> = result.iter().map(|v| format!("{v:.16e}")).collect();
             writeln!(stdout, "{}", words.join(" "))
         };

@@ -1,4 +1,4 @@
-//! `jtc firmware`: images, the drives of boards, flashing one, and what runs there.
+//! `jtc firmware`: images, drives of boards, flashing, and the running firmware.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -75,7 +75,7 @@ fn drive_json(drive: &Drive) -> Value {
     })
 }
 
-/// The image that was named; of the installed ones that of `board` where none was.
+/// Returns the named image, or the installed image for `board` if none was named.
 fn image(
     args: &ImageArgs,
     board: impl FnOnce(&Catalogue) -> Result<String, Failure>,
@@ -91,7 +91,7 @@ fn image(
     Ok(catalogue.image(&board)?)
 }
 
-/// The installed image of the board to which a drive belongs.
+/// Returns the installed image of the board to which a drive belongs.
 fn board_of(drive: &Drive, catalogue: &Catalogue) -> Result<String, Failure> {
     let fits = |board: &&String| drive.fit(board) == Fit::Same && !board.ends_with("-ldo");
     catalogue.images.iter().map(|image| &image.board).find(fits).cloned().ok_or_else(|| {
@@ -115,8 +115,8 @@ fn the_drive(places: &Places, named: Option<&PathBuf>) -> Result<Drive, Failure>
     }
 }
 
-/// The port that is asked beside those of the drive's own USB device: the one that is named, or the only one, where the board has to prove
-/// what it runs and the system does not say which port is its own.
+/// Returns the port that is queried in addition to those of the drive's own USB device: the named one, or the only one
+/// if the board must prove its firmware and the system does not say which port is its own.
 fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<String>, Failure> {
     match &link.port {
         Some(url) if url.contains("://") => {
@@ -134,7 +134,8 @@ fn named_port(link: &LinkArgs, has_own: bool, needed: bool) -> Result<Option<Str
     }
 }
 
-/// The only port that is there. One that another program has open counts: it may be that of the board.
+/// Returns the only port of the computer. A port that another program has open counts: the board may be connected to
+/// it.
 fn only_port() -> Result<String, Failure> {
     let there = |port: &PortInfo| matches!(port.problem, None | Some(PortError::Busy { .. }));
     let mut paths: Vec<String> = ports()?.into_iter().filter(there).map(|port| port.path).collect();
@@ -178,7 +179,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let permissions = Permissions { assume_board: args.assume_board, accept_supply: args.accept_supply };
     may_flash(&image, &drive, &before, permissions)?;
     let line = lines.proving().map(|(port, same_device)| (port.to_owned(), same_device));
-    // Another board that runs the image says nothing about this one.
+    // Another board that runs the image proves nothing about this board.
     if let Some(program) =
         before.own_info().find_map(|info| compare(&image, info).ok()).filter(|_| !args.again)
     {
@@ -191,7 +192,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     if let Some(question) = &question {
         confirm(question, "--yes")?;
     }
-    // A person may have thought about it for minutes.
+    // The user may have thought about the question for minutes.
     let now = lines.look()?;
     may_flash(&image, &drive, &now, permissions)?;
     if let Some(other) = now.to_confirm(&image).filter(|now| !args.yes && question.as_ref() != Some(now)) {
@@ -205,8 +206,8 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     let bar = out.bytes_bar(image.bytes().len() as u64, "copying");
     let mut lines = Some(lines);
     let written = put(&drive, &image, &mut |bytes| {
-        // Closed as soon as the copying has begun: with its drive the ST-LINK may take its serial port from USB, and one that is open then
-        // comes back under another name.
+        // Closed as soon as copying has begun: with its drive the ST-LINK may take its serial port from USB. An open
+        // port would then come back under another name.
         drop(lines.take());
         bar.set_position(bytes as u64);
     });
@@ -222,7 +223,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
         return Ok(());
     };
     out.note("copied; the ST-LINK writes it into the flash, and the board starts");
-    // The board may come back at another name.
+    // The board may come back under another name.
     let mut again = || {
         let own = places.ports_of(&drive).into_iter().next();
         open(own.as_ref().unwrap_or(&port), record.baud)
@@ -238,7 +239,7 @@ fn flash(args: &FlashArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A serial port, and whether it is of the drive's USB device.
+/// A serial port, and `true` if it belongs to the drive's USB device.
 type Line = (String, Option<bool>);
 
 fn result(
@@ -267,7 +268,7 @@ fn program_json(program: Program) -> Value {
     json!({ "bytes": program.bytes, "crc32": format!("{:08x}", program.crc32) })
 }
 
-/// What became of the arm in the board's memory.
+/// Names what happened to the arm in the board's memory.
 fn stored_arm(before: Option<bool>, after: bool) -> &'static str {
     match (before, after) {
         (Some(true), false) => "lost",

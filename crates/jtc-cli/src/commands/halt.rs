@@ -21,24 +21,24 @@ use crate::progress::Progress;
 
 /// A program that has just opened the port, or is about to close it, does not listen for this time.
 const CHANGES_HANDS: Duration = Duration::from_millis(500);
-/// The same where a program of this user has listened: it may be waiting for the end of another Stop.
+/// Like [`CHANGES_HANDS`], if a program of this user has listened: it may be waiting for the end of another Stop.
 const CHANGES_OWN_HANDS: Duration = Duration::from_secs(4);
-/// Programs that may have the port one after the other while one Stop is waited for.
+/// Largest number of programs that may have the port in turn during one Stop.
 const OWNERS: usize = 16;
 /// Time after which a Stop, or the end of teaching, is sent again while statuses do not show it.
 const AGAIN: Duration = Duration::from_millis(200);
-/// Longest time in which a stopped arm comes to rest.
+/// Longest time until a stopped arm is at rest.
 const REST: Duration = Duration::from_secs(5);
 
 /// The arm does not come to rest after a confirmed Stop.
 const STILL_MOVING: &str = "still-moving";
 
-/// Stops the arm, and waits until it stands.
+/// Stops the arm, and waits until it is at rest.
 pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arms = arms(link);
     let not_asked = if link.port.is_some() { Vec::new() } else { not_asked(&arms) };
     out.stream()?;
-    // No arm waits for the end of another one's Stop.
+    // Each arm's Stop runs in parallel, without waiting for another.
     let ends: Vec<Result<Stopped, Failure>> = std::thread::scope(|scope| {
         let stops: Vec<_> =
             arms.iter().map(|arm| scope.spawn(|| stop_one(arm, &Progress::begin(out)?))).collect();
@@ -64,7 +64,7 @@ pub fn stop(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         ends.iter().map(|end| end.as_ref().map_or_else(failed_json, Stopped::json)).collect();
     let accepted = ends.iter().flatten().any(|one| one.accepted);
     let mut value = json!({ "command": "stop", "accepted": accepted, "arms": arms, "not_asked": not_asked });
-    // The most urgent one: an arm moves.
+    // The most urgent failure: an arm still moves.
     failed.sort_by_key(|failure| failure.code != STILL_MOVING);
     if let Some(failure) = failed.first() {
         value["error"] = error_object(failure);
@@ -79,18 +79,18 @@ fn failed_json(failure: &Failure) -> Value {
     json!({ "error": error_object(failure) })
 }
 
-/// The ports on USB where no arm is stopped.
+/// Lists the ports on USB that get no Stop.
 fn not_asked(arms: &[Arm]) -> Vec<String> {
     let asked: Vec<&str> = arms.iter().filter_map(Arm::port).collect();
     if asked.is_empty() {
-        // The only port there is.
+        // The only port.
         return Vec::new();
     }
     let is_asked = |name: &String| asked.iter().any(|port| is_same_port(port, name));
     usb_names().into_iter().filter(|name| !is_asked(name)).collect()
 }
 
-/// Pauses on the path.
+/// Pauses the motion on its path.
 pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let (answer, words) = match reach(link, Halt::Pause, false).map_err(|error| error.told(Halt::Pause))? {
@@ -98,7 +98,7 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
             let mut session = *session;
             progress.watch(&mut session);
             session.pause().map_err(|error| match error {
-                // There is nothing to pause.
+                // There is no motion to pause.
                 Error::Link(LinkError::Refused { .. }) => error.into(),
                 error => unconfirmed(error).told(Halt::Pause),
             })?;
@@ -125,8 +125,8 @@ pub fn pause(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The arms that a Stop is for: that of the port which was named; else all that agents and programs of this user have, or that of the only
-/// port.
+/// Returns the arms to stop: that of the named port; else those of all agents and programs of this user, or that of the
+/// only port.
 fn arms(link: &LinkArgs) -> Vec<Arm> {
     if link.port.is_some() {
         return vec![Arm::Of { link: link.clone(), port: None }];
@@ -147,7 +147,7 @@ fn arms(link: &LinkArgs) -> Vec<Arm> {
     arms
 }
 
-/// The arms behind sockets. That of a program that was killed counts, too: its arm may be moving on.
+/// Returns the arms of programs with a socket. The socket of a killed program counts too: its arm may still be moving.
 #[cfg(unix)]
 fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
     let (alive, stale): (Vec<_>, Vec<_>) =
@@ -171,15 +171,15 @@ fn behind(link: &LinkArgs, agents: &[Registered]) -> Vec<Arm> {
 
 /// An arm to stop.
 enum Arm {
-    /// At a port, or of an agent that has this port.
+    /// An arm at a port, or of an agent that has this port.
     Of { link: LinkArgs, port: Option<String> },
-    /// Of the program that listens at this socket, or did; with its port, if it is there.
+    /// Arm of the program that listens, or listened, at this socket; with its port, if it exists.
     #[cfg(unix)]
     Behind { socket: PathBuf, link: LinkArgs },
 }
 
 impl Arm {
-    /// The port, where it is known.
+    /// Returns the port, if it is known.
     fn port(&self) -> Option<&str> {
         match self {
             Self::Of { port, .. } => port.as_deref(),
@@ -197,11 +197,11 @@ impl Arm {
     }
 }
 
-/// An arm that stands now.
+/// An arm at rest.
 struct Stopped {
-    /// The controller accepted the Stop.
+    /// `true` if the controller accepted the Stop.
     accepted: bool,
-    /// The arm was moving.
+    /// `true` if the arm was moving.
     moved: bool,
     state: String,
     trajectory: String,
@@ -240,11 +240,11 @@ fn holder_json(answer: &Answer) -> Value {
     json!({ "program": answer.program, "pid": answer.pid, "port": answer.port })
 }
 
-/// How far a halt got.
+/// Progress of a Stop or Pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Sent {
     Nothing,
-    /// It may have got to the controller.
+    /// The controller may have received it.
     Unconfirmed,
     /// The controller has received it.
     Confirmed,
@@ -268,12 +268,13 @@ impl NotHalted {
         Self { sent, failure: failure.into() }
     }
 
-    /// The same, after an earlier program has got a Stop so far.
+    /// Returns the result after an earlier program has got a Stop to `sent`.
     fn at_least(self, sent: Sent) -> Self {
         Self { sent: self.sent.max(sent), ..self }
     }
 
-    /// An operator who wants an arm to stand learns how far the halt got, and what stops the arm in any case.
+    /// Turns the failure into one that tells the operator how far the Stop or Pause got, and what stops the arm in any
+    /// case.
     fn told(self, halt: Halt) -> Failure {
         let name = if halt == Halt::Stop { "Stop" } else { "Pause" };
         if self.failure.code == STILL_MOVING {
@@ -293,22 +294,22 @@ impl NotHalted {
             ),
         };
         let next = self.failure.next.to_string();
-        // The words of an error may name the emergency stop alone.
+        // The text of an error may name only the emergency stop.
         let hint = if next.contains("emergency stop") { what } else { format!("{what}. {next}") };
         Failure { next: hint.trim_end_matches([' ', '.']).to_owned().into(), ..self.failure }
     }
 }
 
-/// How an arm is reached.
+/// Link to an arm.
 #[expect(clippy::large_enum_variant, reason = "there is one for each arm, for a moment")]
 enum Reached {
-    /// By a line of our own.
+    /// Own line.
     Line(Box<Session<LinkPort>>),
-    /// By the program that has the port, which has done it.
+    /// The program that has the port; it has executed the request.
     Holder(Answer, Option<End>),
 }
 
-/// Opens the line, or asks the program that has the port. `own`: a program of this user had it a moment ago.
+/// Opens the line, or asks the program that has the port. `own`: a program of this user had the port a moment ago.
 fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalted> {
     let start = Instant::now();
     loop {
@@ -329,7 +330,7 @@ fn reach(link: &LinkArgs, what: Halt, mut own: bool) -> Result<Reached, NotHalte
     }
 }
 
-/// A program of this user listens for this port, or did.
+/// Returns `true` if a program of this user listens for this port, or did.
 #[cfg(unix)]
 fn is_own(path: &str) -> bool {
     !halt::sockets_of(path).is_empty()
@@ -340,7 +341,7 @@ fn is_own(_: &str) -> bool {
     false
 }
 
-/// Asks the program that has this port, if it is one of this user that listens.
+/// Asks the program that has this port, if it belongs to this user and listens.
 #[cfg(unix)]
 fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     for socket in halt::sockets_of(path) {
@@ -351,7 +352,7 @@ fn ask(path: &str, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalte
     Ok(None)
 }
 
-/// Asks the program that listens at this socket. One that does not answer may have written the frame.
+/// Asks the program that listens at this socket. A program that does not answer may have written the frame.
 #[cfg(unix)]
 fn ask_at(socket: &std::path::Path, what: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     halt::ask(socket, what, &who()).map_err(|error| NotHalted::after(Sent::Unconfirmed, error))
@@ -362,7 +363,8 @@ fn ask(_: &str, _: Halt) -> Result<Option<(Answer, Option<End>)>, NotHalted> {
     Ok(None)
 }
 
-/// Stops one arm. A program that was stopped may end before the arm stands: then the port is free, or another program has it.
+/// Stops one arm. The stopped program may end before the arm is at rest: then the port is free, or another program has
+/// it.
 fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
     let (mut reached, mut first) = (reach_arm(arm), None::<Answer>);
     for _ in 0..OWNERS {
@@ -373,7 +375,7 @@ fn stop_one(arm: &Arm, progress: &Progress) -> Result<Stopped, NotHalted> {
             }
             Reached::Holder(answer, end) => (answer, end),
         };
-        // Its rate is that at which the controller answered.
+        // The rate at which the controller answered.
         let link = LinkArgs { port: Some(answer.port.clone()), baud: answer.baud, ..arm.link().clone() };
         let so_far = first.get_or_insert_with(|| answer.clone());
         so_far.accepted |= answer.accepted;
@@ -402,7 +404,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
                 if let Some((answer, end)) = ask_at(socket, Halt::Stop)? {
                     return Ok(Reached::Holder(answer, end));
                 }
-                // The program has ended, or answers others: the port is free, or the next program has it.
+                // The program has ended, or answers other clients: the port is free, or the next program has it.
                 if link.port.is_some() {
                     return reach(link, Halt::Stop, true);
                 }
@@ -417,14 +419,14 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     }
 }
 
-/// Stops over a line of our own. A Stop that the controller refuses has nothing to stop.
+/// Stops over an own line. If the controller refuses the Stop, there is no motion to stop.
 fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,
     holder: Option<Answer>,
 ) -> Result<Stopped, NotHalted> {
     progress.watch(&mut session);
-    // Statuses that come in before the Stop is confirmed count, too.
+    // Statuses received before the Stop is confirmed count, too.
     let (moved, own) = (Rc::<Cell<bool>>::default(), progress.clone());
     let seen = Rc::clone(&moved);
     session.observe(move |_, status| {
@@ -437,7 +439,7 @@ fn directly(
         Err(error) => return Err(unconfirmed(error)),
     };
     let confirmed = |error: Error| NotHalted::after(Sent::Confirmed, error);
-    // An arm that is taught is loose, and a Stop holds it.
+    // A taught arm is compliant, and a Stop holds it.
     let is_taught = |status: &Status| status.state == ControllerState::Teaching;
     let taught = session.last().is_some_and(is_taught);
     if taught {
@@ -452,7 +454,7 @@ fn directly(
                 session.end_teaching().map_err(confirmed)?;
             } else if is_paused(&status) {
                 match session.stop() {
-                    // The next statuses show what the controller does.
+                    // The next statuses show the state of the controller.
                     Ok(()) | Err(Error::Link(LinkError::Refused { .. })) => {}
                     Err(error) => return Err(confirmed(error)),
                 }
@@ -482,7 +484,7 @@ fn still_moving(end: &End) -> Failure {
     Failure::new(ErrorKind::Fault, STILL_MOVING, message).next(end.next_step())
 }
 
-/// An error of a frame that was written, or that an agent refused.
+/// Returns the failure of a frame that was written, or that an agent refused.
 fn unconfirmed(error: Error) -> NotHalted {
     let sent = match error {
         Error::Link(LinkError::Denied { .. }) => Sent::Nothing,

@@ -1,4 +1,4 @@
-//! `jtc info`: who the controller is; `jtc disable`: torque off at rest.
+//! `jtc info`: identity of the controller; `jtc disable`: torque off at rest.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use crate::ask::confirm;
 /// Drives change their state within this time.
 const DISABLED: Duration = Duration::from_secs(5);
 
-/// Prints who the controller is.
+/// Prints the identity of the controller.
 pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     let info = session.info()?;
@@ -39,7 +39,7 @@ pub fn info(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The hash as it is written everywhere.
+/// Formats the hash as in all outputs.
 pub fn hash(hash: u64) -> String {
     format!("{hash:016x}")
 }
@@ -98,7 +98,7 @@ fn as_text(info: &Info) -> String {
     )
 }
 
-/// The flight recorder, and what to do where it has stopped.
+/// Describes the flight recorder, and the next step if it has stopped.
 fn recorder(state: LogState) -> String {
     match state {
         LogState::Error | LogState::Reset => {
@@ -108,7 +108,7 @@ fn recorder(state: LogState) -> String {
     }
 }
 
-/// The last held stop and what goes on of its kind: a line each, with a line break before it.
+/// Describes the last held stop and current reactions: a line each, with a line break before it.
 fn reacting_words(reacting: &Reacting) -> String {
     let mut lines = Vec::new();
     let joints = |joints: &[u8]| {
@@ -162,7 +162,7 @@ fn without_extensions(s: &Status) -> String {
     )
 }
 
-/// Takes the torque off an arm that is held at rest.
+/// Removes the torque from an arm that is held at rest.
 pub fn disable(yes: bool, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut session = link.session()?;
     if !yes {

@@ -1,4 +1,4 @@
-//! A trajectory from a file at the speed asked for, with the arm that it is checked against, and what its check gives.
+//! Trajectory from a file at the requested speed, its arm, and the result of its check.
 
 use std::path::Path;
 
@@ -16,10 +16,10 @@ use serde_json::json;
 use super::named_arm;
 use crate::args::CheckArgs;
 
-/// Speeds tried between one that passes and one that does not.
+/// Number of speeds tried between one that passes and one that does not.
 const TRIES: usize = 4;
 
-/// A path as it can be typed in a shell.
+/// Formats a path for a shell.
 pub fn typed(path: &Path) -> String {
     let text = path.display().to_string();
     let plain = |c: char| c.is_alphanumeric() || "/._-+=:,@%".contains(c);
@@ -30,39 +30,39 @@ pub fn typed(path: &Path) -> String {
     }
 }
 
-/// The name of a file without directory and ending.
+/// Returns the name of a file without directory and ending.
 pub fn stem(path: &Path) -> String {
     path.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// The arm that was named, or the built-in one; its warnings go to stderr.
+/// Returns the named arm, or the built-in one; its warnings go to stderr.
 fn arm_of(args: &CheckArgs, out: &Output) -> Result<Arm, Failure> {
     let arm = named_arm::load(args.arm.as_deref())?;
     named_arm::note_warnings(&arm, out);
     Ok(arm)
 }
 
-/// A trajectory at the speed asked for, and the arm that it is checked against.
+/// A trajectory at the requested speed, and the arm for its check.
 pub struct Job {
-    /// What the file was, and what was derived from it.
+    /// Loaded file and the data derived from it.
     pub loaded: Loaded,
-    /// At the speed asked for.
+    /// Trajectory at the requested speed.
     pub trajectory: Trajectory,
     /// Masses, friction, names.
     pub arm: Arm,
-    /// Limits and settings that count.
+    /// Limits and settings in use.
     pub config: Config,
-    /// Those of the controller, once it was asked.
+    /// Configuration of the controller, after it was read.
     pub device: Config,
-    /// Who the controller is and the hash of its arm, once it was asked and where it knows.
+    /// Identity of the controller and hash of its arm, if it was read and the controller has them.
     pub identity: Option<(DeviceIdentity, u64)>,
-    /// File and arm, as they are typed.
+    /// File and arm, as typed.
     pub words: String,
-    /// What is run after it, and how often.
+    /// Trajectory to run after it, and the number of runs.
     pub later: Option<(Trajectory, u32)>,
     /// Percent of the file's own speed.
     speed: f64,
-    /// It is of no file: its motion is made once the arm's place is known.
+    /// `true` if no file was read: the motion is planned once the arm's position is known.
     made: bool,
 }
 
@@ -74,7 +74,7 @@ impl Job {
         Self::with(arm, loaded, file, args, out)
     }
 
-    /// The same of a trajectory that was read already.
+    /// Like [`Self::load`], with a trajectory that was already read.
     pub fn of(loaded: Loaded, file: &Path, args: &CheckArgs, out: &Output) -> Result<Self, Failure> {
         Self::with(arm_of(args, out)?, loaded, file, args, out)
     }
@@ -108,7 +108,7 @@ impl Job {
         })
     }
 
-    /// Of no file: the motion comes by [`Job::take`]. `words` is the command as it is typed.
+    /// Creates a job without a file: the motion comes from [`Job::take`]. `words` is the command as typed.
     pub fn made(arm: Arm, words: String, out: &Output) -> Self {
         named_arm::note_warnings(&arm, out);
         let loaded = Loaded {
@@ -134,14 +134,14 @@ impl Job {
         }
     }
 
-    /// The motion of this job.
+    /// Sets the motion of this job.
     pub fn take(&mut self, trajectory: Trajectory) {
         self.loaded.trajectory = trajectory.clone();
         self.trajectory = trajectory;
     }
 
-    /// The same way within the limits, where those of a way that was measured are not kept by its own times. What stays wrong is for
-    /// the check to name.
+    /// Plans the same path within the limits if a measured motion violates them with its own times. The check reports
+    /// the errors that remain.
     pub fn plan_anew(&mut self, out: &Output) {
         let verdict = self.verdict(&self.trajectory, None, UploadOptions::default());
         let Some(why) = verdict.refusals().next() else { return };
@@ -159,7 +159,8 @@ impl Job {
         self.trajectory = at_speed;
     }
 
-    /// What helps after a verdict, with the names that the person typed and the [passing speed](Self::passing_speed).
+    /// Returns the hint after a verdict, with the names that the user typed and the [passing
+    /// speed](Self::passing_speed).
     pub fn hint(&self, verdict: &Verdict, passing_speed: Option<f64>) -> Next {
         if self.made {
             return format!(
@@ -191,20 +192,20 @@ impl Job {
         verdict.hint_with(&self.words, self.speed, passing_speed)
     }
 
-    /// The file's numbers are degrees, and nothing else is wrong with them.
+    /// Returns `true` if the values are valid as degrees.
     fn passes_as_degrees(&self) -> bool {
         let degrees = self.loaded.clone().in_degrees().map(|loaded| loaded.trajectory);
         let at_speed = degrees.ok().and_then(|t| plan::at_speed(&t, self.speed).ok());
         at_speed.is_some_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
     }
 
-    /// The highest whole percentage that is tried and passes; none where no speed does, or speed is not what is wrong.
+    /// Returns the highest whole percentage that passes; `None` if no speed does, or if speed is not the problem.
     pub fn passing_speed(&self, verdict: &Verdict) -> Option<f64> {
         let passes = |percent: f64| {
             let slower = plan::at_speed(&self.loaded.trajectory, percent);
             slower.is_ok_and(|t| self.verdict(&t, None, UploadOptions::default()).is_ok())
         };
-        // The estimate may be too bold where torque is what is short, or too timid.
+        // The estimate may be too high if the torque is exceeded, or too low.
         let mut good = verdict.slower(self.speed)?;
         let mut bad = self.speed;
         while !passes(good) {
@@ -242,7 +243,7 @@ impl Job {
         Failure::shown(ErrorKind::Refused)
     }
 
-    /// A failure of this job, with the file's name where its hint leaves it open.
+    /// Adds the file's name to a failure of this job whose hint leaves it open.
     pub fn named(&self, failure: Failure) -> Failure {
         let again =
             if self.made { format!("jtc {}", self.words) } else { format!("jtc traj run {}", self.words) };
@@ -251,7 +252,7 @@ impl Job {
         Failure { next, ..failure }
     }
 
-    /// Parts of the torque that the check leaves out because the arm file does not give them.
+    /// Returns the parts of the torque that are missing in the check because the arm file does not give them.
     pub fn left_out(&self) -> Vec<&'static str> {
         let arm = &self.arm;
         let rotors = (0..JOINTS).any(|j| !arm.rotors_given[j] && self.config.joints[j].rotor_inertia == 0.0);
@@ -259,7 +260,7 @@ impl Job {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// What the torques leave out, and how to give it; none where nothing is left out.
+    /// Returns the parts that are missing in the torques, and how to give them; `None` if none is missing.
     pub fn without(&self) -> Option<String> {
         let parts = self.left_out();
         (!parts.is_empty()).then(|| {
@@ -272,19 +273,19 @@ impl Job {
         })
     }
 
-    /// Prints what the torques leave out, as a note.
+    /// Prints the missing parts of the torque, as a note.
     pub fn note_what_is_left_out(&self, out: &Output) {
         if let Some(words) = self.without() {
             out.note(format!("note: {words}"));
         }
     }
 
-    /// Makes motions for the arm of this job, within the limits that count; `friction` is the arm's.
+    /// Returns a planner for the arm of this job, within the limits in use; `friction` is the arm's.
     pub fn planner<'a>(&'a self, friction: Option<&'a Friction>) -> Planner<'a> {
         Planner { model: Some(&self.arm.model), friction, ..Planner::new(&self.config) }
     }
 
-    /// Limits of every point and between points, torque by the arm model; the start pose, where it is given.
+    /// Checks the limits at every point and between points, the torque by the arm model, and the start pose, if given.
     pub fn verdict(
         &self,
         trajectory: &Trajectory,

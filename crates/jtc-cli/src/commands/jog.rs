@@ -14,14 +14,14 @@ use crate::args::JogArgs;
 use crate::link::LinkPort;
 use jtc_host::session::BRING_UP;
 
-/// How long a key counts. A terminal repeats a key that is held after half a second, and then faster than this.
+/// Time for which a key counts. A terminal repeats a held key after half a second, and then faster than this.
 const HELD: Duration = Duration::from_millis(150);
 /// Rates of the keys, rad/s.
 const RATES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
-/// Index of the highest rate that the keys begin with.
+/// Index of the highest initial rate of the keys.
 const FIRST_MAX: usize = 2;
 
-/// Jogs until the keys, the time or a signal ends it; the arm rests then.
+/// Jogs until the keys, the time or a signal ends it; then the arm rests.
 pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
     let rate = args.rate.map(|rate| if args.deg { rate.to_radians() } else { rate });
     if let Some(rate) = rate
@@ -58,12 +58,12 @@ pub fn jog(args: &JogArgs, out: &Output) -> Result<(), Failure> {
         (Some(joint), Some(rate)) => one(&mut session, joint, rate, over),
         _ => with_keys(&mut session, out, over),
     };
-    // Whatever ended it: the arm comes to rest now, and not only when the controller has waited.
+    // After any end: stop the arm now, without waiting for the controller's timeout.
     let rested = without_error(session.last().copied()).and_then(|()| rest(&mut session));
-    // An error that has released the arm is the reason for whatever else went wrong, and nothing else may have.
+    // An error that has released the arm is the cause of all other failures, and may be the only failure.
     without_error(session.fresh_status().ok())?;
     let now = match (jogged, rested) {
-        // A held stop is the reason for which a jog was refused.
+        // A held stop is the reason why a jog was refused.
         (_, Err(failure)) if failure.code == "held-stop" => return Err(failure),
         (jogged, rested) => jogged.and(rested)?,
     };
@@ -97,7 +97,7 @@ fn one(
     session.jog_while(&velocity, over).map_err(refused)
 }
 
-/// Index of the rate that the keys begin with: for the slowest joint no more than a move's default share of its limit.
+/// Returns the index of the initial rate: for the slowest joint at most a move's default share of its limit.
 fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     let share = 1e-2 * session.move_speed(None)?.percent;
     let arm = if session.has_extensions() { session.device_arm()? } else { Arm::avena() };
@@ -105,21 +105,21 @@ fn first_rate(session: &mut Session<LinkPort>) -> Result<usize, Failure> {
     Ok(rate_within(share * limits.into_iter().fold(f64::INFINITY, f64::min)))
 }
 
-/// Index of the highest rate to begin with up to `most`, rad/s.
+/// Returns the index of the highest initial rate up to `most`, rad/s.
 fn rate_within(most: f64) -> usize {
     RATES[..=FIRST_MAX].iter().rposition(|rate| *rate <= most).unwrap_or(0)
 }
 
-/// Which joint the keys move, how fast, and until when.
+/// Joint that the keys move, its rate, and its end.
 struct Held {
     joint: Joint,
     rate: usize,
-    /// Direction, and when its key was seen last.
+    /// Direction, and the last time of its key.
     moving: Option<(f64, Duration)>,
 }
 
 impl Held {
-    /// A key was pressed; false when it ends everything.
+    /// Handles a key; returns `false` if the key ends the jog.
     fn press(&mut self, key: Key, now: Duration) -> bool {
         match key {
             Key::Char('q' | 'Q') | Key::Escape => return false,
@@ -131,13 +131,13 @@ impl Held {
             Key::Left | Key::Char('h' | 'a') => self.moving = Some((-1.0, now)),
             Key::Up | Key::Char('+' | '=') => self.rate = (self.rate + 1).min(RATES.len() - 1),
             Key::Down | Key::Char('-' | '_') => self.rate = self.rate.saturating_sub(1),
-            // Any other key is a hand that looks for the one that stops.
+            // Any other key stops: the user may be searching for the stop key.
             _ => self.moving = None,
         }
         true
     }
 
-    /// What is wanted now.
+    /// Returns the wanted velocity.
     fn velocity(&mut self, now: Duration) -> [f64; JOINTS] {
         self.moving = self.moving.filter(|(_, pressed)| now < *pressed + HELD);
         let mut velocity = [0.0; JOINTS];
@@ -186,7 +186,7 @@ fn with_keys(
     Ok(())
 }
 
-/// Jogging is refused for reasons of its own.
+/// Returns the failure of a refused jog, with its reason.
 fn refused(error: Error) -> Failure {
     let failure = Failure::of(&error);
     match &error {
@@ -203,7 +203,7 @@ fn refused(error: Error) -> Failure {
     }
 }
 
-/// The controller has not released the arm.
+/// Checks that the controller has not released the arm.
 fn without_error(status: Option<Status>) -> Result<(), Failure> {
     match status {
         Some(status) if status.state == ControllerState::Error => {
@@ -219,7 +219,7 @@ fn without_error(status: Option<Status>) -> Result<(), Failure> {
     }
 }
 
-/// Every joint stands.
+/// Waits until every joint is at rest.
 fn rest(session: &mut Session<LinkPort>) -> Result<Status, Failure> {
     eprint!("{}", if std::io::IsTerminal::is_terminal(&std::io::stderr()) { "\r\x1b[K" } else { "" });
     session.jog_to_rest().map_err(|error| Failure::of(&error))?.ok_or_else(|| {
@@ -239,7 +239,7 @@ mod tests {
         assert_eq!(held.velocity(ms(20)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(159)), [0.0, 0.0, 0.1, 0.0, 0.0, 0.0]);
         assert_eq!(held.velocity(ms(160)), [0.0; JOINTS]);
-        // Another key stops, and so does another joint.
+        // Another key stops, and so does another joint's key.
         for key in [Key::Char('x'), Key::Char('4'), Key::Home] {
             held.press(Key::Left, ms(200));
             assert_ne!(held.velocity(ms(201)), [0.0; JOINTS]);

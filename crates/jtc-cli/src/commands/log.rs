@@ -1,4 +1,4 @@
-//! `jtc log`: the flight recorder, what it holds, and running it again.
+//! `jtc log`: flight recorder, its content, and its replay.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use super::info::hash;
 use crate::args::{LinkArgs, LogCommand};
 use crate::failure::output_lost;
 
-/// Does one of the commands.
+/// Runs a command of the family.
 pub fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     match command {
         LogCommand::Fetch { out: file, report, arm, overwrite, link } => {
@@ -26,7 +26,7 @@ pub fn log(command: &LogCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// What is written, opened before anything else is done.
+/// Output files, opened before any other step.
 struct Files {
     recording: Option<OutputFile>,
     report: Option<OutputFile>,
@@ -53,7 +53,7 @@ impl Files {
     }
 }
 
-/// A log, and what it says.
+/// A log and its account.
 struct Read(Account);
 
 impl Read {
@@ -95,7 +95,7 @@ impl Read {
         })
     }
 
-    /// How much of it was replayed: a line, and one for each reason why not all.
+    /// Describes the replayed part: a line, and a line for each reason why a part is missing.
     fn extent(&self) -> Vec<String> {
         let replayed = &self.0.replayed;
         let verdict = match &replayed.difference {
@@ -152,7 +152,7 @@ impl Read {
         lines.join("\n")
     }
 
-    /// What happened, as a table of the page.
+    /// Returns the events as a table of the page.
     fn facts(&self) -> Vec<Facts> {
         let rows =
             self.0.story.events.iter().map(|event| (format!("{:.3} s", event.time_s), event.text.clone()));

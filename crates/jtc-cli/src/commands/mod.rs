@@ -41,7 +41,7 @@ use cli_kit::{Failure, Output, pages};
 
 use crate::args::Command;
 
-/// Does what the command line asks for.
+/// Runs the command.
 pub fn run(command: Command, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Demo(args) => demo::demo(&args, out),

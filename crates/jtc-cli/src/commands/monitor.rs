@@ -1,4 +1,4 @@
-//! `jtc monitor`: the controller live. A full view on a terminal, one line a status elsewhere.
+//! `jtc monitor`: live view of the controller. A full view on a terminal, else one line per status.
 
 mod joints;
 mod view;
@@ -15,12 +15,12 @@ use crate::args::MonitorArgs;
 use crate::link::LinkPort;
 use view::View;
 
-/// 25 pictures a second are enough, however fast statuses come.
+/// Shortest period of views: 25 a second are enough at any rate of statuses.
 const PICTURE: Duration = Duration::from_millis(40);
-/// After so long a silence what was received last is no news any more.
+/// Time without a status after which the last values count as outdated.
 const SILENT: Duration = Duration::from_secs(1);
 
-/// Shows statuses until `q`, Ctrl-C, or so many of them.
+/// Shows statuses until `q`, Ctrl-C, or the requested number of them.
 pub fn monitor(args: &MonitorArgs, out: &Output) -> Result<(), Failure> {
     let stop = Stop::listen()?;
     let mut session = args.link.session()?;
@@ -108,7 +108,7 @@ fn live(
     Ok(())
 }
 
-/// Stops the motion on its path; what became of it.
+/// Stops the motion on its path and returns the result.
 fn stop_motion(session: &mut Session<LinkPort>) -> String {
     match session.stop() {
         Ok(()) => "stopping on the path".into(),

@@ -1,4 +1,4 @@
-//! `jtc move`: from where the arm is to joint positions or a pose.
+//! `jtc move`: moves the arm from its position to joint positions or a pose.
 
 use cli_kit::{Failure, Output};
 use jtc_host::arm::Arm;
@@ -11,7 +11,7 @@ use super::plan::note_low_margin;
 use super::run::{Course, perform};
 use crate::args::{MoveArgs, Target};
 
-/// Plans the move once it is known where the arm stands, and runs it.
+/// Plans the move once the position of the arm is known, and runs it.
 pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     if let Some(percent) = args.speed.filter(|percent| !(1.0..=100.0).contains(percent)) {
         return Err(Failure::nothing_sent(PlanError::Speed { percent, most: 100.0 }));
@@ -46,7 +46,7 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
         let temperature = coldest(status);
         let (speed_pct, margin_pct) = (speed.percent, args.margin.percent);
         let planner = Planner { speed_pct, margin_pct, temperature, ..job.planner(friction.as_ref()) };
-        // The start is where the arm stands, the end what was asked for.
+        // The start is the position of the arm, the end the requested target.
         let planned = planner.to_target(&job.arm.model, &status.positions(), &target, args.line);
         let planned = planned.map_err(|e| refused(&e, &name))?;
         for note in &planned.notes {
@@ -62,7 +62,7 @@ pub fn move_to(args: &MoveArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, load, Some(&mut make), out)
 }
 
-/// Where the move leads.
+/// Returns the target of the move.
 fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
     let joints = match (&args.to, args.to_flange) {
         (Some(Target::Joints(q)), _) if args.deg => q.map(f64::to_radians),
@@ -78,13 +78,13 @@ fn target(args: &MoveArgs, arm: &Arm) -> Result<kinematics::Target, Failure> {
     Ok(kinematics::Target::Joints(joints))
 }
 
-/// The lowest bearing temperature that is measured, °C, and no less than that of a cold hall where some are not.
+/// Returns the lowest measured bearing temperature, °C, but at most that of a cold hall.
 fn coldest(status: &jtc_wire::Status) -> f64 {
     let measured = status.joints.iter().map(|joint| f64::from(joint.temperature));
     measured.fold(COLD, f64::min)
 }
 
-/// There is no such move.
+/// Returns the failure of an impossible move.
 fn refused(error: &PlanError, name: &str) -> Failure {
     let message = format!("no move to {name}: {}", error.of_move());
     let failure = Failure { message, ..Failure::of(error) };

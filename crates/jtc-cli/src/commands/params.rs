@@ -13,7 +13,7 @@ use crate::limits;
 use crate::link::LinkPort;
 use crate::progress::Progress;
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn params(command: &ParamsCommand, out: &Output) -> Result<(), Failure> {
     match command {
         ParamsCommand::Push { files, friction, accept, link } => {
@@ -64,7 +64,7 @@ fn push(
     let tried = set.pid.is_some() && await_trial(&mut session, out)?;
     let status = session.fresh_status()?;
     let missing = words::missing_parameters(status.jtc_init);
-    // What was neither sent nor is missing: the controller had it before, from whom is not known.
+    // Parameters that were neither sent nor are missing: the controller had them before, from an unknown source.
     let kept: Vec<&str> = if missing.is_empty() { set.missing() } else { Vec::new() };
     let not_given = read.arm.as_ref().map_or(Vec::new(), Arm::settings_not_given);
     let value = json!({
@@ -98,12 +98,12 @@ fn push(
     Ok(())
 }
 
-/// Waits for what comes of gains that an arm under torque was given. Returns whether they were tried.
+/// Waits for the result of gains given to an arm under torque. Returns `true` if they were tried.
 pub(super) fn await_trial(session: &mut Session<LinkPort>, out: &Output) -> Result<bool, Failure> {
     Ok(session.await_trial(|| out.note("the gains are on trial for two seconds"))?)
 }
 
-/// Refuses gains that do not keep the arm stable: that of the files, or the one that the controller has.
+/// Refuses gains that do not keep the arm stable: the arm of the files, or that of the controller.
 fn check_gains(
     read: &ParameterFile,
     set: &ParameterSet,
@@ -112,7 +112,7 @@ fn check_gains(
     let Some(pid) = set.pid else { return Ok(()) };
     let arm = match &read.arm {
         Some(arm) => Some(arm.clone()),
-        // One that cannot be read yet has no torque yet.
+        // An arm that cannot be read yet has no torque yet.
         None if session.info()?.is_some() => session.device_arm().ok(),
         None => None,
     };
@@ -212,7 +212,7 @@ fn as_text(set: &ParameterSet) -> String {
     text
 }
 
-/// What the files hold together, later ones over earlier ones; what could not be carried over goes to stderr.
+/// Loads the files; later ones override earlier ones. Warnings go to stderr.
 fn load(files: &[PathBuf], out: &Output) -> Result<ParameterFile, Failure> {
     let read = ParameterFile::load_all(files)?;
     for warning in &read.warnings {

@@ -1,4 +1,4 @@
-//! `jtc payload`: what the arm carries at its flange (J-60).
+//! `jtc payload`: payload at the flange (J-60).
 
 use cli_kit::{Failure, Output};
 use jtc_core::Payload;
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::args::{LinkArgs, PayloadCommand};
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PayloadCommand::Set { body, link } => set(&body.payload(), link, out),
@@ -20,7 +20,7 @@ pub fn payload(command: &PayloadCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn set(payload: &Payload, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
-    // Before a port is looked for.
+    // Before the search for a port.
     payload.check().map_err(|e| Failure::usage(format!("{e}; nothing was sent")))?;
     let mut session = link.session()?;
     let before = session.payload()?;

@@ -16,7 +16,7 @@ use super::job::{stem, typed};
 use super::{named_arm, run_report};
 use crate::args::PlanArgs;
 
-/// A blend for corners that are not there.
+/// Message for a blend without corners to round.
 const NO_LINES: &str = "--blend-m rounds the corners between lines and arcs, and this motion has none: give --line, or a column `leg`";
 
 /// Plans, checks and writes.
@@ -29,7 +29,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     named_arm::note_warnings(&arm, out);
     let file = WaypointFile::load(&args.file)?;
     let file = if args.deg { file.in_degrees()? } else { file };
-    // Before anything is opened: a line that cannot be leaves no file.
+    // Before any file is opened: an impossible line leaves no file.
     let blend = if args.deg { args.blend.to_radians() } else { args.blend };
     let options = WayOptions { line: args.line, blend, blend_m: args.blend_m };
     let way = Way::of(&file, &arm, options).map_err(|e| unplanned(&e, &file))?;
@@ -74,7 +74,7 @@ pub fn plan(args: &PlanArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// That the flange leaves the straight line between two of its poses.
+/// Notes that the flange leaves the straight line between two of its poses.
 fn off_the_line(aside: Aside) -> String {
     let (to, mm) = (aside.waypoint, 1e3 * aside.distance_m);
     format!(
@@ -84,7 +84,7 @@ fn off_the_line(aside: Aside) -> String {
     )
 }
 
-/// What is written is CSV: under the ending of another form hardly a command would read it.
+/// Checks that the output has an ending for CSV: under the ending of another format hardly any command would read it.
 fn readable(out: &Path) -> Result<(), Failure> {
     let ending = out.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     if ["mcap", "yaml", "yml", "json", "toml", "urdf", "xml", "html"].contains(&ending.as_str()) {
@@ -102,12 +102,12 @@ fn readable(out: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// With the lines of the file that waypoints stand in.
+/// Adds the lines of the file to the waypoints in an error.
 fn located(error: &PlanError, file: &WaypointFile) -> Failure {
     Failure { message: file.located(error), ..Failure::of(error) }
 }
 
-/// The same of what is no way.
+/// Like [`located`], also for waypoints without a possible path.
 fn unplanned(error: &WaypointError, file: &WaypointFile) -> Failure {
     match error {
         WaypointError::Route(e) => located(e, file),
@@ -158,7 +158,7 @@ fn print(planned: &Planned, waypoints: usize, args: &PlanArgs, out: &Output) {
     });
 }
 
-/// For how long which limit of a joint binds; a dash where none does.
+/// Returns how long each limit of a joint binds; a dash if none does.
 fn binds(binding: &[Bound], joint: Joint) -> String {
     let mut limits: Vec<(&str, f64)> = Vec::new();
     for bound in binding.iter().filter(|bound| bound.joint == joint) {
@@ -173,19 +173,19 @@ fn binds(binding: &[Bound], joint: Joint) -> String {
     if words.is_empty() { "-".into() } else { words.join(", ") }
 }
 
-/// The smallest torque margin of a motion as a line; empty where none was computed.
+/// Returns the smallest torque margin of a motion as a line; empty if none was computed.
 pub fn margin_line(margin: Option<TorqueMargin>) -> String {
     margin.map_or(String::new(), |margin| format!("{margin}\n"))
 }
 
-/// Prints a warning where the torque margin is low.
+/// Prints a warning if the torque margin is low.
 pub fn note_low_margin(margin: Option<TorqueMargin>, out: &Output) {
     if let Some(warning) = margin.and_then(|margin| margin.warning()) {
         out.note(format!("warning: {warning}"));
     }
 }
 
-/// The margin that was asked for, and the one that is left.
+/// Returns the requested margin and the remaining one.
 fn margin_words(planned: &Planned, percent: f64) -> String {
     let asked = format!("{percent} % of each limit");
     match planned.verdict.margin {
@@ -196,7 +196,7 @@ fn margin_words(planned: &Planned, percent: f64) -> String {
     }
 }
 
-/// The page of a run, with what is commanded alone, and what binds it.
+/// Returns the page of a motion, with the commanded values only, and its limiting constraints.
 fn report(planned: &Planned, arm: &Arm, planner: &Planner, args: &PlanArgs) -> String {
     let info = run_report::info(arm, "planned, not run", &stem(&args.out), 0);
     let trajectory = &planned.trajectory;

@@ -1,4 +1,4 @@
-//! `jtc ports`: what is there, and why something cannot be used.
+//! `jtc ports`: available ports, and the reason if a port cannot be used.
 
 use cli_kit::{Diagnose, Failure, Output};
 use jtc_host::port::{PortKind, list};

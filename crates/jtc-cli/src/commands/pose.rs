@@ -10,7 +10,7 @@ use super::arm::poses_table;
 use super::job::typed;
 use crate::args::{LinkArgs, PoseCommand};
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
     match command {
         PoseCommand::Save { name, arm, link, overwrite } => save(name, &arm.arm, link, *overwrite, out),
@@ -25,7 +25,7 @@ pub fn pose(command: &PoseCommand, out: &Output) -> Result<(), Failure> {
 }
 
 fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output) -> Result<(), Failure> {
-    // Before the controller is asked: what is wrong with name or file is wrong without it.
+    // Before the controller is asked: an error in name or file does not depend on it.
     let arm = Arm::load(file)?;
     if arm.poses.contains_key(name) && !overwrite {
         let path = file.to_owned();
@@ -35,7 +35,7 @@ fn save(name: &str, file: &Path, link: &LinkArgs, overwrite: bool, out: &Output)
     save_pose(file, name, &position, overwrite)?;
     let arm = Arm::load(file)?;
     let saved = arm.poses.get(name).copied().unwrap_or(position);
-    // Saved all the same: limits may be what is wrong.
+    // Still saved: the limits may be wrong.
     if let Err(outside) = arm.pose(name) {
         out.note(format!("warning: {outside}: no motion leads there"));
     }

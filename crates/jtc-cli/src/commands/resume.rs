@@ -1,4 +1,4 @@
-//! `jtc traj resume`: on after a pause, with a check of what remains where it is known.
+//! `jtc traj resume`: resumes after a pause, and checks the remainder if the trajectory is known.
 
 use cli_kit::{ErrorKind, Failure, Output};
 use jtc_host::error::MotionError;
@@ -12,7 +12,7 @@ use crate::args::ResumeArgs;
 use crate::link::LinkPort;
 use crate::progress::Progress;
 
-/// Goes on, unless what remains of the trajectory that was named does not pass the check any more (J-36, J-60).
+/// Resumes, unless the remainder of the named trajectory no longer passes the check (J-36, J-60).
 pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let progress = Progress::begin(out)?;
     let job = args.trajectory.as_deref().map(|file| Job::load(file, &args.check, out)).transpose();
@@ -20,7 +20,7 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     let mut session = args.link.session()?;
     progress.watch(&mut session);
     let status = session.fresh_status()?;
-    // Else the session names what is wrong.
+    // Otherwise the session reports the error.
     if status.trajectory == TrajectoryState::Pause {
         match &mut job {
             Some(job) => check_rest(job, args.check.arm.is_none(), &mut session, &status)?,
@@ -33,7 +33,8 @@ pub fn resume(args: &ResumeArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The rest of the trajectory, from where it is paused, within the limits of the controller with its payload.
+/// Checks the remainder of the trajectory, from the place of the pause, against the limits of the controller with its
+/// payload.
 fn check_rest(
     job: &mut Job,
     arm_of_device: bool,
@@ -65,7 +66,7 @@ fn check_rest(
     })
 }
 
-/// This program did not load the motion, and a controller does not give it back.
+/// Notes that the remainder is not checked: this program did not load the motion, and a controller does not return it.
 fn note_what_is_not_checked(session: &mut Session<LinkPort>, out: &Output) -> Result<(), Failure> {
     let payload = session.payload()?;
     if session.has_extensions() {

@@ -1,4 +1,4 @@
-//! `jtc traj run`, and what other commands that move along a path share with it: check, upload, execute, follow, report.
+//! `jtc traj run`, and the steps that it shares with other motion commands: check, upload, execute, follow, report.
 
 mod approach;
 mod conclude;
@@ -25,35 +25,35 @@ use conclude::conclude;
 use outputs::Outputs;
 use terminal::{Terminal, cancelled};
 
-/// What a motion is run with, whichever command asks for it.
+/// Settings of a motion, for all commands that run one.
 #[derive(Clone, Debug)]
 pub struct Course {
-    /// Link, files that it writes, what is accepted.
+    /// Link, files that the motion writes, accepted risks.
     pub execute: ExecuteArgs,
-    /// As recordings name it.
+    /// Name in recordings.
     pub name: String,
-    /// Whose first point an approach leads to, as it is typed.
+    /// Name of the trajectory that an approach leads to, as typed.
     pub words: String,
-    /// Files that the command reads, which are no outputs.
+    /// Files that the command reads, which must not be outputs.
     pub inputs: Vec<PathBuf>,
-    /// The arm was named, and has to be that of the controller.
+    /// `true` if the arm was named, and must be that of the controller.
     pub arm_named: bool,
-    /// Where the arm stands elsewhere it is moved to the first point.
+    /// `true` if the arm is moved to the first point when it stands elsewhere.
     pub approach: bool,
-    /// Speed of a move or an approach, %, where it was named.
+    /// Speed of a move or an approach, %, if it was named.
     pub speed: Option<f64>,
-    /// Option that names it; empty: the command has none.
+    /// Option for the speed; empty if the command has none.
     pub speed_option: &'static str,
     pub points_per_segment: Option<usize>,
-    /// How often the motion is run.
+    /// Number of runs of the motion.
     pub repeat: u32,
 }
 
-/// Makes the trajectory of a job once it is known where the arm stands, and how fast a move is on this controller.
+/// Creates the trajectory of a job once the position of the arm, and the speed of a move on this controller, are known.
 pub type Make<'a> = &'a mut dyn FnMut(&mut Job, &Status, MoveSpeed) -> Result<(), Failure>;
 
 impl Course {
-    /// That of a trajectory file.
+    /// Returns the settings for a trajectory file.
     pub fn of(args: &RunArgs) -> Self {
         Self {
             execute: args.execute.clone(),
@@ -84,7 +84,7 @@ pub fn run(args: &RunArgs, out: &Output) -> Result<(), Failure> {
     perform(&course, |out| Job::load(&args.file, &args.check, out), None, out)
 }
 
-/// Runs a job: that of a file as it is, or one whose motion is made once the arm's place is known.
+/// Runs a job: a file unchanged, or a motion that is planned once the position of the arm is known.
 pub fn perform(
     course: &Course,
     load: impl FnOnce(&Output) -> Result<Job, Failure>,
@@ -99,8 +99,8 @@ pub fn perform(
     drive(course, &mut job, make, &progress, out).map_err(|failure| job.named(failure))
 }
 
-/// The arm of the controller and that of the job are one (J-55): the controller's own where none was named, else a refusal. From
-/// then on its settings count.
+/// Checks that the arm of the controller is that of the job (J-55). Without a named arm the controller's own arm is
+/// used, else a difference is refused. From then on the controller's settings count.
 fn match_device(
     session: &mut Session<LinkPort>,
     job: &mut Job,
@@ -125,7 +125,7 @@ fn match_device(
             }
         }
     }
-    // Where nothing differs, these are the arm's own, with the rotors that a file may have left open.
+    // Without differences these are the arm's own settings, with the rotors that a file may have left open.
     job.config = job.arm.config_on_device(&job.device);
     if job.device.payload.is_there() {
         out.note(format!(
@@ -137,7 +137,7 @@ fn match_device(
     Ok(())
 }
 
-/// A motion that is known before the arm is asked passes the check first, and one that is repeated leads back to its start.
+/// Checks a motion that is known before the arm is asked; a repeated motion must end at its start.
 fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failure> {
     let verdict = job.verdict(&job.trajectory, None, course.upload());
     if !verdict.is_ok() {
@@ -153,7 +153,7 @@ fn checked_before(course: &Course, job: &Job, out: &Output) -> Result<(), Failur
     }
 }
 
-/// The failure of a run that cannot be repeated.
+/// Returns the failure of a run that cannot be repeated.
 fn open_path(open: &OpenPath, course: &Course) -> Failure {
     Failure { message: format!("{}: {open}", course.words), ..Failure::of(open) }
 }
@@ -213,7 +213,7 @@ fn ready(session: &mut Session<LinkPort>, operator: &Operator) -> Result<Status,
 }
 
 impl Job {
-    /// How its motions are checked.
+    /// Returns the options of its checks.
     fn options(&self, course: &Course) -> CheckOptions {
         let accept_device_limits = course.accepts_device_limits();
         CheckOptions { upload: course.upload(), accept_device_limits, device: self.device.clone() }

@@ -1,4 +1,4 @@
-//! What a run reports at its end: figures per joint as a table and as JSON, and the files made of it.
+//! Report at the end of a run: figures per joint as a table and as JSON, and the output files.
 
 use cli_kit::table;
 use jtc_host::arm::Arm;
@@ -7,7 +7,7 @@ use jtc_host::report::{RunFailure, Summary};
 use jtc_host::session::{LinkStatistics, UploadReport};
 use jtc_wire::{Joint, Status, TrajectoryState};
 
-/// The description that a recording of this arm carries.
+/// Returns the description in a recording of this arm.
 pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> RecordingInfo {
     RecordingInfo {
         source: source.to_owned(),
@@ -17,7 +17,7 @@ pub fn info(arm: &Arm, source: &str, trajectory: &str, start_unix_ns: u64) -> Re
     }
 }
 
-/// What broke first, where something did, and then the figures.
+/// Returns the first failure, if there was one, and then the figures.
 pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     let Some(failure) = failure else { return figures(summary) };
     let rows: Vec<Vec<String>> = failure.rows().into_iter().map(|row| row.to_vec()).collect();
@@ -36,7 +36,7 @@ pub fn verdict(failure: Option<&RunFailure>, summary: &Summary) -> String {
     )
 }
 
-/// The figures as a table.
+/// Returns the figures as a table.
 pub fn figures(summary: &Summary) -> String {
     let rows: Vec<Vec<String>> = Joint::ALL
         .iter()
@@ -57,19 +57,19 @@ pub fn figures(summary: &Summary) -> String {
     table(&head, &rows)
 }
 
-/// A figure with so many decimals, or a dash where it is not known.
+/// Formats a figure with `digits` decimals, or a dash if it is unknown.
 fn figure(value: Option<f64>, digits: usize) -> String {
     value.map_or("-".into(), |v| cli_kit::figure(v, digits))
 }
 
-/// The keys of an upload as an event.
+/// Returns the result of an upload as an event.
 pub fn uploaded(phase: &str, upload: &UploadReport) -> serde_json::Value {
     let mut value = serde_json::to_value(upload).unwrap_or_default();
     value["phase"] = phase.into();
     value
 }
 
-/// The link in one line.
+/// Describes the link in one line.
 pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     let share = upload.line_share_percent().map_or(String::new(), |s| format!(" ({s:.1} % of the line)"));
     format!(
@@ -78,7 +78,7 @@ pub fn link_line(upload: &UploadReport, link: &LinkStatistics) -> String {
     )
 }
 
-/// A motion in one line, for below its bar: what it does, and the joint that is nearest to what it can.
+/// Describes a motion in one line, below its bar: its state, and the joint that is closest to a limit.
 pub fn motion_line(s: &Status) -> String {
     let what = match s.trajectory.known() {
         Some(TrajectoryState::Stop) => "stopped",

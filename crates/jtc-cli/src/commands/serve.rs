@@ -28,7 +28,7 @@ use super::named_arm;
 use super::simulated::simulated;
 use crate::args::ServeArgs;
 
-/// Longest that the end of the agent waits for a motion to stop.
+/// Longest wait for a motion to stop at the end of the agent.
 const STOPPING: Duration = Duration::from_secs(5);
 
 /// Owns the port until SIGINT or SIGTERM; a motion is stopped on its path first.
@@ -45,7 +45,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     })?;
     let store = args.trajectories.as_deref().map_or_else(|| Ok(Store::in_memory()), Store::open)?;
     if args.sim && args.arm.is_none() && args.trajectories.is_none() {
-        // A motion to try: whoever has only just met the arm has none.
+        // A motion to try, because a new user has none.
         store.put(1, "example motion", &demo_motion().to_exact_csv(), false)?;
     }
     let tls = args.tls_cert.as_deref().zip(args.tls_key.as_deref());
@@ -64,7 +64,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     let (url, name) = (format!("{}://{listen}", if tls.is_some() { "https" } else { "http" }), port.name());
     let log = Arc::new(Mutex::new(log));
     let left = if args.sim { None } else { keep_policies(&name, &log, out)? };
-    // A relative name would be another port in another directory.
+    // A relative name would name another port in another directory.
     let name = std::fs::canonicalize(&name).map_or(name, |path| path.display().to_string());
 
     let witness = recordings.as_mut().and_then(Prepared::witness);
@@ -89,7 +89,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
         token_file: std::path::absolute(&token_file)?,
         certificate: args.tls_cert.as_deref().map(std::path::absolute).transpose()?,
     };
-    // Without it every command can still be given the address.
+    // Without the registration every command can still get the address as an option.
     let registration = register(&registered).ok().flatten();
     if !listen.ip().is_loopback() && tls.is_none() {
         out.note("note: tokens and commands go over the network as they are: use it where you trust everyone on it, or --tls-cert and --tls-key");
@@ -136,7 +136,7 @@ pub fn serve(args: &ServeArgs, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// Where PLCs are to connect, if they are.
+/// Opens the listener for PLCs, if requested.
 fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     let Some(at) = args.modbus else { return Ok(None) };
     if !at.ip().is_loopback() && args.modbus_allow.is_empty() {
@@ -152,16 +152,17 @@ fn listen_modbus(args: &ServeArgs) -> Result<Option<TcpListener>, Failure> {
     Ok(Some(listener))
 }
 
-/// The arm moves by this status, or can be led by hand.
+/// Returns `true` if the arm moves by this status, or can be led by hand.
 fn moves(status: &Status) -> bool {
     status.is_executing() || status.state == ControllerState::Teaching
 }
 
-/// A motion that nobody could stop any more is stopped first, and teaching ended: the arm is held. Whether the controller reports that.
+/// Stops a motion first, because no client can stop it any more, and ends teaching: the arm is held. Returns `true` if
+/// the controller reports that.
 fn come_to_rest(line: &Line, out: &Output) -> bool {
     let began = line.now();
     line.with(|line, now| line.end(now));
-    // By what the controller reports from then on.
+    // Uses only reports of the controller from now on.
     let rests = || {
         line.with(|line, _| {
             line.is_idle() && line.status().is_some_and(|(at, status)| *at > began && !moves(status))
@@ -178,14 +179,15 @@ fn come_to_rest(line: &Line, out: &Output) -> bool {
     rests
 }
 
-/// The directory for recordings, before anything else is done.
+/// Opens the directory for recordings, before any other step.
 fn open_recordings(dir: &Path, limit: u64) -> Result<Prepared, Failure> {
     Prepared::open(dir, limit).map_err(|error| {
         Failure::usage(format!("{}: {error}", dir.display())).next("name another directory with --record DIR")
     })
 }
 
-/// Keeps whose policy is to act on what moves, for an agent that comes when this one was killed; and what the one before has left.
+/// Stores which client's policy applies to a motion, for the next agent if this one is killed; also applies what the
+/// previous agent stored.
 fn keep_policies(
     port: &str,
     log: &Arc<Mutex<CommandLog>>,
@@ -195,12 +197,12 @@ fn keep_policies(
         out.note("warning: neither XDG_STATE_HOME nor HOME is set: if this agent is killed, nobody's policy acts on what moves");
         return Ok(None);
     };
-    // Under the name that it was given: a device has another number when it comes again.
+    // By its given name: a device gets another number when it comes again.
     let port = std::path::absolute(port).map_or(port.to_owned(), |path| path.display().to_string());
     Ok(Some(Keeper::begin(&state.join("openjtc"), &port, notices(log, out, "warning"))?))
 }
 
-/// Acts on what the agent before was killed in, before anyone is served.
+/// Applies the policy that a killed agent left, before any client is served.
 fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog>>, out: &Output) -> Keeper {
     if let Some(notice) = will::apply(line, &keeper, found) {
         notices(log, out, "note")(notice);
@@ -210,7 +212,7 @@ fn act_on(line: &Line, keeper: Keeper, found: &Found, log: &Arc<Mutex<CommandLog
     keeper
 }
 
-/// What becomes of recordings and policies stands in the log of commands; what people are to know is noted, too.
+/// Writes notices about recordings and policies to the command log; notices for users are printed too.
 fn notices(log: &Arc<Mutex<CommandLog>>, out: &Output, kind: &'static str) -> Box<dyn FnMut(Notice) + Send> {
     let (log, out) = (log.clone(), *out);
     Box::new(move |notice| {
@@ -229,7 +231,7 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-/// The port, and the arm of a controller that cannot be asked for its own.
+/// Returns the port, and the arm for a controller that cannot report its own.
 fn port(args: &ServeArgs, out: &Output) -> Result<(Box<dyn Port + Send>, Arm), Failure> {
     if !args.sim {
         let arm = named_arm::load(args.arm.as_deref())?;

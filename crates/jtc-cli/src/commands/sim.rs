@@ -4,7 +4,7 @@ use cli_kit::{Failure, Output};
 
 use crate::args::SimArgs;
 
-/// What carries the arm while no drive does.
+/// Notice about the brakes that carry the arm while no drive does.
 #[cfg(unix)]
 const BRAKES: &str =
     "note: simulated holding brakes keep the arm up after an error; the known drives have none";
@@ -87,7 +87,7 @@ pub fn sim(args: &SimArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The image in the file that keeps a stored arm, if there is one yet.
+/// Returns the image in the file that keeps a stored arm, if there is one.
 #[cfg(unix)]
 fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
     let unreadable = |what: String| {
@@ -106,7 +106,7 @@ fn kept(path: &std::path::Path) -> Result<Option<Vec<u8>>, Failure> {
 fn faults(path: &std::path::Path) -> Result<jtc_sim::FaultPlan, Failure> {
     let text =
         std::fs::read_to_string(path).map_err(|e| Failure::usage(format!("{}: {e}", path.display())))?;
-    // Files of hands are beside the file that names them.
+    // Files of hand motions are in the same directory as the file that names them.
     let load = |file: &str| crate::serve::hand(&path.with_file_name(file));
     jtc_sim::FaultPlan::from_toml_with(&text, load)
         .map_err(|e| Failure::usage(format!("{}: {e}", path.display())))
@@ -127,7 +127,7 @@ fn bus(url: &str) -> Result<crate::serve::Tap, Failure> {
     Ok(jtc_sim::BusTap::new(bus))
 }
 
-/// Pseudo-terminals are a thing of Unix.
+/// Refuses: pseudo-terminals exist on Unix only.
 #[cfg(not(unix))]
 pub fn sim(_args: &SimArgs, _out: &Output) -> Result<(), Failure> {
     Err(Failure::usage("jtc sim needs pseudo-terminals, which this system does not have")

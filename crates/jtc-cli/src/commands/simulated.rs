@@ -1,4 +1,4 @@
-//! The arm that is simulated, by `jtc sim` and `jtc serve --sim` alike, and what its controller has of it.
+//! Simulated arm, for `jtc sim` and `jtc serve --sim`, and its controller's parameters.
 
 use std::path::Path;
 
@@ -8,8 +8,8 @@ use jtc_sim::SimConfig;
 
 use super::named_arm;
 
-/// The arm that was named, or the built-in one, and the world around it; what the arm's file leaves open goes to stderr. The controller
-/// has stored the image `kept`, else the arm that was named where its file is complete.
+/// Returns the named arm, or the built-in one, and its world; missing parameters of the arm's file go to stderr. The
+/// controller has stored the image `kept`, else the named arm if its file is complete.
 pub fn simulated(
     path: Option<&Path>,
     kept: Option<Vec<u8>>,
@@ -29,7 +29,7 @@ pub fn simulated(
     };
     let mut config = SimConfig::new(arm.config(), &arm.parameters());
     if stored.is_some() {
-        // What the controller knows of the arm it has as a board has it: from its memory, and from frames.
+        // The controller gets its arm as on a board: from its memory, and from frames.
         (config.controller, config.stored_arm) = (jtc_core::Config::avena(), stored);
     }
     Ok((arm, config))

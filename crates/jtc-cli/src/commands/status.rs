@@ -83,10 +83,10 @@ pub fn as_json(s: &Status) -> Value {
     })
 }
 
-/// State of joint `j` (from 0): what it sent last, unless it sends nothing any more.
+/// Returns the state of joint `j` (from 0): the last one it sent, unless the joint is silent.
 pub fn joint_state(s: &Status, j: usize) -> &'static str {
     let state = s.joints[j].state;
-    // A joint that is not ready may answer; one that is enabled and not measured does not.
+    // A joint that is not ready may answer; an enabled joint that is not measured does not.
     let silent = !is_measured(s, j) && (words::is_silent(s, j) || state == NodeState::ENABLED);
     if words::is_absent(s, j) {
         "absent"
@@ -97,12 +97,12 @@ pub fn joint_state(s: &Status, j: usize) -> &'static str {
     }
 }
 
-/// Pump and vacuum of the status are what the gripper sent.
+/// Returns `true` if pump and vacuum of the status come from the gripper.
 pub fn gripper_answers(s: &Status) -> bool {
     !words::is_silent(s, GRIPPER)
 }
 
-/// State of the gripper: what it sent last, unless it sends nothing any more.
+/// Returns the state of the gripper: the last one it sent, unless the gripper is silent.
 pub fn gripper_state(s: &Status) -> &'static str {
     match s.gripper {
         Some(g) if gripper_answers(s) => g.state.name(),
@@ -110,7 +110,7 @@ pub fn gripper_state(s: &Status) -> &'static str {
     }
 }
 
-/// A status as text, with the cause of a held stop where the controller tells it.
+/// Formats a status as text, with the cause of a held stop if the controller reports it.
 fn text(s: &Status, reactions: Option<&Reactions>) -> String {
     let stop = reactions.filter(|_| s.is_held_stop()).and_then(|reactions| reactions.stop.as_ref());
     let mut text = format!(
@@ -188,7 +188,7 @@ mod tests {
         assert!(told.contains("next: remove what pushes the joint"), "{told}");
         let untold = text(&s, None);
         assert!(untold.contains("errors: held stop: joint 2: torque over limit\n"), "{untold}");
-        // A stop that was cleared is none any more.
+        // A cleared stop is not shown.
         assert!(!text(&Status { errors: 0, ..s }, Some(&reactions)).contains("held stop"));
     }
 

@@ -18,10 +18,10 @@ use crate::operator::ended_at_once;
 use crate::progress::Progress;
 use taught_file::TaughtFile;
 
-/// Waypoints describe a motion as exactly as this, rad, where nothing else is asked for.
+/// Largest deviation of waypoints from the motion, rad, unless the user names another.
 const TOLERANCE: f64 = 0.01;
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn teach(command: &TeachCommand, out: &Output) -> Result<(), Failure> {
     if matches!(command, TeachCommand::Record { .. }) {
         // Notes about a file that cannot be opened are events, too.
@@ -62,7 +62,7 @@ fn switch(link: &LinkArgs, on: bool, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Records until the person or the time ends it; with a tolerance (rad) as waypoints.
+/// Records until the user or the time ends it; with a tolerance (rad) as waypoints.
 fn record(
     file: OutputFile,
     link: &LinkArgs,
@@ -77,12 +77,12 @@ fn record(
     progress.watch(&mut session);
     let status = session.fresh_status()?;
     if stop.asked() {
-        // Teaching would take the hold from an arm that nobody leads any more.
+        // Teaching would release an arm that the user no longer guides.
         let message = "cancelled before teaching was switched on".into();
         return Err(Failure { message, ..Failure::of(&jtc_host::Error::Cancelled) });
     }
     let was_on = status.state == ControllerState::Teaching;
-    // Before it is asked for: a confirmation that does not come may be that of a request that was taken.
+    // Set before the request: even without a confirmation the controller may have accepted it.
     teaching.store(true, Ordering::Relaxed);
     if !was_on {
         session.teach(true)?;
@@ -97,14 +97,14 @@ fn record(
             Ok(s) if s.state == ControllerState::Teaching => {
                 match taught.take((session.now() - start).as_secs_f64(), s.positions()) {
                     Ok(()) => begun.store(taught.is_begun(), Ordering::Relaxed),
-                    // Nobody leads an arm for a file that is lost: it is held, as at Ctrl-C.
+                    // A user need not guide the arm for a lost file: the arm is held, as at Ctrl-C.
                     Err(e) => {
                         lost = Some(e);
                         break;
                     }
                 }
             }
-            // A Stop of another program holds the arm: the person who leads it has let go, or is about to.
+            // A Stop of another program holds the arm: the user has let go of it, or is about to.
             Ok(s) => {
                 teaching.store(false, Ordering::Relaxed);
                 failed = Some(taught_no_more(&s));
@@ -116,7 +116,7 @@ fn record(
             }
         }
     }
-    // What was recorded is completed first, whatever becomes of the link.
+    // The recording is completed first, in every state of the link.
     let written = lost.map_or_else(|| finish(taught, thin, out), Err);
     if failed.is_none() && !was_on {
         session.teach(false)?;
@@ -125,13 +125,13 @@ fn record(
     failed.map_or(written, Err)
 }
 
-/// Teaching has ended, and not by this command.
+/// Returns the failure if teaching was not ended by this command.
 fn taught_no_more(status: &Status) -> Failure {
     let message = format!("another program ended teaching: state {}; the recording ends there", status.state);
     Failure::new(ErrorKind::Fault, "not-teaching", message).next("`jtc teach record FILE` starts a new one")
 }
 
-/// Ctrl-C: the first one is asked for, the second one ends the command with what is so at that moment.
+/// Handles Ctrl-C: the first one is a request, the second one ends the command with the state at that moment.
 fn stop_at_once_with(
     out: Output,
     teaching: Arc<AtomicBool>,

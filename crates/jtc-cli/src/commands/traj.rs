@@ -16,7 +16,7 @@ use super::plan::{margin_line, note_low_margin};
 use super::{continued, halt, resume, run};
 use crate::args::{CheckArgs, LinkArgs, RunArgs, TrajCommand};
 
-/// Does one of the family.
+/// Runs a command of the family.
 pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     match command {
         TrajCommand::Check { file, check: args, payload } => {
@@ -33,7 +33,7 @@ pub fn traj(command: &TrajCommand, out: &Output) -> Result<(), Failure> {
     }
 }
 
-/// Runs what a recording is of.
+/// Runs the motion of a recording.
 fn replay(args: &RunArgs, measured: bool, out: &Output) -> Result<(), Failure> {
     let recorded = if measured { Loaded::load_measured(&args.file) } else { Loaded::load(&args.file, None) }?;
     if recorded.form != Form::Recording {
@@ -96,7 +96,7 @@ fn check(file: &Path, args: &CheckArgs, payload: Payload, out: &Output) -> Resul
     });
     out.result(&value, || {
         let without = job.without().map_or(String::new(), |words| words + "\n");
-        // What is refused has its reasons already.
+        // Refusals already have their reasons.
         let margin = margin_line(verdict.margin.filter(|_| verdict.is_ok()));
         format!("{verdict}\n{}{margin}{without}next: {}", figures(&verdict), hint.plain(FrontEnd::Command))
     });

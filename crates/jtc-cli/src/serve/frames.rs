@@ -1,4 +1,5 @@
-//! Cuts the controller's bytes into whole statuses, so that a host that comes in the middle of one never sees half of it.
+//! Splits the controller's bytes into complete statuses, so that a host that connects in between never sees half of
+//! one.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -10,12 +11,12 @@ const START: [u8; 4] = [HEADER, 0x03, (STATUS_LEN >> 8) as u8, STATUS_LEN as u8]
 
 /// Silence that ends a frame (J-03).
 pub const GAP: Duration = Duration::from_millis(5);
-/// Systems hand a write to a terminal in pieces, the first of at least this many bytes.
+/// Systems pass a write to a terminal in pieces, the first of at least this many bytes.
 const PIECE: usize = 2048;
 /// Time of a byte on a serial line of 115,200 baud.
 const BYTE: Duration = Duration::from_micros(87);
 
-/// Bytes that came, and the pieces that are complete.
+/// Received bytes, and the complete pieces.
 #[derive(Default)]
 pub struct Frames {
     partial: Vec<u8>,
@@ -23,7 +24,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Takes bytes in. What is no status (a damaged line) is passed on as it is.
+    /// Takes bytes in. Bytes that are not a status (a damaged line) are passed on unchanged.
     pub fn push(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             let n = self.partial.len();
@@ -49,43 +50,45 @@ impl Frames {
         }
     }
 
-    /// Nothing is complete.
+    /// Returns `true` if no frame is complete.
     pub fn is_empty(&self) -> bool {
         self.whole.is_empty()
     }
 
-    /// The oldest piece.
+    /// Returns the oldest piece.
     pub fn pop(&mut self) -> Option<Vec<u8>> {
         self.whole.pop_front()
     }
 }
 
-/// Follows the host's bytes just far enough to know whether a frame is under way, and since when its next byte is missing.
+/// Follows the host's bytes just enough to know whether a frame is in progress, and since when its next byte is
+/// missing.
 ///
-/// Virtual time may pass faster than the host's: with `--speed max`, and while the simulator makes up for a delay. A gap between two pieces
-/// of a frame is then no longer than it was for the host.
+/// Virtual time may pass faster than the host's: with `--speed max`, and while the simulator makes up for a delay. A
+/// gap between two pieces of a frame must then not be longer than it was for the host.
 ///
-/// A busy system can suspend a host between two pieces of one write for longer than a frame may be silent. The adapter of a real line still
-/// sends what it holds then. So a long frame counts as silent only after a line would have sent what has come of it.
+/// A busy system can suspend a host between two pieces of one write for longer than a frame may be silent. The adapter
+/// of a real line still sends its buffer then. So a long frame counts as silent only after a line would have sent its
+/// received bytes.
 pub struct Incoming {
     head: Vec<u8>,
-    /// Bytes of the present frame that have come.
+    /// Received bytes of the current frame.
     come: usize,
-    /// Bytes of the present frame that have not come.
+    /// Missing bytes of the current frame.
     missing: usize,
-    /// Bytes have come that go on with a frame.
+    /// `true` if bytes have arrived that continue a frame.
     continued: bool,
-    /// When the line carried the last byte; for a long frame, when a serial line would have.
+    /// Time when the line carried the last byte; for a long frame, the time on a serial line.
     heard: Instant,
 }
 
 impl Incoming {
-    /// No byte has come.
+    /// Creates the state without any byte.
     pub fn new(now: Instant) -> Self {
         Self { head: Vec::new(), come: 0, missing: 0, continued: false, heard: now }
     }
 
-    /// Takes bytes of the host in that came at `now`.
+    /// Takes bytes of the host that arrived at `now`.
     pub fn push(&mut self, bytes: &[u8], now: Instant) {
         self.continued |= self.mid_frame();
         for &byte in bytes {
@@ -115,18 +118,18 @@ impl Incoming {
         };
     }
 
-    /// The line carries bytes at `now`.
+    /// Notes that the line carries bytes at `now`.
     pub fn carries(&mut self, now: Instant) {
         self.heard = self.heard.max(now);
     }
 
-    /// Bytes of a frame are still to come.
+    /// Returns `true` while bytes of a frame are missing.
     pub fn mid_frame(&self) -> bool {
         self.missing > 0 || !self.head.is_empty()
     }
 
-    /// How long the host has been silent within a frame, also in the moment that ends it; `None`: outside of one, or so long that the frame
-    /// will not be completed.
+    /// Returns how long the host has been silent within a frame, also at the moment that ends the silence. Returns
+    /// `None` outside a frame, or after a silence that means that the frame will not be completed.
     pub fn silence(&mut self, now: Instant) -> Option<Duration> {
         if std::mem::take(&mut self.continued) {
             self.carries(now);
@@ -204,7 +207,7 @@ mod tests {
         let mut incoming = Incoming::new(start);
         let mut frame = vec![0; 9006];
         frame[..4].copy_from_slice(&[HEADER, 0x04, 0x23, 0x2E]);
-        // The host is suspended behind 2,048 bytes, which take 178 ms on a line.
+        // The host is suspended after 2,048 bytes, which take 178 ms on a line.
         incoming.push(&frame[..2048], start);
         assert_eq!(incoming.silence(start), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(170)), Some(Duration::ZERO));
@@ -215,7 +218,7 @@ mod tests {
         incoming.carries(later(171));
         assert_eq!(incoming.silence(later(171)), Some(Duration::ZERO));
         assert_eq!(incoming.silence(later(176)), None, "the credit ends with the frame");
-        // Of a host that died there, silence counts afterwards; a short frame is not waited for.
+        // If the host died there, the time counts as silence afterwards; the simulator does not wait for a short frame.
         incoming.push(&frame[..2048], later(170));
         assert!(incoming.silence(later(300)).is_some() && incoming.silence(later(400)).is_none());
         incoming.push(&frame[..2047], later(600));

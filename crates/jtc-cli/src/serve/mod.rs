@@ -1,4 +1,4 @@
-//! The simulated controller behind a pseudo-terminal: world, terminal and clock in one loop.
+//! Simulated controller on a pseudo-terminal: world, terminal and clock in one loop.
 
 mod frames;
 mod pty;
@@ -18,11 +18,11 @@ use frames::{Frames, Incoming};
 pub use pty::{Pty, PtyError};
 pub use typed::{Typed, hand};
 
-/// Bytes of the host that wait for the line: as much as an adapter's buffer; beyond that its writes block.
+/// Largest number of host bytes that wait for the line, as in an adapter's buffer; beyond that the host's writes block.
 const WAITING_MAX: usize = 4096;
 /// Longest wait for a host to read before statuses are lost, when virtual time runs free.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that is made up for; after a longer one (a suspended computer) time goes on from here.
+/// Largest delay that is made up for; after a longer one (a suspended computer) time continues from here.
 const CATCH_UP_US: u64 = 2_000_000;
 /// A tick, µs.
 const TICK_US: u64 = 1000;
@@ -41,18 +41,18 @@ pub struct Server {
     /// Bytes of a frame that the terminal did not take at once.
     rest: Vec<u8>,
     connected: bool,
-    /// The host did not read for long: statuses are lost until it does.
+    /// `true` if the host has not read for long: statuses are lost until it does.
     stalled: bool,
-    /// A status has left the controller.
+    /// `true` after the first status of the controller.
     answers: bool,
-    /// Takes every tick.
+    /// Sink for every tick.
     sink: Option<SampleSink>,
-    /// Where a stored arm is kept, and the number of the one that is there.
+    /// File of the stored arm, and the number of the one in it.
     keeps: Option<(PathBuf, u32)>,
 }
 
 impl Server {
-    /// A world behind a terminal, its joint bus on `tap`, and the events that are typed.
+    /// Creates a world on a terminal, with its joint bus on `tap` and the typed events.
     pub fn new(world: World, pty: Pty, tap: Option<Tap>, typed: Typed) -> Self {
         Self {
             world,
@@ -70,12 +70,12 @@ impl Server {
         }
     }
 
-    /// Hands what each tick of the controller computed to `sink`.
+    /// Passes the results of each tick of the controller to `sink`.
     pub fn recorded(self, sink: Option<SampleSink>) -> Self {
         Self { sink, ..self }
     }
 
-    /// Keeps what the controller stores in this file.
+    /// Stores the controller's data in this file.
     pub fn keeping(self, file: Option<PathBuf>) -> Self {
         let number = self.world.stored_arm().map_or(0, |(_, number)| number);
         Self { keeps: file.map(|file| (file, number)), ..self }
@@ -109,7 +109,7 @@ impl Server {
                 if due_us < TICK_US {
                     let rest = Duration::from_micros(TICK_US - due_us);
                     if self.world.host_write_pending() >= WAITING_MAX {
-                        std::thread::sleep(rest); // more input would not be taken now
+                        std::thread::sleep(rest); // more input would not be accepted now
                     } else {
                         self.pty.wait_input(rest)?;
                     }
@@ -131,7 +131,7 @@ impl Server {
             if let Some(tap) = &mut self.tap
                 && let Err(e) = tap.exchange(&mut self.world)
             {
-                // Others on the bus are guests: without them the arm goes on.
+                // Other devices on the bus are optional: without them the arm continues.
                 eprintln!("jtc: CAN: {e}; the joint bus is no longer shared");
                 self.tap = None;
             }
@@ -145,7 +145,7 @@ impl Server {
         Ok(self.world.now_us() as f64 * 1e-6)
     }
 
-    /// Hands the host's bytes to the line, as many as an adapter would hold.
+    /// Passes the host's bytes to the line, as many as an adapter would hold.
     fn take_input(&mut self) -> Result<(), PtyError> {
         let mut buffer = [0; WAITING_MAX];
         loop {
@@ -172,7 +172,7 @@ impl Server {
         self.world.limit_host_silence(silence.map(|silence| silence.as_micros() as u64));
     }
 
-    /// Hands statuses to the host; without one they are lost, as on a line that nobody listens to.
+    /// Passes statuses to the host; without a host they are lost, as on an open line.
     fn give_output(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let mut buffer = [0; 1024];
         loop {
@@ -208,8 +208,8 @@ impl Server {
         Ok(())
     }
 
-    /// Writes what is left of a frame. A host that does not read must not hold up the arm: in real time nothing waits, and with
-    /// free-running time only for a while.
+    /// Writes the rest of a frame. A host that does not read must not delay the arm: in real time the simulator does
+    /// not wait, and with free-running time only for a while.
     fn write_rest(&mut self, speed: SimSpeed) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

@@ -1,4 +1,4 @@
-//! A pseudo-terminal that looks like a serial port, under a name of the user's choice.
+//! Pseudo-terminal that looks like a serial port, under a name of the user's choice.
 
 use std::fmt;
 use std::fs;
@@ -13,21 +13,21 @@ use rustix::io::Errno;
 use rustix::pty::OpenptFlags;
 use rustix::termios::{LocalModes, OptionalActions, OutputModes, QueueSelector};
 
-/// Why the terminal cannot be used.
+/// Reason why the terminal cannot be used.
 #[derive(Debug)]
 pub enum PtyError {
-    /// The path is taken by something that is not ours to replace.
+    /// The path is taken by a file that must not be replaced.
     Taken {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// What is there.
+        /// Kind of the existing file.
         what: &'static str,
     },
     /// The operating system refused.
     Io {
-        /// What was tried.
+        /// Failed operation.
         what: &'static str,
-        /// Its words.
+        /// Error of the operating system.
         source: io::Error,
     },
 }
@@ -57,8 +57,8 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A new pseudo-terminal in raw mode; `link` becomes a symbolic link to it. A link that an earlier run left behind is
-    /// replaced, anything else is not.
+    /// Creates a pseudo-terminal in raw mode; `link` becomes a symbolic link to it. A link left by an earlier run is
+    /// replaced, any other file is not.
     pub fn open(link: Option<&Path>) -> Result<Self, PtyError> {
         if let Some(link) = link {
             check_free(link)?;
@@ -69,14 +69,14 @@ impl Pty {
         Ok(pty)
     }
 
-    /// The name that a host opens.
+    /// Returns the name that a host opens.
     pub fn name(&self) -> &Path {
         self.link.as_deref().unwrap_or(&self.slave)
     }
 
     fn put_link(&self) -> Result<(), PtyError> {
         let Some(link) = &self.link else { return Ok(()) };
-        // A new link is moved over the old one: at no moment is there none.
+        // A new link is moved over the old one, so that the link always exists.
         let name = link.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let new = link.with_file_name(format!(".{name}.{}", std::process::id()));
         let _ = fs::remove_file(&new);
@@ -85,17 +85,17 @@ impl Pty {
             .map_err(|source| PtyError::Io { what: "symbolic link", source })
     }
 
-    /// Takes what is there; 0 when nothing is, or no host has the port open.
+    /// Reads the available bytes; 0 without bytes, or if no host has the port open.
     pub fn read(&self, buffer: &mut [u8]) -> Result<usize, PtyError> {
         match rustix::io::read(&self.master, buffer) {
             Ok(n) => Ok(n),
-            // EIO: nobody has the other end open.
+            // EIO: the other end is not open.
             Err(Errno::AGAIN | Errno::IO | Errno::INTR) => Ok(0),
             Err(e) => Err(fails("read")(e)),
         }
     }
 
-    /// Writes what fits.
+    /// Writes as many bytes as fit.
     pub fn write(&self, bytes: &[u8]) -> Result<usize, PtyError> {
         match rustix::io::write(&self.master, bytes) {
             Ok(n) => Ok(n),
@@ -104,7 +104,7 @@ impl Pty {
         }
     }
 
-    /// A host has the port open.
+    /// Returns `true` if a host has the port open.
     pub fn host_is_there(&self) -> Result<bool, PtyError> {
         Ok(!self.poll(PollFlags::IN, Duration::ZERO)?.contains(PollFlags::HUP))
     }
@@ -114,7 +114,7 @@ impl Pty {
         self.wait(PollFlags::IN, timeout)
     }
 
-    /// Waits for room for bytes to the host.
+    /// Waits for space for bytes to the host.
     pub fn wait_room(&self, timeout: Duration) -> Result<(), PtyError> {
         self.wait(PollFlags::OUT, timeout)
     }
@@ -138,8 +138,8 @@ impl Pty {
         }
     }
 
-    /// After a host has gone: forgets what it did not read. A host that was killed may have left the port locked; then a new
-    /// pseudo-terminal takes the place of the old one under the same link.
+    /// Discards the bytes that a disconnected host did not read. A killed host may have left the port locked; then a
+    /// new pseudo-terminal replaces the old one under the same link.
     pub fn renew(&mut self) -> Result<(), PtyError> {
         let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
         match rustix::fs::open(&self.slave, flags, Mode::empty()) {
@@ -178,7 +178,7 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     rustix::pty::unlockpt(&master).map_err(fails("unlock the pseudo-terminal"))?;
     let name = rustix::pty::ptsname(&master, Vec::new()).map_err(fails("name of the pseudo-terminal"))?;
     let slave = PathBuf::from(name.to_string_lossy().into_owned());
-    // Opened once, so that it is raw before any host comes, and so that an absent host is seen as a hang-up.
+    // Opened once, so that it is raw before any host connects, and so that a missing host is seen as a hang-up.
     let open = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
     let first = rustix::fs::open(&slave, open, Mode::empty()).map_err(fails("open the host's end"))?;
     raw(&first).map_err(fails("raw mode"))?;
@@ -187,7 +187,8 @@ fn pair() -> Result<(OwnedFd, PathBuf), PtyError> {
     Ok((master, slave))
 }
 
-/// A free path, or a link that a simulator left behind: one to nothing, or to a pseudo-terminal that is somebody else's by now.
+/// Checks that a path is free, or a link left by a simulator: a dangling link, or a link to a pseudo-terminal that
+/// another program uses by now.
 fn check_free(path: &Path) -> Result<(), PtyError> {
     let taken = |what| Err(PtyError::Taken { path: path.to_owned(), what });
     match fs::symlink_metadata(path) {
@@ -202,8 +203,8 @@ fn check_free(path: &Path) -> Result<(), PtyError> {
     }
 }
 
-/// A program holds this pseudo-terminal as a serial port: it is open and raw, which no shell's terminal is. One that a host has
-/// locked is in use, too.
+/// Returns `true` if a program uses this pseudo-terminal as a serial port: it is open and raw, unlike the terminal of a
+/// shell. A terminal that a host has locked is in use, too.
 fn serves(terminal: &Path) -> bool {
     let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC | OFlags::NONBLOCK;
     match rustix::fs::open(terminal, flags, Mode::empty()) {

@@ -1,4 +1,4 @@
-//! Events that a person types, or a script writes, on the simulator's standard input.
+//! Events that a user types, or a script writes, on the simulator's standard input.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
@@ -8,7 +8,7 @@ use jtc_host::trajectory::Loaded;
 use jtc_sim::{HandPath, TypedEvent, World};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-/// How often it is looked whether the program is in the foreground of its terminal.
+/// Period of checks whether the program is in the foreground of its terminal.
 const LOOK: Duration = Duration::from_millis(200);
 /// Longest line.
 const LINE_MAX: usize = 4096;
@@ -19,14 +19,15 @@ pub struct Typed {
 }
 
 impl Typed {
-    /// Begins to read the standard input, in a thread of its own.
+    /// Starts to read the standard input, in a separate thread.
     pub fn listen() -> Self {
         let (send, lines) = channel();
         std::thread::spawn(move || read(|line| send.send(line).is_ok()));
         Self { lines }
     }
 
-    /// Makes what was typed since the last call happen in `world`; what cannot be is reported on stderr, and the arm goes on.
+    /// Applies the lines typed since the last call to `world`; invalid lines are reported on stderr, and the arm
+    /// continues.
     pub fn act(&self, world: &mut World) {
         while let Ok(line) = self.lines.try_recv() {
             match TypedEvent::parse(&line).map_err(|e| e.to_string()) {
@@ -51,7 +52,7 @@ fn happen(event: &TypedEvent, world: &mut World) -> Result<(), String> {
     Ok(())
 }
 
-/// The joint positions of a trajectory file as the path of a hand.
+/// Returns the joint positions of a trajectory file as the path of a hand.
 pub fn hand(path: &Path) -> Result<HandPath, String> {
     let trajectory = Loaded::load(path, None).map_err(|e| format!("hand: {e}"))?.trajectory;
     let points = trajectory.points.iter().map(|point| point.position).collect();
@@ -59,10 +60,10 @@ pub fn hand(path: &Path) -> Result<HandPath, String> {
     HandPath::new(points, step_s).ok_or_else(|| format!("hand: {}: the file has no points", path.display()))
 }
 
-/// Gives the lines of the standard input to `take` until it wants no more or the input ends.
+/// Gives the lines of the standard input to `take` until it returns `false` or the input ends.
 ///
-/// A program in the background that reads from its terminal is stopped by the system (SIGTTIN). So nothing is read before there is
-/// something, and not while another program is in the foreground.
+/// The system stops a program in the background that reads from its terminal (SIGTTIN). So the thread reads only when
+/// input is available, and not while another program is in the foreground.
 fn read(mut take: impl FnMut(String) -> bool) {
     let stdin = rustix::stdio::stdin();
     let (mut line, mut buffer) = (Vec::new(), [0; 512]);
@@ -99,7 +100,7 @@ fn text(line: &mut Vec<u8>) -> String {
     String::from_utf8_lossy(&std::mem::take(line)).into_owned()
 }
 
-/// The standard input is a terminal, and another program is in its foreground.
+/// Returns `true` if the standard input is a terminal, and another program is in its foreground.
 fn in_background() -> bool {
     let stdin = rustix::stdio::stdin();
     rustix::termios::isatty(stdin)

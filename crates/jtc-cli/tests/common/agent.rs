@@ -1,4 +1,4 @@
-//! An agent (`jtc serve`) with places of its own for tokens and for what it leaves behind.
+//! Agent (`jtc serve`) with its own directories for tokens and other files.
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
@@ -8,14 +8,14 @@ use serde_json::Value;
 
 use super::{command, slow_motion};
 
-/// `jtc` whose state and sockets lie in this directory.
+/// `jtc` with its state and sockets in this directory.
 pub fn command_in(dir: &tempfile::TempDir) -> Command {
     let mut command = command();
     command.env("XDG_STATE_HOME", dir.path().join("state")).env("XDG_RUNTIME_DIR", dir.path());
     command
 }
 
-/// Starts an agent with these options at a free port of this computer; what it prints when it is ready.
+/// Starts an agent with these options at a free port of this computer; returns it with its output when it is ready.
 pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child, Value) {
     let mut child = command_in(dir)
         .args(["--json", "serve", "--listen", "127.0.0.1:0"])
@@ -31,7 +31,7 @@ pub fn serve<S: AsRef<OsStr>>(dir: &tempfile::TempDir, options: &[S]) -> (Child,
     (child, ready)
 }
 
-/// An agent that serves; it ends with the test.
+/// Running agent; it ends with the test.
 pub struct Agent {
     pub child: Child,
     pub url: String,
@@ -39,12 +39,12 @@ pub struct Agent {
 }
 
 impl Agent {
-    /// Starts one, and waits until it serves.
+    /// Starts an agent, and waits until it is ready.
     pub fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
-    /// The same in a directory that may hold what another left behind.
+    /// Like `start`, in a directory that may hold files of another agent.
     pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let (child, ready) = serve(&dir, options);
         Self { child, url: ready["url"].as_str().expect("its address").to_owned(), dir }
@@ -62,14 +62,14 @@ impl Agent {
         run(self.command(words, &self.url), &[], "")
     }
 
-    /// A file with a motion of so many tenths of a second.
+    /// Creates a file with a motion that takes `tenths` tenths of a second.
     pub fn motion(&self, tenths: i32) -> String {
         let file = self.dir.path().join("motion.csv");
         std::fs::write(&file, slow_motion(tenths)).expect("a file");
         file.to_str().expect("a name").to_owned()
     }
 
-    /// Ends it with this signal; its exit code, and what it leaves behind.
+    /// Ends the agent with this signal; returns its exit code and its directory.
     pub fn end(mut self, signal: &str) -> (Option<i32>, tempfile::TempDir) {
         Command::new("kill").args([signal, &self.child.id().to_string()]).status().expect("kill");
         let code = self.child.wait().expect("it ends").code();

@@ -9,7 +9,7 @@ use std::process::{Child, Command, Stdio};
 use cli_kit::trial::{CommandOutput, program, run};
 use serde_json::Value;
 
-/// `jtc`, without variables of the surroundings.
+/// `jtc`, without environment variables.
 pub fn command() -> Command {
     program(env!("CARGO_BIN_EXE_jtc"), "JTC_")
 }
@@ -32,24 +32,24 @@ impl Dir {
         Self(tempfile::tempdir().expect("a directory"))
     }
 
-    /// A path in it.
+    /// Returns a path in it.
     pub fn path(&self, name: &str) -> String {
         self.0.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// A file in it.
+    /// Creates a file in it.
     pub fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
     }
 
-    /// Whether there is such a file.
+    /// Returns `true` if the file exists.
     pub fn has(&self, name: &str) -> bool {
         self.0.path().join(name).exists()
     }
 }
 
-/// A simulated controller behind a pseudo-terminal; it ends with the test.
+/// Simulated controller on a pseudo-terminal; it ends with the test.
 pub struct Sim {
     child: Child,
     stderr: BufReader<std::process::ChildStderr>,
@@ -58,12 +58,12 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// Starts one and waits until it is ready.
+    /// Starts a simulator and waits until it is ready.
     pub fn start(options: &[&str]) -> Self {
         Self::start_in(tempfile::tempdir().expect("a directory"), options)
     }
 
-    /// The same at `jtc` in a directory that may hold something already.
+    /// Like `start`, at `jtc` in a directory that may already hold files.
     pub fn start_in(dir: tempfile::TempDir, options: &[&str]) -> Self {
         let port = dir.path().join("jtc");
         let mut child = command()
@@ -85,7 +85,7 @@ impl Sim {
         Self { child, stderr, port, dir }
     }
 
-    /// The same with a fault file.
+    /// Like `start`, with a fault file.
     pub fn with_faults(options: &[&str], faults: &str) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let file = dir.path().join("faults.toml");
@@ -93,13 +93,13 @@ impl Sim {
         Self::start_in(dir, &[options, &["--faults", file.to_str().unwrap()]].concat())
     }
 
-    /// The controller has its parameters.
+    /// Gives the controller its parameters.
     pub fn with_parameters(self) -> Self {
         self.jtc(&["params", "use-defaults"]).ends(0);
         self
     }
 
-    /// The controller has its parameters and holds the arm.
+    /// Gives the controller its parameters and waits until it holds the arm.
     pub fn held(self) -> Self {
         self.jtc(&["recover", "--defaults"]).ends(0);
         self
@@ -117,12 +117,12 @@ impl Sim {
         run(self.command(words), &[], "")
     }
 
-    /// What `jtc --json` with these words answers; panics if it ends with another code.
+    /// Returns the answer of `jtc --json` with these words; panics if the command ends with another code.
     pub fn json(&self, words: &[&str], code: i32) -> Value {
         self.jtc(&[&["--json"], words].concat()).ends(code).json()
     }
 
-    /// A file in its directory.
+    /// Creates a file in its directory.
     pub fn file(&self, name: &str, text: &str) -> String {
         std::fs::write(self.path(name), text).expect("a file");
         self.path(name)
@@ -133,24 +133,24 @@ impl Sim {
         writeln!(self.child.stdin.as_mut().expect("stdin"), "{line}").expect("it reads");
     }
 
-    /// The next line of its stderr; waits for it.
+    /// Waits for the next line of its stderr.
     pub fn error_line(&mut self) -> String {
         let mut line = String::new();
         self.stderr.read_line(&mut line).expect("a line");
         line
     }
 
-    /// Its number among the processes.
+    /// Returns its process id.
     pub fn pid(&self) -> String {
         self.child.id().to_string()
     }
 
-    /// A path in its directory.
+    /// Returns a path in its directory.
     pub fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// Sends a signal and waits for the end: its exit code.
+    /// Sends a signal, waits for the end and returns the exit code.
     pub fn end(mut self, signal: &str) -> (i32, bool) {
         let pid = self.child.id().to_string();
         Command::new("kill").args([signal, &pid]).status().expect("kill");
@@ -166,25 +166,25 @@ impl Drop for Sim {
     }
 }
 
-/// Where the simulated arm is, rad.
+/// Returns the position of the simulated arm, rad.
 pub fn place(sim: &Sim) -> Vec<f64> {
     let status = sim.json(&["status"], 0);
     status["joints"].as_array().unwrap().iter().map(|joint| joint["position_rad"].as_f64().unwrap()).collect()
 }
 
-/// It is there.
+/// Checks that the arm is at these joint positions.
 pub fn at(sim: &Sim, q: [f64; 6]) {
     for (joint, (is, should)) in place(sim).into_iter().zip(q).enumerate() {
         assert!((is - should).abs() < 3e-3, "joint {}: {is} instead of {should}", joint + 1);
     }
 }
 
-/// Starts a command that moves the arm, and waits until it has moved for so many seconds.
+/// Starts a command that moves the arm, and waits until the arm has moved for `seconds`.
 pub fn moving_while(sim: &Sim, words: &[&str], seconds: f64) -> std::process::Child {
     moving_after(sim, words, "", seconds)
 }
 
-/// The same of the motion behind a line with this text.
+/// Like [`moving_while`], for the motion after a line with this text.
 pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std::process::Child {
     let mut child = sim
         .command(&[&["--json"], words].concat())
@@ -210,7 +210,7 @@ pub fn moving_after(sim: &Sim, words: &[&str], text: &str, seconds: f64) -> std:
     child
 }
 
-/// A smooth trajectory file from the zero pose and back: `amplitude` rad in 1.2 s.
+/// Returns a smooth trajectory file from the zero pose and back: `amplitude` rad in 1.2 s.
 pub fn motion(amplitude: f64) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=120 {
@@ -221,7 +221,7 @@ pub fn motion(amplitude: f64) -> String {
     text
 }
 
-/// A slow motion of all joints, up to 0.2 rad and back, in so many tenths of a second.
+/// Returns a slow motion of all joints, up to 0.2 rad and back, in `tenths` tenths of a second.
 pub fn slow_motion(tenths: i32) -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=tenths {

@@ -1,4 +1,4 @@
-//! A board for `jtc firmware flash`: a controller behind a pseudo-terminal, and the drive of its ST-LINK in a folder.
+//! Board for `jtc firmware flash`: a controller on a pseudo-terminal, and the drive of its ST-LINK in a folder.
 
 use std::fs;
 use std::os::fd::OwnedFd;
@@ -20,7 +20,7 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 /// Bytes of the program in an image of [`super::image`].
 const PROGRAM: usize = 0x1000;
 
-/// What a board reports that has this image in flash; bit by bit, as the definition has it.
+/// Returns the program that a board with this image in flash reports; computed bit by bit, as in the definition.
 pub fn program_of(image: &[u8]) -> Program {
     let mut register = u32::MAX;
     for byte in &image[..PROGRAM] {
@@ -41,7 +41,7 @@ pub struct Board {
     thread: Option<JoinHandle<()>>,
 }
 
-/// What the processor does.
+/// State of the processor.
 struct Flashed {
     status: Status,
     program: Option<Program>,
@@ -51,7 +51,7 @@ struct Flashed {
 }
 
 impl Board {
-    /// One with an arm that has no torque, and with a drive at this folder, which takes an image of this length.
+    /// Creates a board with an arm without torque, and a drive at this folder, which takes an image of this length.
     pub fn new(board: &str, drive: &Path, length: usize) -> Self {
         let (master, port) = pseudo_terminal();
         let mut status = Status { state: ControllerState::Init.into(), ..Status::default() };
@@ -75,7 +75,7 @@ impl Board {
         Self { port, flashed, stop, thread: Some(thread) }
     }
 
-    /// From now on it sends this.
+    /// Sets the status that it sends from now on.
     pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.flashed.lock().unwrap().status);
     }
@@ -104,7 +104,7 @@ impl Running {
         let few_ms = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
         let _ = poll(&mut ends, Some(&few_ms));
         if ends[0].revents().contains(PollFlags::HUP) {
-            // Nobody has the port open.
+            // The port is not open.
             thread::sleep(Duration::from_millis(5));
         } else {
             self.serve();
@@ -115,7 +115,7 @@ impl Running {
         }
     }
 
-    /// A status each 40 ms, and an answer to what is asked.
+    /// Sends a status every 40 ms, and answers requests.
     fn serve(&mut self) {
         let mut request = [0; 256];
         let asked = matches!(rustix::io::read(&self.master, &mut request), Ok(1..));
@@ -152,13 +152,13 @@ impl Running {
     }
 }
 
-/// A drive at this folder.
+/// Creates a drive at this folder.
 pub fn appear(drive: &Path) {
     fs::create_dir_all(drive).unwrap();
     fs::write(drive.join("DETAILS.TXT"), "Version: V3J13M4B5S1\n").unwrap();
 }
 
-/// The board's end of a line, and the name of the other.
+/// Returns the board's end of a line, and the name of the other end.
 fn pseudo_terminal() -> (OwnedFd, String) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
     grantpt(&master).and_then(|()| unlockpt(&master)).unwrap();

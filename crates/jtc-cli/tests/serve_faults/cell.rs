@@ -1,4 +1,4 @@
-//! An agent of a simulated controller behind a serial port, each a process of its own.
+//! Agent of a simulated controller on a serial port, each in its own process.
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, Command, Stdio};
@@ -11,7 +11,7 @@ use test_kit::patience::Patience;
 use crate::common::agent::{self, command_in};
 use crate::common::{Sim, slow_motion};
 
-/// Both of them.
+/// Agent and simulated controller.
 pub struct Cell {
     pub sim: Option<Sim>,
     pub agent: Child,
@@ -22,7 +22,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// `tenths`: how long its motion takes, 0.1 s.
+    /// `tenths`: duration of its motion, 0.1 s.
     pub fn new(baud: &str, tenths: i32) -> Self {
         let dir = tempfile::tempdir().expect("a directory");
         let sim = Sim::start(&["--baud", baud]).with_parameters();
@@ -43,7 +43,7 @@ impl Cell {
         cell
     }
 
-    /// A run through the agent, with what is to become of it without its program.
+    /// Starts a run through the agent, with a policy for the loss of its program.
     pub fn run(&self, policy: &str) -> Child {
         self.jtc(&["--json", "traj", "run", &self.motion, "--when-gone", policy, "--port", &self.url])
             .stdout(Stdio::piped())
@@ -58,7 +58,7 @@ impl Cell {
         command
     }
 
-    /// What the controller reports through the agent.
+    /// Returns the status of the controller through the agent.
     pub fn status(&self) -> Value {
         self.status_at(&self.url)
     }
@@ -83,19 +83,19 @@ impl Cell {
         }
     }
 
-    /// The agent goes without a word.
+    /// Kills the agent.
     pub fn kill_agent(&mut self) {
         self.agent.kill().expect("it is there");
         self.agent.wait().expect("it ends");
     }
 
-    /// Another agent takes its place.
+    /// Starts another agent in its place.
     pub fn next_agent(&mut self) {
         let port = &self.sim.as_ref().expect("it is there").port;
         (self.agent, self.url) = serve(&self.dir, port, &self.baud);
     }
 
-    /// `jtc --json` with these words at the agent, when it has reported this event.
+    /// Starts `jtc --json` with these words at the agent, and waits for this event.
     pub fn at(&self, words: &[&str], event: &str) -> Program {
         let words = [&["--json"], words, &["--port", &self.url]].concat();
         let mut jtc = self.jtc(&words);
@@ -105,13 +105,13 @@ impl Cell {
         program
     }
 
-    /// The same that is over, well.
+    /// Like [`Self::jtc`], waits for the end of a command that must succeed.
     pub fn done(&self, words: &[&str]) {
         let ended = self.jtc(&[words, &["--port", &self.url]].concat()).output().expect("it ran");
         assert!(ended.status.success(), "{words:?}: {}", String::from_utf8_lossy(&ended.stderr));
     }
 
-    /// A program that knows HTTP alone, with the operator's token.
+    /// Returns a program that uses only HTTP, with the operator's token.
     pub fn http(&self) -> Http {
         let file = self.dir.path().join("state/openjtc/tokens.toml");
         let text = std::fs::read_to_string(file).expect("a token file");
@@ -120,22 +120,22 @@ impl Cell {
         Http { address, operator: token.expect("the operator's").to_owned() }
     }
 
-    /// What agents have found of the one before: the lines of their log.
+    /// Returns the log lines of agents about the policy of a killed agent.
     pub fn found(&self) -> Vec<Value> {
         let text = std::fs::read_to_string(self.dir.path().join("commands.jsonl")).expect("a log");
-        // The last one may be on its way to the disk.
+        // The last line may not be on the disk yet.
         let lines = text.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
         lines.filter(|line| line["what"].as_str().is_some_and(|what| what.starts_with("policy-"))).collect()
     }
 
-    /// The file with whose policy is to act on what moves, if it is there.
+    /// Returns the file with the policy for a motion, if it exists.
     pub fn left(&self) -> Option<PathBuf> {
         let files = std::fs::read_dir(self.dir.path().join("state/openjtc")).expect("it is there");
         let mut paths = files.map(|file| file.expect("a file").path());
         paths.find(|path| path.extension().is_some_and(|kind| kind == "json"))
     }
 
-    /// Nothing moves, and nothing begins to.
+    /// Checks that the arm rests for this time, and that no motion begins.
     pub fn rests(&self, time: Duration) -> Value {
         let (seen, mut patience) = (Instant::now(), Patience::begin());
         loop {
@@ -163,14 +163,14 @@ fn serve(dir: &tempfile::TempDir, port: &Path, baud: &str) -> (Child, String) {
     (child, ready["url"].as_str().expect("an address").to_owned())
 }
 
-/// A command at work.
+/// A running command.
 pub struct Program {
     child: Child,
     err: BufReader<ChildStderr>,
 }
 
 impl Program {
-    /// Waits until it has reported this event.
+    /// Waits for this event.
     pub fn until(&mut self, event: &str) {
         let (mut line, mut all) = (String::new(), String::new());
         while !line.contains(&format!("\"event\":\"{event}\"")) {
@@ -180,14 +180,14 @@ impl Program {
         }
     }
 
-    /// It goes without a word.
+    /// Kills the program.
     pub fn kill(mut self) {
         assert!(self.child.try_wait().expect("a child").is_none(), "it is at work");
         self.child.kill().expect("it runs");
         self.child.wait().expect("it ends");
     }
 
-    /// It finds out that nobody is there any more.
+    /// Waits until the program reports the lost link.
     pub fn ends_without_link(self) -> String {
         let Self { child, err } = self;
         let ended = child.wait_with_output().expect("it ends");
@@ -198,7 +198,7 @@ impl Program {
     }
 }
 
-/// And not that there is none, as where a computer is so busy that none comes in time.
+/// Returns `false` for a message without a status, as on a computer so busy that none comes in time.
 fn is_status(value: &Value) -> bool {
     value["state"].is_string()
 }

@@ -1,15 +1,15 @@
-//! The phases besides an upload and a motion, and programs that know HTTP alone.
+//! The other phases than upload and motion, and programs that use only HTTP.
 use std::time::Duration;
 
 use serde_json::{Value, json};
 
 use super::cell::{Cell, trajectory};
 
-/// An upload of the long motion, which takes five seconds, is going on so long behind the check.
+/// Time after the check at which the upload of the long motion, which takes five seconds, is in progress.
 pub const IN_UPLOAD: Duration = Duration::from_millis(700);
-/// For so long after somebody's Pause, or that of a policy, nobody else begins a motion.
+/// Hold-off after a client's or a policy's Pause, in which no other client begins a motion.
 const CALM: Duration = Duration::from_millis(3100);
-/// So long nothing moves where nothing may.
+/// Observation time in which the arm must rest.
 pub const REST: Duration = Duration::from_millis(500);
 
 pub fn state(status: &Value) -> &str {
@@ -20,7 +20,7 @@ pub fn is_taught(status: &Value) -> bool {
     state(status) == "Teaching"
 }
 
-/// It does so some seconds after it has begun, when all drives are enabled.
+/// Returns `true` once all drives are enabled, some seconds after the start.
 pub fn is_held(status: &Value) -> bool {
     let enabled = |joint: &Value| joint["state"] == "OperationEnable";
     state(status) == "HoldPos" && status["joints"].as_array().is_some_and(|joints| joints.iter().all(enabled))
@@ -40,20 +40,20 @@ pub fn long_motion(cell: &Cell) -> String {
     file.to_str().expect("a name").to_owned()
 }
 
-/// Until the arm has moved some way, and then paused.
+/// Waits until the arm has moved, and then pauses.
 pub fn pause(cell: &Cell) {
     cell.until("Execute", |status| trajectory(status) == "Execute");
     cell.done(&["traj", "pause"]);
     cell.until("Pause", |status| trajectory(status) == "Pause" && is_held(status));
 }
 
-/// Without torque and parameters: from there `recover` has the whole way to go.
+/// Removes torque and parameters: from there `recover` runs all its steps.
 fn disable(cell: &Cell) {
     cell.done(&["disable", "--yes"]);
     cell.until("Init", |status| state(status) == "Init");
 }
 
-/// From wherever it is, as after every fault.
+/// Recovers from any state, as after every fault.
 fn recover(cell: &Cell) {
     cell.done(&["recover", "--defaults"]);
     cell.until("a held arm", is_held);
@@ -124,10 +124,10 @@ fn a_command_that_is_killed_leaves_what_it_has_begun_to_its_policy_or_as_it_is()
     recover(&cell);
 }
 
-/// How long its lease lasts without a request.
+/// Duration of its lease without a request.
 const LASTS: Duration = Duration::from_millis(1500);
 
-/// A program that knows HTTP alone, and is silent from its last request on.
+/// A program that uses only HTTP, and is silent after its last request.
 pub struct Silent<'a> {
     cell: &'a Cell,
     key: String,
@@ -151,7 +151,7 @@ impl<'a> Silent<'a> {
         answer
     }
 
-    /// The last that is received from it: a job.
+    /// Sends the program's last request: a job.
     fn begins(self, request: &str, body: Value) -> Job<'a> {
         let last = self.cell.http().api("GET /api/status", None, None).1["last_event"].as_u64();
         let job = self.ask(request, body)["number"].as_u64().expect("a number");
@@ -159,7 +159,7 @@ impl<'a> Silent<'a> {
     }
 }
 
-/// A job that nobody asks for any more.
+/// A job whose client is silent.
 struct Job<'a> {
     cell: &'a Cell,
     job: u64,
@@ -172,7 +172,7 @@ impl Job<'_> {
         self.last = found.0;
     }
 
-    /// How it has ended.
+    /// Waits for the end of the job and returns it.
     fn ends(mut self) -> Value {
         self.reports("ended");
         self.cell.http().api(&format!("GET /api/jobs/{}", self.job), None, None).1
@@ -190,12 +190,13 @@ fn a_program_by_http_that_falls_silent_leaves_its_run_to_its_policy() {
         assert_eq!(kept.0, 200, "{}", kept.1);
     }
 
-    // A check or an upload, of which it has seen nothing but the beginning: which of them depends on how fast this machine is.
+    // A check or an upload, whose start the client has seen: the choice depends on the speed of this
+    // machine.
     let job = Silent::come(&cell, "pause").begins("POST /api/runs", json!({ "trajectory": 7 }));
     let ended = job.ends();
     assert_eq!(ended["stage"], "stopped", "{ended}");
     assert!(is_held(&cell.rests(CALM)), "{ended}");
-    // It goes on as if somebody were there.
+    // The motion continues as with a connected client.
     let mut job = Silent::come(&cell, "continue").begins("POST /api/runs", json!({ "trajectory": 8 }));
     job.reports("executing");
     pause(&cell);

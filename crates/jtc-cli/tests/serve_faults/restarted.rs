@@ -1,4 +1,5 @@
-//! What another agent does first where the one before was killed: the policy of who commanded acts on what still moves.
+//! First action of a new agent after the previous one was killed: the policy of the lease holder applies to an arm that
+//! still moves.
 use std::time::Duration;
 
 use serde_json::{Value, json};
@@ -7,7 +8,7 @@ use test_kit::patience::{Patience, until};
 use super::cell::{Cell, moves, trajectory};
 use super::phases::{IN_UPLOAD, REST, Silent, is_held, is_taught, long_motion, pause, state};
 
-/// The file is there before anybody kills the agent, and says what moves: it is written by a thread of its own.
+/// Checks the file before the agent is killed: it names the moving job, and a separate thread writes it.
 fn is_left(cell: &Cell, policy: &str, what: &str) {
     let mut patience = Patience::begin();
     loop {
@@ -24,17 +25,17 @@ fn is_gone(cell: &Cell) {
     until("the end of the file: nothing moves", || cell.left().is_none());
 }
 
-/// Another agent, and what it has found and done.
+/// Starts another agent, and returns its report.
 fn next(cell: &mut Cell) -> Value {
     cell.kill_agent();
     follow(cell)
 }
 
-/// The same in place of one that was killed.
+/// Like [`next`], after an agent was killed.
 fn follow(cell: &mut Cell) -> Value {
     let before = cell.found().len();
     cell.next_agent();
-    // The log is written by a thread of its own.
+    // A separate thread writes the log.
     until("what the next agent finds", || cell.found().len() > before);
     let found = cell.found();
     assert_eq!(found.len(), before + 1, "{found:?}");
@@ -64,7 +65,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             (&json!(policy), &json!("motion"), &json!(true))
         );
         assert!(found["by"].as_str().is_some_and(|by| by.contains("jtc traj")), "{found}");
-        // Before anyone was served it was sent.
+        // The request was sent before any client was served.
         let taken = [("continue", "it goes on"), ("pause", "a Pause was sent"), ("stop", "a Stop was sent")];
         let taken = taken.iter().find(|taken| taken.0 == policy).expect("a policy").1;
         assert!(done(&found).starts_with(taken), "{found}");
@@ -76,7 +77,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
         let status = cell.until(left, |status| !moves(status));
         assert_eq!(trajectory(&status), left, "{policy}: {status}");
         if policy == "pause" {
-            // It can be gone on with: that is left to the next one, too.
+            // The motion can be resumed: this is left to the next agent, too.
             is_left(&cell, policy, "motion");
             let found = next(&mut cell);
             assert_eq!(done(&found), "it stays paused");
@@ -85,7 +86,7 @@ fn a_motion_follows_the_policy_of_its_client_when_the_agent_is_killed_and_anothe
             cell.until("Finish", |status| trajectory(status) == "Finish");
         }
         is_gone(&cell);
-        // Where nothing moves nothing is found, nor done.
+        // Without a motion the report is empty.
         let before = cell.found().len();
         cell.kill_agent();
         cell.next_agent();

@@ -1,9 +1,9 @@
-//! The files of the cases, each with one thing wrong.
+//! Files of the cases, each with one error.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Writes all of them.
+/// Writes all files.
 pub fn write(dir: &Path) {
     let save = |name: &str, text: &str| std::fs::write(dir.join(name), text).unwrap();
     // 6 s of all joints, there and back.
@@ -45,7 +45,7 @@ pub fn write(dir: &Path) {
     save("gripper.urdf", &urdf(6, "revolute", gripper));
 }
 
-/// A robot of so many equal links, one above the other.
+/// Returns a robot with `joints` equal links, one above the other.
 fn urdf(joints: usize, kind: &str, more: &str) -> String {
     let inertia = "<inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial>";
     let mut text = format!("<robot name=\"robot\"><link name=\"link0\">{inertia}</link>\n");

@@ -9,10 +9,10 @@ use super::{Arm, BRAKED, LIGHTEST, along, braked};
 /// Part of the rotor's inertia that turns with the link, as the output of a gear does, kg·m²: without it a light last link would swing
 /// too fast for any step. A rotor has at least twice as much.
 pub(super) const OUTPUT: f64 = 0.01;
-/// Damping over stiffness of a gear of which only the stiffness is known, s.
+/// Damping over stiffness of a gear with known stiffness and unknown damping, s.
 const DAMPING_TIME: f64 = 5e-4;
 
-/// How far a gear yields.
+/// Elasticity of a gear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gear {
     /// Torque per angle between motor and link, N·m/rad; infinite: a rigid gear.
@@ -33,7 +33,7 @@ impl Gear {
         Self { stiffness, damping: if stiffness.is_finite() { DAMPING_TIME * stiffness } else { 0.0 } }
     }
 
-    /// It yields.
+    /// Returns `true` if the gear yields.
     pub fn is_elastic(&self) -> bool {
         self.stiffness.is_finite()
     }
@@ -65,7 +65,7 @@ impl Sides {
     }
 }
 
-/// What stays the same during a step.
+/// Values that are constant during a step.
 struct Drives<'a> {
     /// Torques of the drives, N·m.
     torque: &'a JointVec,
@@ -152,7 +152,7 @@ impl Arm {
         self.follow_rigid();
     }
 
-    /// Motors with rigid gears are where their links are.
+    /// Sets motors with rigid gears to the positions of their links.
     pub(super) fn follow_rigid(&mut self) {
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if !gear.is_elastic() {

@@ -22,8 +22,8 @@ impl core::fmt::Display for Side {
     }
 }
 
-/// A flat or angular obstacle. It only pushes: its force is stiffness times depth plus damping times the speed inwards, and never
-/// less than 0.
+/// Flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the speed inwards, and
+/// never less than 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wall {
     /// A plane that the origin of the flange meets.
@@ -52,7 +52,7 @@ pub enum Wall {
     },
 }
 
-/// Where a wall is.
+/// Place of a wall.
 #[derive(Clone, Debug)]
 enum Surface {
     Plane {
@@ -77,7 +77,7 @@ pub(super) struct Contact {
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// How far the surface is behind its place, m or rad.
+    /// Distance by which the surface is set back from its place, m or rad.
     recess: f64,
 }
 
@@ -146,8 +146,8 @@ impl Contact {
         }
     }
 
-    /// What the wall adds to the square of the highest natural frequency (1/s²), and to the fastest decay (1/s), of an arm that may touch
-    /// it within `dt`; 0 of one that is far. `mobility`: acceleration of the joints by torques.
+    /// Returns the increase of the square of the highest natural frequency (1/s²) and of the fastest decay (1/s) by the wall, for an arm
+    /// that may touch it within `dt`; 0 if the arm is far. `mobility`: acceleration of the joints by torques.
     pub fn rates(
         &self,
         dynamics: &Dynamics,
@@ -165,7 +165,7 @@ impl Contact {
         (self.stiffness * inverse_mass, self.damping * inverse_mass)
     }
 
-    /// The arm has moved: a surface behind its place follows it.
+    /// Lets a surface that is set back from its place follow the arm after a move.
     pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
@@ -188,7 +188,7 @@ impl Arm {
         sum
     }
 
-    /// These walls are there and no others; those that were there already stay as they are.
+    /// Sets the walls; walls that are present already stay unchanged, others are removed.
     pub fn set_walls(&mut self, walls: &[Wall]) {
         let mut known = core::mem::take(&mut self.contacts);
         for &wall in walls {

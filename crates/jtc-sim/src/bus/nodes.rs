@@ -1,4 +1,4 @@
-//! The nodes of the joint bus, and what they answer.
+//! Nodes of the joint bus, and their answers.
 
 use jtc_bus::{Answer, Frame, JOINTS, NODES, NodeState, Scale};
 
@@ -6,7 +6,7 @@ use crate::drive::Drive;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
 
-/// Time from the end of a request to the first answer that is ready, µs; the others follow by this much each.
+/// Time from the end of a request to the first ready answer, and from each answer to the next, µs.
 pub(super) const ANSWER_US: (u32, u32) = (38, 6);
 /// Bytes of the gripper's answer to Move.
 const GRIPPER_ANSWER: usize = 20;
@@ -16,7 +16,7 @@ const GRIPPER_ANSWER: usize = 20;
 pub struct Nodes {
     /// Base to wrist.
     pub drives: [Drive; JOINTS],
-    /// Node 6; `None`: not there at all.
+    /// Node 6; `None`: not installed.
     pub gripper: Option<Gripper>,
 }
 
@@ -26,13 +26,13 @@ impl Nodes {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
-    /// States of the nodes; Fault where there is no gripper.
+    /// Returns the states of the nodes; Fault if there is no gripper.
     pub fn states(&self) -> [NodeState; NODES] {
         let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
     }
 
-    /// What a node answers to a request that ended at `now_us`, and how long after that it is ready, µs.
+    /// Returns a node's answer to a request that ended at `now_us`, and the time after that until the answer is ready, µs.
     pub fn answer(
         &mut self,
         node: usize,
@@ -43,7 +43,7 @@ impl Nodes {
         let answer = self.receive(node, now_us, request)?;
         let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
         if matches!(answer, Answer::Gripper(_)) {
-            // Real ones send 20 bytes, of which the last mean nothing.
+            // Real grippers send 20 bytes; the last of them have no meaning.
             let mut data = [0; GRIPPER_ANSWER];
             let len = frame.data().len().min(GRIPPER_ANSWER);
             data[..len].copy_from_slice(&frame.data()[..len]);

@@ -1,4 +1,4 @@
-//! What a drive answers to requests.
+//! Answers of a drive to requests.
 use jtc_bus::{Answer, JointReport, NodeState, Request, warning};
 
 use super::Drive;
@@ -17,7 +17,7 @@ impl Drive {
         }
     }
 
-    /// ChangeFsm: any byte is taken; what it means is decided by the tick.
+    /// Takes ChangeFsm with any byte; the tick decides its meaning.
     fn change(&mut self, state: NodeState) -> Answer {
         let before = self.states.state();
         if !self.fault.ignores_state {
@@ -69,7 +69,7 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        // Also before the first configuration, whatever the line is.
+        // The warning is set before the first configuration, too, at any level of the line.
         if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }

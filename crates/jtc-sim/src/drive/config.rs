@@ -1,4 +1,4 @@
-//! What drives differ in, and what faults do to them.
+//! Properties that differ between drives, and effects of faults on them.
 
 /// Side of the gear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -10,7 +10,7 @@ pub enum EncoderPlace {
     Link,
 }
 
-/// What drives differ in.
+/// Properties that differ between drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveConfig {
     /// Silence after power-up and reset, ms.
@@ -26,13 +26,13 @@ pub struct DriveConfig {
     /// Measured speed that trips, rad/s, either way. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times the default
     /// arm's velocity limit; [`SimConfig::new`](crate::SimConfig::new) sets each joint's to 1.2 times its limit.
     pub over_speed: f64,
-    /// Side of the gear at which the position is read; the speed is always the motor's. It makes a difference with gears that yield.
+    /// Side of the gear at which the position is read; the speed is always the motor's. The side matters only for gears that yield.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
-    /// Torque at the joint over the torque that the drive was asked for and believes to give. Known drives: about 1/1.3.
+    /// Torque at the joint over the requested torque, which the drive reports as delivered. Known drives: about 1/1.3.
     pub delivers: f64,
-    /// The drive takes one message per interrupt: requests back to back leave it one behind for good.
+    /// The drive takes one message per interrupt: after back-to-back requests it is one message late for good.
     pub one_message_per_interrupt: bool,
     /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state
     /// before.
@@ -76,7 +76,7 @@ impl DriveConfig {
     }
 }
 
-/// What faults do to a drive at the moment.
+/// Effects of faults on a drive at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveFault {
     /// The node is off the bus; its motor goes on.
@@ -85,7 +85,7 @@ pub struct DriveFault {
     pub motor_control: u8,
     /// The gate driver reports a fault.
     pub hardware: bool,
-    /// Added to what the encoder reads, rad.
+    /// Offset of the encoder reading, rad.
     pub encoder_offset: f64,
     /// The position is reported as not accurate.
     pub not_accurate: bool,

@@ -5,7 +5,7 @@
 const ENCODER_COUNTS: f64 = 65_536.0;
 /// rad at 32768 encoder counts as the bus scales positions.
 const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
-/// Counts of the motor's incremental encoder behind the gear of 121.
+/// Counts of the motor's incremental encoder per radian of the joint, with the gear ratio of 121.
 const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
 /// Encoder differences of 1 ms that the speed is the mean of.
 const SPEED_WINDOW: usize = 10;
@@ -19,8 +19,8 @@ pub(super) struct Encoders {
 }
 
 impl Encoders {
-    /// Speed of a joint at `q` (rad) after another millisecond, rad/s. It comes from the motor's encoder, which is much finer
-    /// than the joint's.
+    /// Returns the speed of a joint at `q` (rad) after another millisecond, rad/s. The speed comes from the motor's encoder,
+    /// which is much finer than the joint's.
     pub fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
@@ -36,7 +36,7 @@ impl Encoders {
     }
 }
 
-/// The next whole number below; `f64::floor` is a call where the processor's own instruction may not be used.
+/// Returns the next whole number below; `f64::floor` is a call if the processor's own instruction may not be used.
 pub(super) fn floor(x: f64) -> i64 {
     let near = x as i64;
     near - i64::from(near as f64 > x)

@@ -8,7 +8,7 @@ const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 
-/// State and what it remembers of the way there.
+/// State, and progress of a transition.
 #[derive(Clone, Debug)]
 pub(super) struct States {
     state: NodeState,
@@ -32,7 +32,7 @@ impl States {
         self.state
     }
 
-    /// Any byte is taken; what it means is decided by [`accept`](Self::accept).
+    /// Takes any byte; [`accept`](Self::accept) decides its meaning.
     pub fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
@@ -64,7 +64,7 @@ impl States {
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
             // Some drives take an echoed fault byte as a command to move: this one does.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
-            // Its error byte stays 0.
+            // The error byte stays 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
                 self.pending = NodeState::START;
                 NodeState::FAULT

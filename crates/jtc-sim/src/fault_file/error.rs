@@ -1,4 +1,4 @@
-//! Why a fault file cannot be used, in words.
+//! Errors of fault files, with their texts.
 use core::fmt;
 
 use jtc_dynamics::JOINTS;
@@ -6,21 +6,21 @@ use jtc_dynamics::JOINTS;
 use super::{SIDES, STATES};
 use crate::faults::FaultKind;
 
-/// Why a fault file cannot be used.
+/// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// It is not TOML of this form; the text is the reader's, with the place.
+    /// The file is not TOML of this form; the text is the reader's, with the place.
     Syntax(String),
-    /// It has no `format = 2`.
+    /// The file has no `format = 2`.
     Format {
-        /// Its format.
+        /// Format of the file.
         found: Option<f64>,
     },
     /// The key `node`, which formats before 2 had.
     Node {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// As written.
+        /// Value in the file.
         node: f64,
     },
     /// Neither or both of `joint` and `gripper`.
@@ -34,14 +34,14 @@ pub enum FaultFileError {
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// What is wrong.
+        /// Error.
         text: String,
     },
-    /// There is no fault of this kind.
+    /// The kind of fault does not exist.
     UnknownKind {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// As written.
+        /// Kind in the file.
         kind: String,
     },
     /// A key that this kind needs is missing.
@@ -68,18 +68,18 @@ pub enum FaultFileError {
         fault: usize,
         /// The key.
         key: &'static str,
-        /// As written.
+        /// Value in the file.
         value: f64,
         /// Smallest and largest.
         allowed: (f64, f64),
     },
-    /// A whole number is needed.
+    /// The value must be a whole number.
     NotWhole {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// The key.
         key: &'static str,
-        /// As written.
+        /// Value in the file.
         value: f64,
     },
     /// Not three numbers.
@@ -88,28 +88,28 @@ pub enum FaultFileError {
         fault: usize,
         /// The key.
         key: &'static str,
-        /// Numbers that are there.
+        /// Number of values in the file.
         count: usize,
     },
     /// The normal of a wall has no length.
     NoDirection {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// As written.
+        /// Value in the file.
         normal: [f64; 3],
     },
-    /// There is no such side of an angle.
+    /// The side of an angle does not exist.
     UnknownSide {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// As written.
+        /// Side in the file.
         side: String,
     },
-    /// There is no such state.
+    /// The state does not exist.
     UnknownState {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// As written.
+        /// State in the file.
         state: String,
     },
     /// Not exactly one of `at_s`, `in_state`, `at_point`.

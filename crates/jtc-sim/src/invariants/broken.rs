@@ -1,4 +1,4 @@
-//! What the checker finds.
+//! Findings of the checker.
 use core::fmt;
 
 use jtc_bus::Joint;
@@ -27,7 +27,7 @@ pub enum Broken {
     },
     /// A number is NaN or infinite.
     NotFinite {
-        /// What.
+        /// Name of the value.
         what: &'static str,
         /// Joint.
         joint: Joint,
@@ -72,12 +72,12 @@ pub enum Broken {
         /// Node.
         node: usize,
     },
-    /// What went out is no frame of the protocol.
+    /// The frame that was sent is not a frame of the protocol.
     UnknownFrame {
-        /// Its id.
+        /// Identifier.
         id: u16,
     },
-    /// A pause or stop took too long, though no error intervened (J-33).
+    /// A pause or stop took too long, without an error (J-33).
     NoStop {
         /// Ticks since it was commanded.
         ticks: u32,
@@ -91,16 +91,16 @@ pub enum Broken {
         /// Consecutive measurements above the limit.
         ticks: u16,
     },
-    /// A torque was at its limit too often, though the arm did not brake and no load was caught (J-43).
+    /// A torque was at its limit too often, while the arm neither braked nor caught a load (J-43).
     Saturated {
         /// Joint.
         joint: Joint,
-        /// So many of the last 100 ticks.
+        /// Ticks at the limit, of the last 100.
         ticks: u32,
     },
     /// The safety output does not follow from the errors.
     SafetyOutput {
-        /// Its level.
+        /// Level.
         level: bool,
         /// Error word.
         errors: u16,
@@ -112,7 +112,7 @@ pub enum Broken {
 pub struct Violation {
     /// µs since the start.
     pub time_us: u64,
-    /// What.
+    /// Invariant.
     pub broken: Broken,
 }
 

@@ -1,4 +1,4 @@
-//! What the checker sees.
+//! Input of the checker.
 use jtc_bus::Frame;
 use jtc_core::{Config, Telemetry};
 
@@ -12,9 +12,9 @@ pub struct Moment<'a> {
     pub time_us: u64,
     /// The controller had its tick.
     pub ticked: bool,
-    /// What it computed.
+    /// Telemetry of the tick.
     pub telemetry: &'a Telemetry,
-    /// How the arm really is.
+    /// True state of the arm.
     pub truth: &'a Truth,
     /// The frame that it gave out.
     pub sent: Option<&'a Frame>,

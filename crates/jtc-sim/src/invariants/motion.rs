@@ -1,4 +1,4 @@
-//! How the arm moves: a stop comes to its end, no joint races, and no torque stays at its limit.
+//! Invariants of the arm's motion: a stop comes to its end, no joint is too fast, and no torque stays at its limit.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
@@ -7,19 +7,19 @@ use super::broken::Broken;
 use super::moment::Moment;
 use crate::board::Worked;
 
-/// Ticks from a pause or stop until the arm stands: the time of J-33, and some in which what was commanded comes to rest.
+/// Ticks from a pause or stop until the arm stands: the time of J-33, and some more for the commanded motion to come to rest.
 const REST_MS: u32 = 20;
-/// Speed below which a joint stands, rad/s.
+/// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 0.02;
 /// Ticks in which torques at their limit are counted.
 const WINDOW: u32 = 100;
 
-/// What it needs from one millisecond to the next.
+/// State that the check keeps from one millisecond to the next.
 #[derive(Clone, Debug, Default)]
 pub(super) struct MotionWatch {
     /// Ticks since a pause or stop was commanded on the path, until the arm stands.
     stopping: Option<u32>,
-    /// A push brought a torque to its limit meanwhile.
+    /// `true` if a push has brought a torque to its limit since.
     overpowered: bool,
     /// Per joint: consecutive measurements above the limit.
     fast: [u16; JOINTS],
@@ -37,8 +37,8 @@ impl MotionWatch {
         self.torque(moment)
     }
 
-    /// J-33: the arm stands in time, unless an error takes the torque away. Where a push leaves the torque limit too little to brake
-    /// with, it has the time of an error.
+    /// Checks J-33: the arm stands in time, unless an error removes the torque. If a push leaves too little of the torque limit to
+    /// brake, the arm has the time of an error.
     fn stop(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         let t = moment.telemetry;
         let ends = |worked: &Worked| {

@@ -1,4 +1,4 @@
-//! What the arm does when it is pushed, meets something, carries what nobody told it, or is cleared while it falls.
+//! Reactions of the arm to a push, a contact, an unknown load, and an error that is cleared while the arm falls.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_dynamics::Dynamics;
@@ -11,9 +11,9 @@ use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host;
 use crate::operator::Operator;
 
-/// What is watched, ms: longer than the motion has left.
+/// Time watched, ms: longer than the rest of the motion.
 const WATCH_MS: u64 = 5_000;
-/// How long a push lasts, ms, and its share of what a joint can be pushed by and held.
+/// Duration of a push, ms, and its share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
 const PUSH_SHARE: f64 = 0.8;
 /// Stiffness (N·m/rad) and damping (N·m·s/rad) of a wall that a joint meets, and how far away it is, rad.
@@ -21,24 +21,24 @@ const WALL: (f64, f64, f64) = (3_000.0, 20.0, 0.1);
 /// Stiffness (N/m) and damping (N·s/m) of a plane that the flange meets, and how far away it is, m.
 const PLANE: (f64, f64, f64) = (20_000.0, 100.0, 0.05);
 
-/// What happens to the arm.
+/// Events that the arm meets.
 #[derive(Clone, Copy)]
 enum Meets {
-    /// Somebody pushes a joint.
+    /// A push on a joint.
     Push(Joint),
     /// A joint meets a wall on its path.
     Wall(Joint),
     /// The flange meets a plane across its way.
     Plane,
-    /// It takes up a load that the controller does not know, kg.
+    /// The arm takes up a load that the controller does not know, kg.
     Load(f64),
-    /// It takes it up, and drops it after a second.
+    /// The arm takes up this load, and drops it after a second.
     Drops(f64),
-    /// Friction of all joints, as a factor of what the controller has.
+    /// Friction of all joints, as a factor of the controller's values.
     Friction(f64),
-    /// Masses of all links, in the same way.
+    /// Masses of all links, as a factor of the controller's values.
     Masses(f64),
-    /// The safety input is low for 1 ms, and the host clears the error after so many.
+    /// The safety input is low for 1 ms, and the host clears the error after this number of ms.
     Cleared(u64),
 }
 
@@ -64,7 +64,7 @@ impl Meets {
         }
     }
 
-    /// Errors of the model that are there from the beginning.
+    /// Returns the errors of the model that are present from the beginning.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -75,7 +75,7 @@ impl Meets {
         }
     }
 
-    /// What happens before the step of millisecond `ms`, counted from 1.
+    /// Acts before the step of millisecond `ms`, counted from 1.
     fn before(self, operator: &mut Operator, ms: u64) {
         let q = operator.world.truth().q;
         let fault = match self {
@@ -110,7 +110,7 @@ fn load(mass: f64) -> FaultKind {
     FaultKind::Payload { mass, com: [0.0, 0.0, 0.05] }
 }
 
-/// A push with gravity, of which the joint can hold 0.8 beside 1.1 times its load and a reserve of 5 %, N·m.
+/// Returns a push in the direction of gravity, N·m: 0.8 · (95 % of the joint's limit − 1.1 times its load).
 fn push(operator: &Operator, joint: usize) -> f64 {
     let config = operator.world.config();
     let q = operator.world.truth().q;
@@ -134,7 +134,7 @@ fn plane(operator: &Operator) -> FaultKind {
     FaultKind::Wall { position, normal: way.map(|x| -x / length), stiffness, damping }
 }
 
-/// What became of it.
+/// Result of the watch.
 struct Outcome {
     then: String,
     /// First reaction, ms.
@@ -147,7 +147,7 @@ struct Outcome {
     speed: f64,
     /// Strongest torque from outside in one joint, and the one that stays, N·m.
     torque: [f64; 2],
-    /// Work of the arm against what is outside, and of that on the arm, J.
+    /// Work of the arm against external forces, and of these on the arm, J.
     work: [f64; 2],
 }
 
@@ -192,7 +192,7 @@ fn outcome(meets: Meets, state: ControllerState) -> Result<Outcome, MatrixError>
         crate::config::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
     let mut operator = bring_to(config, state)?;
     if state == ControllerState::HoldPos {
-        // What it carries is known.
+        // After this time the controller knows the load.
         operator.run(3_000);
     }
     let from = operator.world.truth().q;

@@ -1,4 +1,4 @@
-//! What goes wrong in a row of the tables, and why nothing happens where nothing happens.
+//! Faults in the rows of the tables, and the reasons for cells without a reaction.
 use jtc_bus::{GRIPPER, Joint};
 use jtc_core::ControllerState;
 use jtc_wire::{FrameType, fixed};
@@ -12,14 +12,14 @@ pub(super) const LASTING_MS: u64 = 300;
 /// Short frames that come in front of a Stop.
 const FLOOD: usize = 4_000;
 
-/// What is done to the world.
+/// Action on the world.
 #[derive(Clone, Copy)]
 pub(super) enum Act {
-    /// A fault, for so many ms.
+    /// A fault, and its duration in ms.
     Fault(FaultKind, u64),
-    /// The same, and the host clears all errors so that it is executed in this tick.
+    /// A fault, its duration in ms, and the tick in which the host's command to clear all errors is executed.
     Cleared(FaultKind, u64, u64),
-    /// Two faults at once, for so many ms.
+    /// Two faults at once, and their duration in ms.
     Both(FaultKind, FaultKind, u64),
     /// Every second tick does not come.
     EverySecondTick,
@@ -27,14 +27,14 @@ pub(super) enum Act {
     ResetGripper,
     /// A frame from the host.
     Frame(&'static [u8]),
-    /// A frame directly behind one byte of noise, which comes every 6 ms.
+    /// A frame directly after one byte of noise, every 6 ms.
     InNoise(&'static [u8]),
-    /// A frame behind thousands of short ones, all in the same millisecond.
+    /// A frame after thousands of short ones, all in the same millisecond.
     Behind(&'static [u8]),
 }
 
 impl Act {
-    /// What happens before the step of tick `tick`, counted from 1.
+    /// Acts before the step of tick `tick`, counted from 1.
     pub fn before(self, operator: &mut Operator, tick: u64) {
         let world = &mut operator.world;
         let trigger = Trigger::At(world.now_us() / 1000);
@@ -76,9 +76,9 @@ pub(super) struct Row {
     pub act: Act,
     /// Silence of the host that the controller acts upon, ms (J-59); 0: none.
     pub host_timeout_ms: u16,
-    /// Why there is no reaction while the arm is held or moves.
+    /// Reason for no reaction while the arm is held or moves.
     held: Option<&'static str>,
-    /// Why there is none in Init and Error.
+    /// Reason for no reaction in Init and Error.
     parked: Option<&'static str>,
 }
 
@@ -99,17 +99,17 @@ const fn seen(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: None }
 }
 
-/// One that the error state has already, where it was caused by the safety input.
+/// Returns a row that the error state has latched already, if it was caused by the safety input.
 const fn latched(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("latched") }
 }
 
-/// One that matters to an arm with torque only.
+/// Returns a row that matters only to an arm with torque.
 const fn powered(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("no torque") }
 }
 
-/// One that is borne in every state, and why.
+/// Returns a row that is tolerated in every state, with the reason.
 const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
     Row { name, act, host_timeout_ms: 0, held: Some(why), parked: Some(why) }
 }

@@ -1,20 +1,20 @@
-//! How far and how fast the arm goes after a fault in motion until it stands, with holding brakes and without.
+//! Distance and speed of the arm after a fault in motion until it stands, with holding brakes and without.
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 
 use super::rows::{Act, ROWS, STOPS};
 use super::{MatrixError, words, world_in};
 use crate::config::Support;
 
-/// Speed below which a joint stands, rad/s.
+/// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 2e-3;
-/// For as long, ms.
+/// Time below this speed after which a joint counts as standing, ms.
 const STANDS_MS: u64 = 50;
 /// The motion of the test has this long to go, ms; a fault that stops nothing leaves it running for longer than `WATCH_MS`.
 const WATCH_MS: u64 = 700;
 /// Longest time watched, ms.
 const LONGEST_MS: u64 = 10_000;
 
-/// What becomes of the motion.
+/// Motion after the fault.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Motion {
     GoesOn,
@@ -59,7 +59,7 @@ pub(super) fn stop_lines() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// J-33, and 20 ms in which what was commanded comes to rest.
+/// Checks J-33, with 20 ms more for the commanded motion to come to rest.
 pub(super) fn stood_in_time(motion: &Motion) -> Result<(), MatrixError> {
     match *motion {
         Motion::Stands { ms, .. } if ms <= 520 => Ok(()),
@@ -107,7 +107,7 @@ fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, M
     Ok((state_then(t.state, t.trajectory, t.errors, joints), motion))
 }
 
-/// State, execution state where there is a path, and errors.
+/// Returns the state, the execution state if there is a path, and the errors.
 pub(super) fn state_then(
     state: ControllerState,
     trajectory: TrajectoryState,

@@ -1,4 +1,4 @@
-//! What makes sense in a motion only: commands that stop, on a bad line, near the torque limit, and with a payload.
+//! Rows that apply to a motion only: commands that stop, on a bad line, near the torque limit, and with a payload.
 use jtc_core::{ControllerState, Parameters};
 
 use super::MatrixError;
@@ -55,7 +55,7 @@ pub fn stopping_table() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// What came of a lowering, with holding brakes and without.
+/// Results of a lowering, with holding brakes and without.
 struct Line {
     then: [String; 2],
     motion: [Motion; 2],
@@ -64,7 +64,7 @@ struct Line {
 }
 
 impl Line {
-    /// The arm must be held when it stands; where the torque `suffices`, it must stand in time.
+    /// Runs a lowering. The arm must be held when it stands; if the torque `suffices`, it must stand in time.
     fn of(lowering: &Lowering, suffices: bool) -> Result<Self, MatrixError> {
         let mut sag = 0.0f64;
         let mut one = |support| -> Result<(String, Motion), MatrixError> {

@@ -1,4 +1,4 @@
-//! What users of the world see and do.
+//! Interface of the world to its users.
 use jtc_bus::{Frame, Joint, NODES, NodeState};
 use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
@@ -55,9 +55,9 @@ impl World {
         }
     }
 
-    /// The host has been silent for no longer than this (µs) in its own time, while virtual time may have passed faster: a frame whose bytes
-    /// come in pieces from another program is not interrupted by a gap (J-03) that is none of the host's making. Bytes that wait on the
-    /// line make gaps as before. `None`, the start: virtual time alone counts.
+    /// Limits the host's silence to `us` µs of its own time, while virtual time may pass faster: a frame whose bytes come in pieces from
+    /// another program is then not interrupted by a gap (J-03) that the host did not make. Bytes that wait on the line make gaps as
+    /// before. `None`, the default: virtual time alone counts.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
     }
@@ -85,12 +85,12 @@ impl World {
         self.board.clear_log();
     }
 
-    /// The controller itself, for a replay of what was recorded.
+    /// Returns the controller, for a replay of a recording.
     pub fn controller(&self) -> &Controller<Vec<RawPoint>> {
         self.board.controller()
     }
 
-    /// What the controller's last tick computed.
+    /// Returns the telemetry of the controller's last tick.
     pub fn telemetry(&self) -> &Telemetry {
         self.board.telemetry()
     }
@@ -100,7 +100,7 @@ impl World {
         self.board.stored_arm()
     }
 
-    /// How the arm really is.
+    /// Returns the true state of the arm.
     pub fn truth(&self) -> &Truth {
         self.plant.truth()
     }
@@ -120,12 +120,12 @@ impl World {
         self.sent.as_ref()
     }
 
-    /// From now on [`exchange`](Self::exchange) has what goes into the controller's board and what comes out of it.
+    /// Starts to record the inputs and outputs of the controller's board in [`exchange`](Self::exchange).
     pub fn watch_board(&mut self) {
         self.exchange.get_or_insert_default();
     }
 
-    /// What went into the controller's board in the last millisecond, and what came out; nothing unless it is
+    /// Returns the inputs and outputs of the controller's board in the last millisecond; `None` unless it is
     /// [watched](Self::watch_board).
     pub fn exchange(&self) -> Option<&Exchange> {
         self.exchange.as_deref()
@@ -146,8 +146,8 @@ impl World {
         self.bus.frames()
     }
 
-    /// A member of the joint bus that is not of this world sends a frame: an answer for the controller, or a
-    /// request for the nodes. False when too many such frames wait already.
+    /// Queues a frame of a member of the joint bus outside this world: an answer for the controller, or a request for the
+    /// nodes. Returns `false` if too many such frames wait already.
     pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
         self.bus.put(frame)
     }
@@ -172,17 +172,17 @@ impl World {
         self.safety_input = level;
     }
 
-    /// Something is where the gripper can hold it (from the start it is).
+    /// Places a part where the gripper can hold it, or removes it (present from the start).
     pub fn set_part_present(&mut self, present: bool) {
         self.plant.set_part_present(present);
     }
 
-    /// One more fault; `Trigger::At` counts from the start of the world.
+    /// Adds a fault; `Trigger::At` counts from the start of the world.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
     }
 
-    /// More faults, as a fault file has them; `Trigger::At` counts from the start of the world.
+    /// Adds the faults of a fault file; `Trigger::At` counts from the start of the world.
     pub fn inject_all(&mut self, plan: FaultPlan) {
         let known = self.hands.len();
         self.hands.extend(plan.hands);
@@ -222,7 +222,7 @@ impl World {
         }
     }
 
-    /// What happened.
+    /// Returns the event log.
     pub fn log(&self) -> &Log {
         &self.log
     }

@@ -1,5 +1,5 @@
-//! What goes into the controller's board in a millisecond, and what comes out of it: for somebody who runs another board, or the
-//! controller in another program, beside the one of the world.
+//! Inputs and outputs of the controller's board in a millisecond: for programs that run another board, or the controller in
+//! another program, together with the board of the world.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
@@ -10,11 +10,11 @@ use crate::board::{Board, Pins};
 pub struct Exchange {
     /// Bytes from the host that arrived before the tick.
     pub host: Vec<u8>,
-    /// The tick came. Without it nothing was looked at but the bytes from the host, and nothing came out.
+    /// `true` if the tick came. Without it the board only took the bytes from the host and produced no output.
     pub ticked: bool,
     /// Frames of the joint bus that the tick was given.
     pub bus: Vec<Frame>,
-    /// How the bus was.
+    /// State of the bus.
     pub bus_state: BusState,
     /// Level of the safety input: true = no error.
     pub safety_input: bool,
@@ -58,7 +58,7 @@ impl Exchange {
 }
 
 impl Board {
-    /// What a tick with these outputs, the last one, sends to the host: a status, an answer to an extension request, or nothing.
+    /// Returns the bytes that the last tick, with these outputs, sends to the host: a status, an answer to an extension request, or none.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };
         let answer = if outputs.answer_line.is_some() { self.answer_frame() } else { &[] };

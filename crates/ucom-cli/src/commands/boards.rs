@@ -1,4 +1,4 @@
-//! `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`: single acts on boards.
+//! `ucom info`, `status`, `reset`, `xreset`, `start`, `stop`: single commands to boards.
 
 use cli_kit::{Diagnose, ErrorKind, Failure, Output, error_object, exit};
 use serde_json::json;
@@ -10,7 +10,7 @@ use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, 
 use crate::session::shared_numbers;
 use crate::shape::{bits, board_table, board_value, info_value};
 
-/// What boards report about themselves.
+/// Shows the reports of boards about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
@@ -26,7 +26,7 @@ pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     Ok(())
 }
 
-/// Shows status bits, after setting and clearing some.
+/// Shows status bits, after setting and clearing some of them.
 pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let (set, clear) = (args.set.unwrap_or_default(), args.clear.unwrap_or_default());
     let (both, mirrors) = (set & clear, (set | clear) & Status::MIRRORS);
@@ -52,7 +52,8 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     Ok(())
 }
 
-/// One PC_SETSTATUS with these two bytes to each board, or one to all; what came of it beside what the rules require.
+/// Sends one PC_SETSTATUS with these two bytes to each board, or one to all, and shows the result next to the result
+/// that the rules require.
 fn raw_status(
     args: &StatusArgs,
     (mask, value): (u8, u8),
@@ -117,7 +118,7 @@ fn lines_of(all: &[Numbered]) -> String {
     all.iter().map(line).collect()
 }
 
-/// PC_RESET, to all at once or one by one.
+/// Sends PC_RESET, to all boards at once or one by one.
 pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let force = args.force.force;
@@ -146,12 +147,12 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     Ok(())
 }
 
-/// PC_XRESET: exloader with programming enabled.
+/// Sends PC_XRESET: exloader with programming enabled.
 pub fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::XReset { board, force })
 }
 
-/// PC_START: the application.
+/// Sends PC_START: starts the application.
 pub fn start(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::Start { board, force })
 }
@@ -170,13 +171,13 @@ fn act(
     Ok(())
 }
 
-/// Outputs, control and application, as far as asked. Stopping is always allowed: no other PC can forbid it.
+/// Stops outputs, control and application, as requested. Stopping is always allowed: no other PC can prevent it.
 pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
-    // Only reported, and only now: both boards of such a number were commanded to stop.
+    // Only reported, and only now: both boards with such a number got the stop command.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));

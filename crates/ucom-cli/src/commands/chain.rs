@@ -1,4 +1,4 @@
-//! `ucom scan` and `init`: who is in the chain, and which numbers boards have.
+//! `ucom scan` and `init`: connected boards and their numbers.
 
 use cli_kit::{ErrorKind, Failure, Output, OutputFile, error_object};
 use serde_json::json;
@@ -9,7 +9,7 @@ use ucom_host::session::{SessionError, nothing_shared};
 use crate::args::{InitArgs, LinkArgs};
 use crate::shape::{board_table, board_value};
 
-/// Who is there; changes nothing.
+/// Lists the connected boards; changes no board.
 pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
@@ -43,12 +43,12 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // What the command ends with is reported there.
+        // The error at the end of the command reports these findings.
         let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
-        // stdout has it already.
+        // stdout already has it.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.next));
             Err(Failure::shown(failure.kind))
@@ -86,7 +86,7 @@ pub fn init(args: &InitArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let compared = known.as_ref().filter(|_| !args.renew);
     let expected =
         compared.map(|i| i.boards().map(|b| (b.number, b.flash_number)).collect()).unwrap_or_default();
-    // It can be written: that is found out before the chain is numbered anew.
+    // Checks that the file can be written before the chain gets new numbers.
     let file = OutputFile::open(&args.inventory, true, &[]).map_err(Failure::nothing_sent)?;
     let mut driver = link.session()?;
     let profile = driver.master.profile();

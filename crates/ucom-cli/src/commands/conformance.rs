@@ -1,4 +1,4 @@
-//! `ucom conformance`: the acceptance tests of the board side, against boards that are there.
+//! `ucom conformance`: the acceptance tests of the board side, against connected boards.
 
 use std::path::Path;
 
@@ -15,13 +15,13 @@ use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 
-/// 2026-01-01: what a test programs has a date of its own, and none of the boards' own time.
+/// 2026-01-01: a fixed date for programs of tests, different from those of the boards.
 fn date(profile: &Profile) -> u16 {
-    // Where the date is a number without a meaning, any will do.
+    // If the date is a plain number, any number will do.
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
 }
 
-/// Runs the tests that are allowed and shows how each ended.
+/// Runs the allowed tests and shows their results.
 pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if let Some(wrong) = args.only.iter().find(|o| !test_names().any(|id| id.eq_ignore_ascii_case(o))) {
         let all: Vec<&str> = test_names().collect();
@@ -63,7 +63,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     }
 }
 
-/// The image for one board, which must be the one that is meant.
+/// Returns the image for one board, which must be the intended one.
 fn program(
     args: &ConformanceArgs,
     path: &Path,

@@ -1,4 +1,4 @@
-//! `ucom decode`: frames in words, from a recording, stdin or the live bus.
+//! `ucom decode`: frames as text, from a recording, stdin or the live bus.
 
 use std::io::BufRead;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -15,12 +15,12 @@ use super::record::{Silence, report_broken_off};
 use crate::args::{DecodeArgs, LinkArgs};
 use crate::interrupt::listen;
 
-/// Lines that are read before they are decoded, at most.
+/// Largest number of lines that are read before they are decoded.
 const READ_AHEAD: usize = 64;
-/// How often Ctrl-C is looked at while stdin brings nothing.
+/// Period of checks for Ctrl-C while stdin is idle.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Decodes to the end, or until Ctrl-C. Exit code 2 when nothing in a file is a frame.
+/// Decodes to the end, or until Ctrl-C. Exit code 2 if a file contains no frame.
 pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let left = args.count.unwrap_or(u64::MAX);
     if args.live {
@@ -35,7 +35,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).next("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
         report_broken_off(&recording, &args.file, out);
-        // The recorder's profile is the right one, unless another is asked for.
+        // The recorder's profile is used, unless another is requested.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
         }
@@ -96,7 +96,7 @@ fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Outpu
     });
 }
 
-/// Lines of stdin as they come; Ctrl-C ends them, also while none comes.
+/// Returns lines of stdin as they arrive; Ctrl-C ends them, even while stdin is idle.
 fn received(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
     let (sender, lines_read) = sync_channel(READ_AHEAD);
     let read = move || lines(std::io::stdin().lock()).try_for_each(|record| sender.send(record));
@@ -114,7 +114,7 @@ fn received(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>>
     }))
 }
 
-/// candump lines, or bare frames; empty lines are none.
+/// Reads candump lines or bare frames, and skips empty lines.
 fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
     let texts = input.lines().enumerate();
     texts.filter_map(|(i, line)| match line {
@@ -124,7 +124,7 @@ fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
     })
 }
 
-/// A line of a log, or a bare frame; `None`: nothing but a comment.
+/// Parses a line of a log, or a bare frame; `None` for a comment.
 pub fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     let bare = !line.starts_with('(');
     // A bare frame has no time and no bus; with both it is a line of a log.

@@ -1,4 +1,4 @@
-//! `ucom doctor` and `ucom probe`: what is wrong, and how boards read the protocol.
+//! `ucom doctor` and `ucom probe`: faults, and the boards' reading of the protocol.
 
 use std::time::Duration;
 
@@ -15,10 +15,10 @@ use super::params::open_output;
 use crate::args::{LinkArgs, ProbeArgs};
 use crate::shape::board_value;
 
-/// How long the bus is listened to before anything is asked.
+/// Listening time before the first request.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Looks at everything; ends with 0 when nothing is a problem, 3 without any frame, else 1.
+/// Checks everything; ends with 0 without a problem, 3 without any frame, else 1.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
@@ -58,7 +58,7 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
-        // Nothing was measured: a profile of defaults would pass for what these boards are.
+        // Without measurements a profile of defaults would look like the profile of these boards.
         let what = "no board answers: nothing was measured, no profile written";
         return Err(
             Failure::new(ErrorKind::NoLink, "no-boards", what).next("ucom doctor looks for the reason")

@@ -1,4 +1,4 @@
-//! `ucom explain`: what a word means that a screen shows, and what to do.
+//! `ucom explain`: the meaning of a word on a screen, and the next step.
 
 use cli_kit::{Failure, Output, table};
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use ucom_host::explain::{Word, find, words};
 
 use crate::args::ExplainArgs;
 
-/// Prints what the words mean, or the list of all.
+/// Prints the meaning of the words, or the list of all.
 pub fn explain(args: &ExplainArgs, out: &Output) -> Result<(), Failure> {
     let (query, all) = (args.word.join(" "), words());
     let found = if query.is_empty() { all.iter().collect() } else { find(&all, &query) };

@@ -16,13 +16,13 @@ use ucom_host::session::{
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
-/// Names of everything, what their words mean, and initial inputs where the application runs.
+/// Shows all names, the meaning of their words, and the first inputs if the application runs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
     let file =
         args.template.as_deref().map(|file| file_or_stdout(file, args.overwrite.overwrite)).transpose();
-    // What is there is a table that somebody has filled in.
+    // An existing file is a table that a user has filled in.
     let file = file.map_err(|e| match matches!(e, OutputError::Exists { .. }) {
         true => Failure::nothing_sent(e)
             .next("--template - shows the table, to be added by hand; --overwrite writes over it"),
@@ -33,7 +33,7 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let numbers = driver.numbers(&args.boards)?;
     for known in cache.all(&mut driver, &signals, &numbers, |_| false)? {
         let board = known.board;
-        // Without a started application there is nobody to ask for them.
+        // Without a started application no board can answer.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
@@ -86,7 +86,7 @@ fn io_value((known, initial): &Described) -> Value {
     })
 }
 
-/// What is known of a signal's words; null without a table.
+/// Returns the known meaning of a signal's words; null without a table.
 fn signal_value(signal: &Signal) -> Value {
     if !signal.known {
         return Value::Null;
@@ -179,7 +179,7 @@ pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Runs the board for a while and shows where it got to.
+/// Runs the board for a while and shows its final position.
 fn move_for(
     driver: &mut Driver,
     args: &CiArgs,
@@ -198,7 +198,7 @@ fn move_for(
         let plan = RunBoard { board, ci, par: Vec::new() };
         let options = RunOptions { boards: vec![plan], active: true, force };
         driver.master.watch(board, None, true);
-        // What it began it has taken back when it fails.
+        // After a failure the run has already undone its own changes.
         driver.run(Request::Run(options)).inspect_err(|_| prepared.undo(driver))?;
         Ok(prepared)
     })?;
@@ -221,7 +221,7 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // Not as a procedure that Ctrl-C cancels: it is what Ctrl-C asks for.
+    // Not as a procedure that Ctrl-C cancels: Ctrl-C requests this stop.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
@@ -283,14 +283,15 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// Notes that `--force` overrules nothing here: older scripts have it to write over a file.
+/// Notes that `--force` overrides no check here: older scripts use it to overwrite a file.
 fn note_force(force: bool, out: &Output) {
     if force {
         out.note("--force has no effect here: there is no check of the bus; --overwrite writes over a file");
     }
 }
 
-/// Readers of DBC files take them for Windows-1252; units have letters like ° and µ, which it has where Latin-1 has them.
+/// Encodes text as Windows-1252, which readers of DBC files expect. Letters of units like ° and µ have the same codes
+/// as in Latin-1.
 fn windows(text: &str) -> Vec<u8> {
     let byte = |c: char| u8::try_from(u32::from(c)).ok().filter(|b| !(0x80..0xA0).contains(b));
     text.chars().map(|c| byte(c).unwrap_or(b'?')).collect()

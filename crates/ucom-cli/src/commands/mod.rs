@@ -29,7 +29,7 @@ use cli_kit::{Failure, Output, pages};
 
 use crate::args::{Command, LinkArgs};
 
-/// Does what the command line asks for.
+/// Runs the command.
 pub fn run(command: Command, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     match command {
         Command::Sim(args) => sim::sim(&args, link, out),

@@ -1,4 +1,4 @@
-//! Boards as rows of the live view: as many columns as the terminal has room for, and always a board's state, status bits and heartbeat.
+//! Boards as rows of the live view: as many columns as fit, and always a board's state, status bits and heartbeat.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -7,7 +7,7 @@ use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
 use ucom_host::master::{Board, Boards, Life, Statistics};
 
-/// Status bits from the most significant one: a letter each where room is short, a word where there is more.
+/// Status bits from the most significant one: a letter each in narrow columns, a word in wider ones.
 pub const BITS: [(Status, char, &str); 8] = [
     (Status::MSTART, 'M', ""),
     (Status::ASTART, 'A', "autostart"),
@@ -19,13 +19,13 @@ pub const BITS: [(Status, char, &str); 8] = [
     (Status::IPINIT, 'i', "in-pin"),
 ];
 
-/// Columns that a terminal needs for status bits as words, and for flash numbers and programs.
+/// Width from which status bits are words, and flash numbers and programs are shown.
 pub const WIDE: u16 = 130;
 const MEDIUM: u16 = 72;
-/// An answer of a board of which nothing has come since is old after so long, s.
+/// Age above which the last answer of a board counts as old, s.
 const OLD_S: f64 = 5.0;
 
-/// A column: its head, its width, and what stands in it.
+/// A column: its head, its width, and its content.
 struct Column {
     head: &'static str,
     width: Constraint,
@@ -42,7 +42,7 @@ impl Column {
     }
 }
 
-/// The columns that have room, the most needed ones first in line.
+/// Returns the columns that fit, the most important first.
 fn columns(width: u16) -> Vec<Column> {
     let number =
         Column::new("#", Constraint::Length(2), |number, _, _, _| Cell::from(format!("{number:>2}")));
@@ -76,7 +76,7 @@ fn columns(width: u16) -> Vec<Column> {
     vec![number, state, letters, heartbeat]
 }
 
-/// The rows from `first` on, as far as the view is wide.
+/// Returns the rows from `first` on, at the width of the view.
 pub fn table(boards: &Boards, statistics: &Statistics, now: u64, width: u16, first: usize) -> Table<'static> {
     let columns = columns(width);
     let row = |(number, b): (u8, &Board)| {
@@ -106,7 +106,7 @@ fn state(board: &Board, now: u64) -> Cell<'static> {
     Cell::from(Span::styled(format!(" {} ", board.state_name(now)), style))
 }
 
-/// A letter for each bit that is set, in its place.
+/// Returns a letter for each set bit, in its place.
 fn letters(board: &Board) -> Cell<'static> {
     let Some(status) = board.status().filter(|_| board.is_known()) else {
         return Cell::from("?").dark_gray();
@@ -126,7 +126,7 @@ fn words(board: &Board) -> Cell<'static> {
 fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
     match (board.life, board.alive_age_s(now)) {
         (Life::Unarmed, _) | (_, None) => match board.last {
-            // It sends nothing by itself: what is shown of it is as old as its last answer.
+            // The board sends no frames by itself: the values shown are as old as its last answer.
             Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
                 Cell::from(format!("{:.0} s old", now.saturating_sub(at) as f64 * 1e-6)).dark_gray()
             }
@@ -150,7 +150,7 @@ mod tests {
 
     use super::*;
 
-    /// The letters and words of the view are explained as the bits that they stand for.
+    /// The letters and words of the view are explained under the names of their bits.
     #[test]
     fn every_letter_and_word_of_a_bit_is_explained() {
         let all = words();

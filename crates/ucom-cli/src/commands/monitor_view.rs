@@ -1,5 +1,5 @@
-//! The picture of `ucom monitor`, from a large terminal down to one of 40 columns and 12 rows: what is wrong and the next command come
-//! before anything else, what has no room scrolls, and the keys are always there.
+//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows: errors and the next command come first, rows
+//! without space scroll, and the keys are always visible.
 
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small, wrapped};
 use ratatui::Frame;
@@ -11,14 +11,14 @@ use ucom_host::session::{Picture, Problems, Watch};
 
 use super::monitor_boards::{self as rows, WIDE};
 
-/// Keys, of which the first are shown on terminals that are too small.
+/// Keys; terminals that are too small show only the first.
 const KEYS: &str = "s stops  q ends";
-/// Rows of boards that are shown however much is wrong, with their head.
+/// Least number of board rows with their head, for any number of errors.
 const LEAST_ROWS: u16 = 4;
-/// Rows from which on there is one for the last event.
+/// Number of rows above which the last event has its own row.
 const EVENT: u16 = 16;
 
-/// Draws everything; `scroll` learns what has room.
+/// Draws the view; sets the visible rows in `scroll`.
 pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     if too_small(frame, KEYS) {
         return;
@@ -30,7 +30,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let most = area.height.saturating_sub(1 + LEAST_ROWS + 2 * edge + log);
     let (trouble, rest) = trouble(picture).lines(inner, most.into());
     let first = if trouble.is_empty() { 0 } else { trouble.len() as u16 + edge };
-    // A frame with the curve of the load only where nothing else is short of room for it.
+    // A frame with the load curve only if all other parts have enough space.
     let wanted = rest.len() as u16 + boards.max(1) + 1 + edge;
     let head = if framed && area.height >= first + wanted + log + 5 { 5 } else { 1 };
     let left = area.height.saturating_sub(first + head);
@@ -64,7 +64,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    // A head without a row below it has no use.
+    // A head without a row below it is useless.
     if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture.boards, picture.statistics, picture.now, inner, skip), table);
     }
@@ -73,13 +73,13 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
 }
 
-/// What is wrong, what a key did, and the next command.
+/// Returns the errors, the effect of a key, and the next command.
 fn trouble(picture: &Picture<'_>) -> Trouble {
     let Problems { causes, warnings, next } = picture.problems();
     Trouble { causes, warnings, next, message: picture.watch.message.clone() }
 }
 
-/// The bus in one line, with its name where that fits whole.
+/// Returns the bus in one line, with its name if the whole name fits.
 fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
     let load = picture.statistics.load_percent(picture.now);
     let foreign = picture.statistics.foreign_count();
@@ -125,7 +125,7 @@ fn load(picture: &Picture<'_>, room: usize) -> Sparkline<'static> {
         .block(panel(&format!("bus load {percent:.1} %")))
 }
 
-/// The newest events, the last one at the bottom; a long one goes on in the next line.
+/// Draws the newest events, the last one at the bottom; a long one continues on the next line.
 fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
     let (width, height) = if framed {
         (area.width.saturating_sub(4), area.height.saturating_sub(2))

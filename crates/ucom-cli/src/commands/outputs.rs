@@ -1,4 +1,4 @@
-//! `ucom so`: what boards send while they run, by name and in units.
+//! `ucom so`: outputs of running boards, by name and in units.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
 
-/// Waits for the reader of stdout as long as it reads.
+/// Waits for the reader of stdout while it reads.
 pub fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
@@ -20,7 +20,7 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
     }
 }
 
-/// Outputs of boards as they come; only listens once their names are known.
+/// Shows outputs of boards as they arrive; only listens once their names are known.
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
@@ -41,7 +41,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
-                // Another PC runs the boards: that is why there is something to see.
+                // Another PC runs the boards: this is why there are outputs.
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;

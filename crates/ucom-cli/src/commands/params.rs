@@ -46,12 +46,12 @@ pub fn par(args: &ParArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// The file to write, opened before anything is sent and not written over unless that was asked for.
+/// Opens the output file before any frame is sent; an existing file is overwritten only on request.
 pub fn open_output(file: &Path, overwrite: bool) -> Result<OutputFile, Failure> {
     OutputFile::open(file, overwrite, &[]).map_err(Failure::nothing_sent)
 }
 
-/// The same; `-` is stdout, and so `None`.
+/// Opens an output file; `-` is stdout, and returns `None`.
 pub fn file_or_stdout(file: &Path, overwrite: bool) -> Result<Option<OutputFile>, OutputError> {
     match file.as_os_str() == "-" {
         true => Ok(None),
@@ -94,7 +94,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
     });
 }
 
-/// Place, name, and what this process wrote.
+/// Returns place, name, and the value that this process wrote.
 fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, &'a String, Option<u16>)> {
     let assumed = driver.master.parameters(p.known.board);
     p.known.names.par.iter().enumerate().map(move |(i, name)| match assumed.get(i) {
@@ -103,7 +103,7 @@ fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, 
     })
 }
 
-/// Writes a parameter file: what was written last as values, all other names as comments.
+/// Writes a parameter file: the last written values, and all other names as comments.
 fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Output) -> Result<(), Failure> {
     let names = inventory(&args.inventory).map_err(Failure::usage)?;
     let board = |p: &Parameters| {
@@ -138,7 +138,7 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
     })
 }
 
-/// A text that was asked for: into a file, or to stdout for `-`.
+/// Delivers a requested text: into a file, or to stdout for `-`.
 pub fn deliver(
     file: Option<OutputFile>,
     text: &str,
@@ -151,7 +151,7 @@ pub fn deliver(
         out.result(&result, || text.into());
         return Ok(());
     };
-    // Whole or not at all: what was there is people's own work.
+    // Atomic: the old content is a user's work.
     ucom_host::files::write_text(file.path(), text).map_err(Failure::usage)?;
     let name = file.name();
     file.is_written();
@@ -179,7 +179,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    // What is written to must run. To check, what is known will do.
+    // Boards that are written to must run. A check can use the cache.
     let cache = args.cache.cache();
     let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;

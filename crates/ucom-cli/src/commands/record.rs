@@ -14,14 +14,14 @@ use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::interrupt::listen;
 use crate::session::shared_numbers;
 
-/// So often what was recorded reaches the file: a recorder that is killed loses no more.
+/// Period of writes to the file: a killed recorder loses no more than this.
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
     Failure::new(ErrorKind::Fault, "recording", e).next("is the disk full?")
 }
 
-/// Reports that a recording does not end as one does.
+/// Reports an incomplete recording.
 pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     if let Some(why) = &recording.broken_off {
         let (file, whole) = (file.display(), recording.records.len());
@@ -30,22 +30,22 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     }
 }
 
-/// A bus on which nothing has come for so long is reported.
+/// Silence of a bus after which the command reports it.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Reports once, to people, that nothing has come of a bus yet, and what to look at.
+/// Reports once, to users, that a bus has sent no frames yet, and what to check.
 pub struct Silence {
     since: Instant,
     over: bool,
 }
 
 impl Silence {
-    /// From now on it is listened; programs know themselves when nothing comes.
+    /// Starts to listen; without a note for programs, which detect silence themselves.
     pub fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }
 
-    /// To be called at each look at the bus: whether a frame came.
+    /// Must be called at each poll of the bus; `came`: a frame has arrived.
     pub fn look(&mut self, came: bool, out: &Output) {
         if !came && self.since.elapsed() < SILENCE {
             return;
@@ -59,7 +59,7 @@ impl Silence {
     }
 }
 
-/// Records until Ctrl-C, so long, or so many frames.
+/// Records until Ctrl-C, for the requested time, or the requested number of frames.
 pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let stop = listen(&CleanupList::default())?;
     let profile = link.profile()?;
@@ -89,11 +89,11 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         bus.news().iter().for_each(|news| out.note(news));
         silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
-        // However the clock is set meanwhile, time does not run backwards in a file.
+        // Time never runs backwards in a file, even if the clock is changed meanwhile.
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // `ucom record - | head` has what it wanted.
+            // `ucom record - | head` has read enough.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;
@@ -119,7 +119,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     Ok(())
 }
 
-/// The files of a recording, opened before anything is recorded; its form goes by the ending.
+/// Opens the files of a recording before it starts; the file ending selects the format.
 fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>, Failure> {
     let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
     let known = ["log", "candump", "fzi", "fzican", "mcap"];
@@ -133,7 +133,7 @@ fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>
     files.map(|file| open_output(&file, args.overwrite)).collect()
 }
 
-/// Who may end a replay, and where its notes go.
+/// Stop signal and output of a replay.
 struct Player<'a> {
     stop: Stop,
     out: &'a Output,
@@ -149,7 +149,7 @@ impl Operator for Player<'_> {
     }
 }
 
-/// Sends a recording's frames when they are due.
+/// Sends the frames of a recording at their times.
 pub fn replay(args: &ReplayArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if !(args.speed.is_finite() && args.speed > 0.0) {
         return Err(Failure::usage(format!("--speed {}: it must be above 0", args.speed)));

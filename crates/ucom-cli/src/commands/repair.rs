@@ -10,12 +10,12 @@ use ucom_host::session::SessionError;
 use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
-/// Repairs the board; its flash number must be the one that is named, else as the inventory has it.
+/// Repairs the board; its flash number must be the named one, else that of the inventory.
 pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {
         Some(flash) => flash,
-        // Which board is meant is the command line's matter: wrong usage.
+        // The choice of the board belongs to the command line: wrong usage.
         None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).next(e.hint()))?,
     };
     let mut driver = link.session()?;

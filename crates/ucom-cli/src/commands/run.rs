@@ -16,7 +16,7 @@ use super::outputs::finish;
 use super::typed::{obey, typed};
 use crate::args::{Boards, LinkArgs, OnLost, RunArgs};
 
-/// How often `run` shows how things are.
+/// Period of the reports of `run`.
 const REPORT_PERIOD: Duration = Duration::from_secs(1);
 
 /// Starts boards and keeps them running until Ctrl-C.
@@ -34,13 +34,13 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;
     let file = match &args.params {
-        // Of all boards none may be missing that the file has something for.
+        // With all boards, every board in the file must be connected.
         Some(path) => Some(ParameterFile::read(path, &args.inventory, |n| {
             args.boards == Boards::All || boards.contains(&n)
         })?),
         None => None,
     };
-    // Who is there comes first: it needs no started application.
+    // The identities are read first: this needs no started application.
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
@@ -49,7 +49,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     let (report, prepared) = with_names(&args.cache.cache(), |cache| {
         let mut prepared = Prepared::default();
         let report = start(&mut driver, args, cache, &boards, &signals, file.as_ref(), &mut prepared);
-        // What the procedure began it has taken back itself.
+        // The procedure has already undone its own changes.
         let report = report.inspect_err(|_| prepared.undo(&mut driver))?;
         Ok((report, prepared))
     })?;
@@ -80,7 +80,7 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     Ok(followed.nobody_left()?)
 }
 
-/// That the boards run, with which flags and at which load of the bus.
+/// Prints that the boards run, with their flags and the load of the bus.
 fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output) {
     let running = json!({
         "event": "running",
@@ -95,7 +95,7 @@ fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output)
     }));
 }
 
-/// Names, plans, and the start of all boards.
+/// Reads names and plans, and starts all boards.
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
@@ -119,7 +119,7 @@ fn start(
     }
 }
 
-/// Texts of the boards, if they are wanted.
+/// Requests the texts of the boards, if wanted.
 fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), Failure> {
     let on = |wanted: bool| wanted.then_some(true);
     for board in boards.iter().filter(|_| args.debug || args.global_debug) {
@@ -130,7 +130,7 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervision until Ctrl-C, `stop`, the end of the time, or of the last board's loop.
+/// Supervises until Ctrl-C, `stop`, the end of the time, or of the last board's loop.
 fn supervise(
     driver: &mut Driver,
     args: &RunArgs,
@@ -162,7 +162,7 @@ fn supervise(
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
-        // What was found while it runs: a fault, not a refusal.
+        // An error found during the run: a fault, not a refusal.
         nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
@@ -187,7 +187,7 @@ fn supervise(
     }
 }
 
-/// The last outputs of each board, as events of `--json`.
+/// Prints the last outputs of each board, as events of `--json`.
 fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdout: &Lines, out: &Output) {
     for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
         let Some(known) = prepared.known.get(&board) else { continue };
@@ -201,7 +201,7 @@ fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdo
     }
 }
 
-/// A notice as an event of `--json`.
+/// Returns a notice as an event of `--json`.
 fn notice_value(notice: &Notice) -> Value {
     let Notice { board, change, time_s, age_s } = *notice;
     match notice.is_of_loop() {

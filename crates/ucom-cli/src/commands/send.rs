@@ -1,4 +1,4 @@
-//! `ucom send`: single frames as they are.
+//! `ucom send`: single frames, unchanged.
 
 use std::time::{Duration, Instant};
 
@@ -11,10 +11,10 @@ use ucom_host::session::{is_intrusive, replayed};
 use super::decode::parsed;
 use crate::args::{LinkArgs, SendArgs};
 
-/// How long the adapter is listened to afterwards: a controller that leaves the bus does so within some 32 tries of a frame.
+/// Listening time after the last frame: a controller goes bus-off within about 32 attempts of a frame.
 const SENT: Duration = Duration::from_millis(50);
 
-/// Sends frames in the order given; all are looked at before the first one leaves.
+/// Sends frames in the given order; all are checked before the first one is sent.
 pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let frame = |(i, text): (usize, &String)| {
         let record = parsed(text.trim(), i + 1).unwrap_or_else(|| Err(Failure::usage("an empty frame")))?;

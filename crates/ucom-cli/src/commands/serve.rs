@@ -21,10 +21,10 @@ use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 use crate::args::{LinkArgs, ServeArgs};
 use crate::interrupt::listen;
 
-/// How long nothing that happens outside is waited for.
+/// Period at which signals are polled.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Owns the bus until SIGINT or SIGTERM; what the agent has started is stopped then.
+/// Owns the bus until SIGINT or SIGTERM; then boards that the agent has started are stopped.
 pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(Failure::usage("a bus and --sim: the agent owns one of them")
@@ -42,7 +42,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         signals: link.signal_table()?,
         cache: args.cache.cache(),
         cleanup: CleanupList::default(),
-        // Simulated boards begin anew each time: the inventory of real ones is not theirs.
+        // Simulated boards are new each time: the inventory of real boards does not apply.
         inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
@@ -59,7 +59,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
-    // It goes behind the owner of its bus.
+    // The simulated chain outlives the owner of its bus.
     let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;
@@ -94,7 +94,7 @@ fn log_failure(out: &Output) -> impl FnMut(&std::io::Error) + Send + 'static + u
     }
 }
 
-/// A simulated chain that goes on in a thread.
+/// A simulated chain that runs in a thread.
 struct Simulated {
     url: String,
     ended: Arc<AtomicBool>,
@@ -116,7 +116,7 @@ impl Simulated {
                 Ok(server) => server,
                 Err(error) => return drop(ready.send(Err(error.to_string()))),
             };
-            // Who waits for it has not gone.
+            // The receiver of this message still exists.
             let _ = ready.send(Ok(server.url()));
             while !end.load(Ordering::Relaxed) {
                 server.turn(LOOK);

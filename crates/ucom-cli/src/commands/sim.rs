@@ -1,4 +1,4 @@
-//! `ucom sim`: a simulated chain behind a server of the socketcand protocol.
+//! `ucom sim`: a simulated chain with a server of the socketcand protocol.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use super::typed::typed;
 use crate::args::{LinkArgs, SimArgs};
 use crate::interrupt::listen;
 
-/// How long nothing that happens outside is waited for: signals and stdin are looked at so often.
+/// Period at which signals and stdin are polled.
 const LOOK: Duration = Duration::from_millis(50);
 
 /// Serves a simulated chain until SIGINT or SIGTERM.

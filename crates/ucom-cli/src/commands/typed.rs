@@ -1,4 +1,4 @@
-//! What is typed while `ucom run` runs: inputs, parameters, outputs on and off.
+//! Lines typed during `ucom run`: inputs, parameters, outputs on and off.
 
 use cli_kit::Failure;
 use std::io::{BufRead, ErrorKind};
@@ -10,15 +10,15 @@ use ucom_host::session::{Driver, History, Prepared, note_rounded, only, words};
 
 use crate::args::{Assignment, RunArgs};
 
-/// Lines on stdin, read beside the bus.
+/// Reads lines from stdin, in parallel with the bus.
 pub fn typed() -> Receiver<String> {
     let (sender, receiver) = channel();
     std::thread::spawn(move || each_line(std::io::stdin().lock(), |line| sender.send(line).is_ok()));
     receiver
 }
 
-/// Hands over every line until the end, or until `take` wants no more. A byte that is no text makes a line that nothing
-/// obeys, and that is reported; it does not keep a later `stop` from being read.
+/// Hands over every line until the end, or until `take` returns `false`. A byte that is not text makes an invalid line,
+/// which is reported; a later `stop` is still read.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {
@@ -35,7 +35,7 @@ fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     }
 }
 
-/// The assignments of a line: a word without `=` is the unit of the value before it, `current_max=1500 mA`.
+/// Parses the assignments of a line: a word without `=` is the unit of the value before it, `current_max=1500 mA`.
 fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
     let mut values: Vec<String> = Vec::new();
     for word in words {
@@ -47,7 +47,7 @@ fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignmen
     values.iter().map(|word| word.parse().map_err(Failure::usage)).collect()
 }
 
-/// `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
+/// Executes a line: `ci 1 set_position=1500`, `par 1 kp=80`, `active on`, `active off`.
 pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared) -> Result<(), Failure> {
     let form = || {
         Failure::usage(format!(
@@ -65,7 +65,7 @@ pub fn obey(driver: &mut Driver, args: &RunArgs, line: &str, prepared: &Prepared
             };
             let boards: Vec<u8> = prepared.known.keys().copied().collect();
             if !on {
-                // What fails has been noted with its board.
+                // Failures have already been noted with their boards.
                 let failed = driver.outputs_safe(&boards, true).failed;
                 return failed.into_iter().next().map_or(Ok(()), |(_, failure)| Err(failure.into()));
             }

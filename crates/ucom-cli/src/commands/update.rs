@@ -14,7 +14,7 @@ use super::update_files::{Files, day};
 use super::update_report::print;
 use crate::args::{Boards, LinkArgs, UpdateArgs};
 
-/// Programs the boards that are meant.
+/// Programs the selected boards.
 pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let profile = link.profile()?;
     let files = Files::read(args, &profile, out)?;
@@ -26,7 +26,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
-    // Before anything is asked or sent: what goes where.
+    // Before any question and any frame: images and targets.
     files.notes.iter().for_each(|note| driver.note(note.clone()));
     driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
@@ -40,7 +40,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         second: files.second,
         expect_program_id: args.expect_program_id,
         name_target: args.name_target,
-        // The other boards of an update session are none the worse for one that fails.
+        // In an update session, the failure of a board does not affect the other boards.
         keep_going: several,
         ..UpdateOptions::new(targets, files.image, day)
     };
@@ -56,14 +56,14 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     }
 }
 
-/// A board and who it must be.
+/// Describes a board and its required identity.
 fn target(target: &UpdateTarget) -> String {
     let who =
         target.flash_number.map_or_else(|| "any flash number".into(), |f| format!("flash number 0x{f:04X}"));
     format!("board {} ({who})", target.board)
 }
 
-/// The boards that are meant. `all` are those that answer and those of the inventory: a board that is missing is reported.
+/// Returns the selected boards. `all` means those that answer and those of the inventory: a missing board is reported.
 fn with_listed(mut numbers: Vec<u8>, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     if args.boards == Boards::All && args.inventory.exists() {
         let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
@@ -78,7 +78,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Ctrl-C while it was still asked who is there: nothing was sent that changes a board, which the report shows.
+/// Handles Ctrl-C during the identification: no board was changed, which the report shows.
 fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;
@@ -102,7 +102,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
     Failure::shown(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
-/// Which flash number each board must have: named, else as the inventory has it.
+/// Returns the required flash number of each board: the named one, else that of the inventory.
 fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = args.flash_id {
         return match numbers {
@@ -111,7 +111,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
                 .next("a list takes the flash ids from the inventory that ucom init writes")),
         };
     }
-    // One board by its number alone is what the user asked for; a list needs to know who is who.
+    // For a single board its number is enough; a list needs the identity of each board.
     if let ([board], Boards::Some(_)) = (numbers, &args.boards)
         && !args.inventory.exists()
     {

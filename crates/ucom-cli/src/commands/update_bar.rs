@@ -1,4 +1,4 @@
-//! The bar of an update on stderr. A thread of its own draws it: a terminal that is held (Ctrl-S) must not stop a block.
+//! Bar of an update on stderr. A separate thread draws it: a blocked terminal (Ctrl-S) must not delay a block.
 
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
@@ -7,21 +7,21 @@ use cli_kit::{ErrorKind, Failure, Output, ProgressBar};
 use ucom_host::master::Event;
 use ucom_host::master::update::Progress;
 
-/// Steps that wait to be drawn; more are left out.
+/// Largest number of waiting steps; more are dropped.
 const WAITING: usize = 4;
-/// At the end, a terminal that takes nothing for so long is not waited for.
+/// Longest wait for a blocked terminal at the end.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 
-/// What is drawn next.
+/// Next state of the bar.
 struct Step {
     bar: ProgressBar,
-    /// Which bar it is: another one takes the place of the one before.
+    /// Number of the bar: a new bar replaces the previous one.
     serial: usize,
     bytes: u64,
     message: String,
 }
 
-/// The bar of the boards that are at work.
+/// Bar of the boards in progress.
 pub struct Bar<'a> {
     out: &'a Output,
     bar: Option<(Vec<u8>, ProgressBar)>,
@@ -32,7 +32,7 @@ pub struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    /// None is shown before the first progress.
+    /// Creates a bar that stays hidden before the first progress.
     pub fn new(out: &'a Output) -> Result<Self, Failure> {
         let (steps, drawn) = sync_channel(WAITING);
         let (end, ended) = channel::<()>();
@@ -46,7 +46,7 @@ impl<'a> Bar<'a> {
         Ok(Self { out, bar: None, serial: 0, steps, ended })
     }
 
-    /// Draws the progress in an event, when the terminal takes it.
+    /// Draws the progress in an event, if the terminal accepts it.
     pub fn see(&mut self, event: &Event) {
         let Event::Progress { progress, .. } = event else { return };
         if self.bar.as_ref().is_none_or(|(boards, _)| *boards != progress.boards) {
@@ -58,12 +58,12 @@ impl<'a> Bar<'a> {
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
             let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
-            // Too many wait: the next step contains the same, and more.
+            // Too many wait: the next step contains the same progress, and more.
             let _ = self.steps.try_send(step);
         }
     }
 
-    /// Takes the bar away, before anything else is printed.
+    /// Removes the bar, before any other output.
     pub fn end(self) {
         let Self { steps, ended, .. } = self;
         drop(steps);

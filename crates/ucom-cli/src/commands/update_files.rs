@@ -1,4 +1,4 @@
-//! The files and the date of an update, checked against what the profile's plan takes.
+//! Files and date of an update, checked against the profile's plan.
 
 use std::path::{Path, PathBuf};
 
@@ -12,20 +12,20 @@ use ucom_host::master::update::{UpdateImage, has_header};
 
 use crate::args::{Addresses, UpdateArgs};
 
-/// What the files hold.
+/// Contents of the files.
 pub struct Files {
     /// The image.
     pub image: UpdateImage,
-    /// What the other cycle carries.
+    /// Image of the other cycle.
     pub second: Option<UpdateImage>,
-    /// Where they came from, in that order.
+    /// Paths of the images, in the same order.
     pub names: Vec<PathBuf>,
-    /// What each holds, in words.
+    /// Description of each file.
     pub notes: Vec<String>,
 }
 
 impl Files {
-    /// Reads the files that the plan takes; refuses others.
+    /// Reads the files of the plan; refuses others.
     pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
@@ -51,7 +51,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     let format = args.raw.then_some(Format::Bin);
     let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
-        // Some mistakes name the file themselves.
+        // Some errors name the file themselves.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
         failure.next(advice(&e))
@@ -71,7 +71,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     Ok((image.into(), note))
 }
 
-/// What helps against a file that is no image. It never leads past a check of what the file holds.
+/// Returns the hint for an invalid image file. The hint never suggests skipping a check of the content.
 fn advice(error: &ImageError) -> String {
     match error.advice() {
         ImageAdvice::None => String::new(),
@@ -94,7 +94,7 @@ fn advice(error: &ImageError) -> String {
     }
 }
 
-/// The file beside the image that the plan takes.
+/// Returns the additional image file that the plan needs.
 fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     let options = [
         ("--exloader", Plan::ExloaderApp, &args.exloader),
@@ -125,7 +125,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     Ok(None)
 }
 
-/// The flash date: as asked, else today (UTC); 0 where no header carries it.
+/// Returns the flash date: as requested, else today (UTC); 0 if no header carries it.
 pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
@@ -186,7 +186,7 @@ mod tests {
             assert!(read(wrong).is_none(), "{wrong}");
         }
         assert!(day(None, &fat).is_ok_and(|today| today > 0x3AC1));
-        // Bits only, as there is no calendar.
+        // Bits only, because this form has no calendar.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
         assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));

@@ -31,7 +31,7 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// Starts one on a free port and waits until it is ready.
+    /// Starts a simulator on a free port and waits until it is ready.
     pub fn start(options: &[&str]) -> Self {
         let mut child = command()
             .args(["sim", "--listen", "127.0.0.1:0"])
@@ -51,7 +51,7 @@ impl Sim {
         Self { child, url: url.to_owned(), dir: tempfile::tempdir().expect("a directory") }
     }
 
-    /// The same, and its boards have their numbers.
+    /// Like `start`, with numbered boards.
     pub fn numbered(options: &[&str]) -> Self {
         let sim = Self::start(options);
         sim.ucom(&["init"]).ends(0);
@@ -66,53 +66,53 @@ impl Sim {
         command
     }
 
-    /// Runs `ucom` on its bus, with an inventory and a cache of its own.
+    /// Runs `ucom` on its bus, with a separate inventory and cache.
     pub fn ucom(&self, words: &[&str]) -> CommandOutput {
         run(self.command(), words, "")
     }
 
-    /// What `ucom --json` with these words answers; panics if it ends with another code.
+    /// Returns the answer of `ucom --json` with these words; panics if the command ends with another code.
     pub fn json(&self, words: &[&str], code: i32) -> Value {
         self.ucom(&[&["--json"], words].concat()).ends(code).json()
     }
 
-    /// The status byte of a board.
+    /// Returns the status byte of a board.
     pub fn status_byte(&self, board: &str) -> Value {
         self.json(&["status", board], 0)["boards"][0]["status_byte"].clone()
     }
 
-    /// Starts `ucom` on its bus; it goes on while the test does.
+    /// Starts `ucom` on its bus, in parallel with the test.
     pub fn spawn(&self, words: &[&str]) -> Child {
         let mut command = self.command();
         command.args(words).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.spawn().expect("ucom starts")
     }
 
-    /// A path in its directory.
+    /// Returns a path in its directory.
     pub fn path(&self, name: &str) -> String {
         self.dir.path().join(name).to_str().unwrap().to_owned()
     }
 
-    /// A file in its directory.
+    /// Creates a file in its directory.
     pub fn file(&self, name: &str, bytes: &[u8]) -> String {
         std::fs::write(self.path(name), bytes).expect("a file");
         self.path(name)
     }
 
-    /// Begins a fault.
+    /// Starts a fault.
     pub fn fault(&mut self, line: &str) {
         let stdin = self.child.stdin.as_mut().expect("stdin");
         writeln!(stdin, "{line}").expect("the simulator reads");
-        // It looks at its stdin every 50 ms.
+        // The simulator polls its stdin every 50 ms.
         std::thread::sleep(Duration::from_millis(150));
     }
 
-    /// Joins its bus as a device that knows nothing but frames.
+    /// Joins its bus as a device that sends and receives plain frames.
     pub fn peer(&self) -> Peer {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
-    /// Ends it at once, as a power cut; its directory stays.
+    /// Kills it, like a power cut; its directory stays.
     pub fn kill(mut self) -> tempfile::TempDir {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
@@ -124,7 +124,7 @@ impl Sim {
         signal(&self.child, name);
     }
 
-    /// Sends a signal and waits for the end: its exit code.
+    /// Sends a signal, waits for the end and returns the exit code.
     pub fn end(mut self, name: &str) -> i32 {
         signal(&self.child, name);
         self.child.wait().expect("it ends").code().unwrap_or(-1)
@@ -144,7 +144,7 @@ pub fn ended_by(child: Child, name: &str) -> CommandOutput {
     ended(child)
 }
 
-/// What became of each board of an update.
+/// Returns the outcome of each board of an update.
 pub fn outcomes(report: &Value) -> Vec<&str> {
     report["boards"].as_array().unwrap().iter().map(|b| b["outcome"].as_str().unwrap()).collect()
 }
@@ -155,7 +155,7 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// Sends a frame written as candump does, `1C1#0202`.
+    /// Sends a frame in candump notation, `1C1#0202`.
     pub fn send(&mut self, text: &str) {
         let (id, data) = text.split_once('#').expect("ID#DATA");
         let id = Id::standard(u32::from_str_radix(id, 16).expect("hex")).expect("11 bits");
@@ -165,12 +165,12 @@ impl Peer {
         self.bus.send(&CanFrame::classic(id, &data).expect("8 bytes")).expect("sent");
     }
 
-    /// How often its controller has left the bus, by what the server reported.
+    /// Returns how often its controller went bus-off, as the server reported.
     pub fn times_bus_off(&self) -> u64 {
         self.bus.times_bus_off()
     }
 
-    /// The next frame within a time.
+    /// Returns the next frame within a time.
     pub fn receive(&mut self, within_ms: u64) -> Option<String> {
         self.receive_for(Duration::from_millis(within_ms))
     }
@@ -181,7 +181,7 @@ impl Peer {
         Some(format!("{}#{data}", frame.id()))
     }
 
-    /// Everything within a time.
+    /// Returns all frames within a time.
     pub fn all(&mut self, within_ms: u64) -> Vec<String> {
         let end = Instant::now() + Duration::from_millis(within_ms);
         let mut received = Vec::new();
@@ -191,7 +191,7 @@ impl Peer {
         received
     }
 
-    /// Waits for a frame that begins so; what comes before it is passed over.
+    /// Waits for a frame that begins with `start`; skips others.
     pub fn wait(&mut self, start: &str) -> String {
         let mut patience = Patience::begin();
         let mut next = || patience.wait(format_args!("a frame {start}"), |time| self.receive_for(time));
@@ -202,13 +202,13 @@ impl Peer {
         }
     }
 
-    /// Waits for so many frames that begin so.
+    /// Waits for `count` frames that begin with `start`.
     pub fn wait_for(&mut self, count: usize, start: &str) {
         (0..count).for_each(|_| drop(self.wait(start)));
     }
 }
 
-/// An image of so many bytes, different for each seed.
+/// Returns an image of `bytes` bytes, different for each seed.
 pub fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
 }

@@ -1,4 +1,4 @@
-// What the page of an arm knows: model, controller, jobs, what is previewed. Components read it, and ask by it.
+// State of the page of an arm: model, controller, jobs, preview. Components read it, and send requests through it.
 import { getContext, setContext } from 'svelte';
 
 import { ApiError } from '../api.ts';
@@ -11,12 +11,12 @@ import { freeNumber } from './numbers.ts';
 import type { ArmEntry, Controller, InfoObject, JobObject, PayloadObject, Points, Pose, ProblemObject, Status, TrajectoryObject } from './types.ts';
 import { eventWords, isMoving, isPaused, jobWords, stateWords, type StateWords, whatStopDid } from './words.ts';
 
-/** Columns of the history: time, then six of each. */
+/** Columns of the history: time, then six of each quantity. */
 export const COLUMN = { position: 1, velocity: 7, torque: 13, temperature: 19, commanded: 25, error: 31 } as const;
 const COLUMNS = 37;
-/** Rows that are kept: ten minutes at 25 Hz. */
+/** Number of stored rows: ten minutes at 25 Hz. */
 const ROWS = 15_000;
-/** What people read changes so often at most, ms. */
+/** Shortest period of displayed text, ms. */
 const READ_MS = 120;
 
 /** A job as its events report it. */
@@ -26,7 +26,7 @@ export interface Course {
   client: string;
   phase: string;
   stage: 'begun' | 'uploading' | 'executing' | 'ended';
-  /** 0 to 1, of the phase. */
+  /** Progress of the phase, 0 to 1. */
   progress: number;
   duration_s: number;
   runs: number;
@@ -34,12 +34,12 @@ export interface Course {
   own: boolean;
 }
 
-/** What becomes of a job before it moves anything. */
+/** Stages of a job before a motion. */
 const STAGES = { begun: ': being prepared', uploading: ': being uploaded', executing: '', ended: '' };
 
 export interface Preview {
   points: Points;
-  /** s on the slider. */
+  /** Time on the slider, s. */
   time: number;
   problems: ProblemObject[];
   title: string;
@@ -67,9 +67,9 @@ export class ArmPage {
 
   tab = $state<Tab>('state');
   unit = $state<AngleUnit>(device.getItem('openjtc-unit') === 'rad' ? 'rad' : 'deg');
-  /** As of the last status that was read out; undefined: nothing that is known is of now. */
+  /** Last displayed status; undefined: no current status. */
   controller = $state.raw<Controller | undefined>(undefined);
-  /** For the picture and the plots: each status. */
+  /** Every status, for the scene and the plots. */
   latest: Controller | undefined;
   model = $state.raw<ArmModel | undefined>(undefined);
   info = $state.raw<InfoObject | undefined>(undefined);
@@ -81,14 +81,14 @@ export class ArmPage {
   lastJob = $state.raw<JobObject | undefined>(undefined);
   speed = $state(100);
   preview = $state<Preview | undefined>(undefined);
-  /** The joint that somebody points at, from 1. */
+  /** Joint under the pointer, from 1. */
   pointed = $state<number | undefined>(undefined);
   explained = $state<string | undefined>(undefined);
-  /** The page asks which arm this is, before it recovers. */
+  /** The page asks for the arm, before it recovers. */
   asksArm = $state(false);
-  /** An arm file that was opened, to be compared and given. */
+  /** An opened arm file, to be compared and given. */
   armFile = $state.raw<{ name: string; text: string } | undefined>(undefined);
-  /** What the last Stop that was sent did. */
+  /** Result of the last Stop that was sent. */
   #did = $state('');
   readonly stopWords = $derived.by(() => {
     const { phase, text } = this.session.stopState;
@@ -106,7 +106,7 @@ export class ArmPage {
     return stateWords(this.controller, course, this.info?.missing ?? []);
   });
   readonly canCommand = $derived(this.session.role === 'operator' && this.session.fresh);
-  /** The controller has not been given friction, gains or model. */
+  /** The controller lacks friction, gains or model. */
   readonly lacksArm = $derived((this.info?.missing.length ?? 0) > 0);
   readonly isRunning = $derived(this.course !== undefined && this.course.stage !== 'ended');
 
@@ -120,7 +120,7 @@ export class ArmPage {
     this.session.isBusy = () => (this.course?.own ?? false) && this.course?.stage !== 'ended';
   }
 
-  /** Called with each status, and with undefined when there is none of now. */
+  /** Called with each status, and with undefined without a current status. */
   onFrame(handler: (controller: Controller | undefined) => void): () => void {
     this.#frames.push(handler);
     return () => this.#frames.splice(this.#frames.indexOf(handler), 1);
@@ -131,20 +131,20 @@ export class ArmPage {
     device.setItem('openjtc-unit', unit);
   }
 
-  /** Recovers the arm. Which arm's parameters a controller without any gets is asked first. */
+  /** Recovers the arm. For a controller without parameters, asks first which arm it is. */
   recover(): void {
     if (this.lacksArm) this.asksArm = true;
     else void this.session.command('Recover', 'POST', '/api/recover', { body: {}, moves: true });
   }
 
-  /** Measured positions, or undefined where one is not known. */
+  /** Measured positions, or undefined if a position is unknown. */
   get position(): number[] | undefined {
     const values = this.controller?.joints.map((joint) => joint.position_rad);
     return values?.every((value) => typeof value === 'number') ? (values as number[]) : undefined;
   }
 
   async stop(): Promise<void> {
-    // Before all else; the words come after.
+    // Before all other steps; the messages follow.
     const sent = this.session.stop();
     const controller = this.latest;
     const moved = isMoving(controller) || isPaused(controller) || this.words?.tone === 'move';
@@ -172,7 +172,7 @@ export class ArmPage {
   #take(status: Status): void {
     if (status.agent !== this.#agent) {
       this.#agent = status.agent;
-      // Its jobs are others; what is going on now is asked for.
+      // The new agent has other jobs; the current one is requested.
       this.course = undefined;
       this.#stop = undefined;
       void this.refresh();
@@ -195,7 +195,7 @@ export class ArmPage {
   #lose(): void {
     this.latest = undefined;
     this.controller = undefined;
-    // A gap in the plots, and no line across it.
+    // A gap in the plots instead of a line.
     if (this.history.length > 0) this.history.push([Date.now() / 1000, ...new Array<number>(COLUMNS - 1).fill(NaN)]);
     for (const frame of this.#frames) frame(undefined);
   }
@@ -219,7 +219,7 @@ export class ArmPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
-        // What a Stop did is shown until somebody goes on.
+        // The result of a Stop is shown until the next job.
         if (isNew && !this.#stop) this.session.forgetStop();
         this.course = {
           number: event.job, what: event.what, client: event.client, phase: '', stage: 'begun', progress: 0, duration_s: 0, runs: 0,
@@ -256,11 +256,11 @@ export class ArmPage {
       if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
       else if (outcome === 'finished') this.session.toast({ tone: 'good', title: jobWords(job.what), text: 'Finished.' });
     } catch {
-      // The log has the event; the figures come with the next look at the job.
+      // The log has the event; the figures come with the next request for the job.
     }
   }
 
-  /** Reads what the stream does not send. */
+  /** Reads data that the stream does not send. */
   async refresh(): Promise<void> {
     await Promise.all([this.readModel(), this.readInfo(), this.readPayload(), this.readPoses(), this.readTrajectories(), this.readJobs(), this.readSpeed()]);
   }
@@ -311,7 +311,7 @@ export class ArmPage {
     });
   }
 
-  /** A number for a new trajectory, by what is kept now; one that somebody else takes meanwhile is refused with `new`. */
+  /** Returns a free number for a new trajectory; with `new` the agent refuses it if another client has used it meanwhile. */
   async freeNumber(): Promise<number> {
     await this.readTrajectories();
     return freeNumber(this.trajectories);

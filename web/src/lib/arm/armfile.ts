@@ -1,7 +1,7 @@
-// Two arm files beside each other, and the gains in one.
+// Comparison of two arm files, and the gains in a file.
 import { parse, type Table, type Value } from './toml.ts';
 
-/** A place where two arm files differ. */
+/** A difference between two arm files. */
 export interface Difference {
   /** "joint 2, pid.kp": joints counted from 1. */
   place: string;
@@ -9,7 +9,7 @@ export interface Difference {
   file: string;
 }
 
-/** The controller's numbers are single precision: nearer than that they are the same. */
+/** The controller's numbers have single precision: closer values count as equal. */
 const SAME = 2e-6;
 const NAMED = new Set(['joint', 'link']);
 
@@ -69,10 +69,10 @@ function compare(board: Value | undefined, file: Value | undefined, place: strin
   out.push({ place: place.replaceAll(/ (\d+)\./g, ' $1, '), board: shown(board), file: shown(file) });
 }
 
-/** What never reaches the controller: where a file differs in it, the arm does not. */
+/** Keys that never reach the controller: a difference in them is not a difference of the arm. */
 const NOT_GIVEN = new Set(['poses', 'format']);
 
-/** Where two arm files differ in what the controller has. Throws TomlError for what is no TOML. */
+/** Returns the differences between two arm files in the data of the controller. Throws TomlError for invalid TOML. */
 export function differences(board: string, file: string): Difference[] {
   const [a, b] = [parse(board), parse(file)];
   for (const key of NOT_GIVEN) {
@@ -101,10 +101,10 @@ export function gainsOf(text: string): Gains[] {
   });
 }
 
-/** The same file with other gains of a joint (from 1); all else stays as it is, comments included. */
+/** Returns the file with other gains of a joint (from 1); all other text is unchanged, comments included. */
 export function withGains(text: string, joint: number, gains: Gains): string {
   const parts = text.split(/^(?=\[\[joint\]\])/m);
-  // What stands before the first joint is a part of its own, unless there is nothing.
+  // The text before the first joint is a separate part, unless it is empty.
   const first = parts.findIndex((part) => part.startsWith('[[joint]]'));
   const at = first + joint - 1;
   const part = parts[at];
@@ -119,7 +119,7 @@ export function withGains(text: string, joint: number, gains: Gains): string {
   return parts.join('');
 }
 
-/** A TOML number that stays one with a fraction. */
+/** Returns a TOML number with a fraction. */
 function literal(value: number): string {
   return Number.isInteger(value) ? value.toFixed(1) : String(value);
 }

@@ -1,4 +1,4 @@
-// The text of an explanation as terms and their texts, for a page that sets them as such.
+// Parses the text of an explanation into terms and their texts.
 
 const TERMS: Record<string, string> = { meaning: 'Meaning', cause: 'Cause', do: 'What to do', next: 'Command' };
 

@@ -1,18 +1,18 @@
-// Jogging with a dead man's switch: rates go out as long as a key is held, zeros when it is let go, by whatever.
+// Jogging with a dead man's switch: rates are sent while a key is held, zeros when the key is released by any cause.
 
-/** So often rates are sent, ms: they hold for 200 ms. */
+/** Period of sent rates, ms: a rate holds for 200 ms. */
 export const PERIOD_MS = 90;
-/** A request without an answer for so long is not waited for, ms. */
+/** Longest wait for the answer to a request, ms. */
 const LATE_MS = 1000;
-/** A page that was suspended for so long does not know whether the key is still held, ms. */
+/** Suspension of the page above which the state of the key is unknown, ms. */
 const ASLEEP_MS = 450;
 
 export interface JogLine {
-  /** Sends rates; resolves when they were taken. Zeros end a jog, and are for whoever it is. */
+  /** Sends rates; resolves when the agent has accepted them. Zeros end a jog, and are accepted from every client. */
   send(rates: number[]): Promise<unknown>;
-  /** It was refused, and is not asked for on; `after`: the key had been let go by then. */
+  /** The request was refused, and is not repeated; `after`: the key had been released by then. */
   refused(error: unknown, after: boolean): void;
-  /** The page was suspended while a key was held, and it counts as let go. */
+  /** The page was suspended while a key was held; the key counts as released. */
   slept(): void;
   every(act: () => void, ms: number): unknown;
   never(handle: unknown): void;
@@ -38,7 +38,7 @@ export class Jogger {
     return this.#rates !== undefined;
   }
 
-  /** A key is pressed: one joint, rad/s. */
+  /** Presses a key: one joint, rad/s. */
   press(joint: number, rate: number): void {
     this.release();
     const rates = new Array<number>(6).fill(0);
@@ -50,7 +50,7 @@ export class Jogger {
     this.#timer = this.#line.every(() => this.#tick(), PERIOD_MS);
   }
 
-  /** The key is let go, the pointer lost, the window left, the connection gone. Without a pressed key nothing is sent. */
+  /** Releases the key: also if the pointer, the window or the connection is lost. Without a pressed key no request is sent. */
   release(): void {
     if (!this.#rates) return;
     this.#end();
@@ -58,7 +58,7 @@ export class Jogger {
   }
 
   #zeros(): void {
-    // One at a time, and one more behind what may have overtaken it.
+    // At most one request, and another one after it, because it may have been overtaken.
     if (this.#ending) {
       this.#again = true;
       return;
@@ -96,7 +96,7 @@ export class Jogger {
   #send(): void {
     const rates = this.#rates;
     if (!rates) return;
-    // One request at a time: the agent refuses a second one, and a slow line does not fill with old ones.
+    // At most one request: the agent refuses a second one, and a slow line does not fill with old ones.
     if (this.#open > 0 && this.#line.now() - this.#sentAt < LATE_MS) return;
     const turn = this.#turn;
     this.#open += 1;
@@ -104,7 +104,7 @@ export class Jogger {
     this.#line.send(rates).then(
       () => {
         this.#open -= 1;
-        // Let go while these rates were on their way: zeros may have overtaken them, or were refused because of them.
+        // Released while these rates were on their way: zeros may have overtaken them, or were refused because of them.
         if (turn !== this.#turn && !this.#rates) this.#zeros();
       },
       (error: unknown) => {

@@ -117,13 +117,13 @@ export function quaternion(frame: Frame): [number, number, number, number] {
   return q.map((value) => value / length) as [number, number, number, number];
 }
 
-/** How far the arm reaches at most, roughly, m: the sum of its links. */
+/** Approximate reach of the arm, m: the sum of its links. */
 export function reach(model: ArmModel): number {
   const lengths = [...model.joints.map((joint) => joint.origin_xyz_m), model.flange.origin_xyz_m].map((xyz) => Math.hypot(...xyz));
   return lengths.reduce((sum, length) => sum + length, 0);
 }
 
-/** How near a joint is to the nearer of its limits: 0 at it, 1 in the middle of its range. */
+/** Distance of a joint from the nearer limit: 0 at the limit, 1 in the middle of its range. */
 export function room(joint: JointModel, q: number): number {
   const half = (joint.position_max_rad - joint.position_min_rad) / 2;
   return Math.min(q - joint.position_min_rad, joint.position_max_rad - q) / half;

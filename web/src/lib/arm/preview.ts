@@ -1,8 +1,8 @@
-// A trajectory before anything moves: where the arm is at a time, the way of its flange, the places of what is wrong.
+// A trajectory before the arm moves: pose of the arm at a time, path of its flange, places of problems.
 import { type ArmModel, flange, place, type Vector } from './kinematics.ts';
 import type { Points, ProblemObject } from './types.ts';
 
-/** Positions at a time, between the points on straight lines. */
+/** Positions at a time, on straight lines between the points. */
 export function previewAt(points: Points, time: number): number[] {
   const times = points.times_s;
   const last = times.length - 1;
@@ -21,7 +21,7 @@ export function previewAt(points: Points, time: number): number[] {
   return from.map((q, i) => q + share * ((to[i] ?? q) - q));
 }
 
-/** The flange's way, and where on it the problems are worst. */
+/** Path of the flange, and the worst place of each problem. */
 export function wayOf(model: ArmModel, points: Points, problems: readonly ProblemObject[]): { line: Vector[]; places: { at: Vector; warning: boolean }[] } {
   const at = (q: readonly number[]) => place(flange(model, q));
   return {

@@ -1,7 +1,7 @@
 // Rows of waypoint files: written in the columns, the units and the separator of the file's own header, as the agent reads them.
 import { type ArmModel, flange, place, quaternion, rpy } from './kinematics.ts';
 
-/** A place that becomes a row. */
+/** A pose to add as a row. */
 export interface Waypoint {
   /** Joint positions, rad. */
   q: readonly number[];
@@ -9,9 +9,9 @@ export interface Waypoint {
   pose?: string | undefined;
 }
 
-/** A row, or why the file takes none. */
+/** A row, or the reason why the file cannot take it. */
 export type Row = { row: string } | { problem: string };
-/** The file with the row, or why it takes none. */
+/** The file with the row, or the reason why it cannot take it. */
 export type Added = { text: string; row: string } | { problem: string };
 
 const JOINTS = ['q1', 'q2', 'q3', 'q4', 'q5', 'q6'];
@@ -22,7 +22,7 @@ const ANGLES = new Set([...JOINTS, ...RPY]);
 /** Other names of columns. */
 const ALSO = new Map([['t', 't'], ['t_s', 't'], ['time', 't'], ['time_s', 't'], ['pose', 'pose'], ['name', 'pose'], ['leg', 'leg']]);
 const LENGTHS = new Set([...XYZ, ...QUATERNION]);
-/** A number as a file has it, not the name of a column. */
+/** A number as in a file, not the name of a column. */
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i;
 
 interface Column {
@@ -52,7 +52,7 @@ function column(cell: string): Column | undefined {
   return ANGLES.has(name) ? { name, unit: unit as Column['unit'] } : undefined;
 }
 
-/** The header names the unit of an angle: the switch for degrees says nothing about such a file. */
+/** Returns `true` if the header names the unit of an angle: the switch for degrees then does not apply. */
 export function namesUnits(text: string): boolean {
   if (isJson(text)) return /"(q[1-6]|roll|pitch|yaw)_deg"/.test(text);
   return cells(first(text) ?? '').some((cell) => column(cell)?.unit !== undefined);
@@ -76,7 +76,7 @@ export function rowFor(text: string, waypoint: Waypoint, degrees: boolean, model
     if (columns.some((each) => each.name === found.name)) return { problem: `The header has the column ${found.name} twice.` };
     columns.push(found);
   }
-  // Cells of t and leg stay empty: no time of its own, and the leg as the switch for straight lines says.
+  // Cells of t and leg stay empty: no time, and the leg as set by the switch for straight lines.
   const filled = valuesFor(new Set(columns.map((each) => each.name)), waypoint, model);
   if ('problem' in filled) return filled;
   const out = columns.map(({ name, unit }) => {

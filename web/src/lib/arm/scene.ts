@@ -1,4 +1,4 @@
-// The picture of the arm. Drawn only when something has changed; loaded only when it is looked at.
+// Scene of the arm. Drawn only after a change; loaded only when shown.
 import {
   AmbientLight, ArrowHelper, BufferGeometry, CircleGeometry, Color, DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
   LineBasicMaterial, LineDashedMaterial, Mesh, MeshBasicMaterial, MeshStandardMaterial, type Object3D, PCFShadowMap, PerspectiveCamera, RingGeometry, Scene,
@@ -28,17 +28,17 @@ export interface Shown {
   limits: boolean;
   trail: boolean;
   path: boolean;
-  /** The limits of all joints, and where down is. */
+  /** Limits of all joints, and the direction of gravity. */
   all: boolean;
 }
 
-/** What draws the scene: a test has no WebGL. */
+/** Renderer of the scene: a test has no WebGL. */
 export type Renderer = Pick<WebGLRenderer, 'render' | 'setPixelRatio' | 'setSize' | 'dispose' | 'shadowMap'>;
 
 const TRAIL = 400;
-/** Commanded and measured farther apart than this are two arms to see, rad. */
+/** Distance between commanded and measured position above which the ghost is shown, rad. */
 const APART_RAD = 0.004;
-/** A joint nearer to a limit than this share of half its range has its range shaded. */
+/** Share of half its range: a joint that is closer to a limit has its range shaded. */
 const NEAR = 0.12;
 
 export class ArmScene {
@@ -63,7 +63,7 @@ export class ArmScene {
   readonly #payload = new Mesh(new SphereGeometry(1, 32, 20), new MeshStandardMaterial({ transparent: true, opacity: 0.75, roughness: 0.5 }));
   #trailPoints: Vector[] = [];
   #q: number[] = [];
-  /** Joint positions of the ghost, and whether it is shown: a new body takes them over. */
+  /** Joint positions of the ghost, and its visibility: a new body takes them over. */
   #ghostQ: number[] = [];
   #ghostShown = false;
   #palette: Palette;
@@ -72,7 +72,7 @@ export class ArmScene {
   #pointed: number | undefined;
   #asked = false;
   #lost = false;
-  /** Pictures that were drawn: for tests of idleness. */
+  /** Number of drawn pictures: for tests of idleness. */
   drawn = 0;
 
   constructor(canvas: HTMLCanvasElement, palette: Palette, renderer: Renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true, powerPreference: 'low-power' })) {
@@ -96,7 +96,7 @@ export class ArmScene {
     this.view('home');
   }
 
-  /** Draws in the next frame, once, however often it is asked for. */
+  /** Draws in the next frame, once for any number of requests. */
   ask(): void {
     if (this.#asked) return;
     this.#asked = true;
@@ -132,7 +132,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** By keys: the picture turns as the camera is led around. */
+  /** By keys: turns the camera around the arm. */
   turn(across: number, up: number, zoom = 1): void {
     const offset = this.#camera.position.clone().sub(this.#controls.target);
     const radius = offset.length() / zoom;
@@ -194,7 +194,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Turns the joints of both bodies to the positions that are known. */
+  /** Turns the joints of both bodies to the known positions. */
   #pose(): void {
     this.#body?.joints.forEach((joint, i) => (joint.rotation.z = this.#q[i] ?? 0));
     if (!this.#ghost) return;
@@ -202,7 +202,7 @@ export class ArmScene {
     this.#ghost.root.visible = this.#ghostShown;
   }
 
-  /** Measured positions; undefined: not known, the arm is drawn faint where it was last. */
+  /** Measured positions; undefined: unknown, the arm is drawn faint in its last pose. */
   setMeasured(q: readonly number[] | undefined): void {
     if ((q === undefined) !== this.#lost) {
       this.#lost = q === undefined;
@@ -223,7 +223,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** Where the arm is to be: drawn where it differs from where it is. */
+  /** Target pose of the arm: drawn if it differs from the current pose. */
   setGhost(q: readonly number[] | undefined, always = false): void {
     const apart = q?.some((value, i) => Math.abs(value - (this.#q[i] ?? value)) > APART_RAD) ?? false;
     const visible = q !== undefined && (apart || always);
@@ -246,7 +246,7 @@ export class ArmScene {
     this.ask();
   }
 
-  /** The way of the flange, and places on it that something is wrong at. */
+  /** Path of the flange, and places of problems on it. */
   setPath(points: readonly Vector[] | undefined, places: readonly { at: Vector; warning: boolean }[] = []): void {
     this.#path.geometry.dispose();
     this.#path.geometry = new BufferGeometry().setFromPoints((points ?? []).map((point) => new Vector3(...point)));
@@ -263,7 +263,7 @@ export class ArmScene {
 
   setPayload(mass_kg: number, com_m: readonly number[]): void {
     this.#payload.visible = mass_kg > 0;
-    // As large as a ball of that mass made of something of 2.7 kg a litre.
+    // As large as a ball of that mass with a density of 2.7 kg a litre.
     this.#payload.scale.setScalar(Math.cbrt((3 * Math.max(mass_kg, 1e-3)) / (4 * Math.PI * 2700)));
     this.#payload.position.set(com_m[0] ?? 0, com_m[1] ?? 0, com_m[2] ?? 0);
     this.ask();
@@ -326,7 +326,7 @@ export class ArmScene {
     this.#scene.add(floor);
   }
 
-  /** The range of each joint as a sector about its axis, with a needle where it stands. */
+  /** Range of each joint as a sector about its axis, with a needle at its position. */
   #shadeLimits(model: ArmModel): void {
     this.#limits = [];
     this.#needles = [];
@@ -334,7 +334,7 @@ export class ArmScene {
       const mount = this.#body?.mounts[i];
       if (!mount) return;
       const next = model.joints[i + 1]?.origin_xyz_m ?? [1, 0, 0];
-      // The sector is drawn about where the link points to at zero.
+      // The sector is centred on the direction of the link at zero.
       const zero = Math.hypot(next[0], next[1]) > 0.02 ? Math.atan2(next[1], next[0]) : 0;
       const r = housingRadius(joint.torque_max_nm);
       const [inner, outer] = [r * 1.35, r * 2.5];
@@ -356,7 +356,7 @@ export class ArmScene {
     });
   }
 
-  /** Colours and what is visible, by where the arm stands. */
+  /** Colours and visibility, by the pose of the arm. */
   #dress(): void {
     const model = this.#model;
     if (!model) return;

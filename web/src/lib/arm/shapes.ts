@@ -40,7 +40,7 @@ function rounded(radius: number, low: number, high: number): BufferGeometry {
   return new LatheGeometry(profile, 40).rotateX(Math.PI / 2);
 }
 
-/** A tube from one place to another, with round ends; its radius goes from one to the other. */
+/** A tube from one place to another, with round ends; its radius changes from one value to the other. */
 function tube(from: Vector3, to: Vector3, radius: number, thin: number, material: Material): Group {
   const group = new Group();
   const way = to.clone().sub(from);
@@ -63,12 +63,12 @@ function tube(from: Vector3, to: Vector3, radius: number, thin: number, material
   return group;
 }
 
-/** Everything that moves with the joints, as nested groups: joint groups are turned about z. */
+/** All parts that move with the joints, as nested groups: joint groups are turned about z. */
 export interface Body {
   root: Group;
   /** Turned about z by the joint's position. */
   joints: Group[];
-  /** Where a joint is before it turns: its limits are drawn here. */
+  /** Frame of a joint before it turns: its limits are drawn here. */
   mounts: Group[];
   flange: Group;
 }
@@ -130,7 +130,7 @@ export function bodyOf(model: ArmModel, materials: Materials, plain = false): Bo
   return { root, joints, mounts, flange };
 }
 
-/** How far beside its axis' origin a link lies, m along the axis: where its mass is, for a link between axes that are parallel. */
+/** Offset of a link from its axis' origin, m along the axis: the offset of its mass, for a link between parallel axes. */
 function asideOf(model: ArmModel, i: number, to: Vector3): number {
   const across = Math.hypot(to.x, to.y);
   const com = model.links[i + 1]?.com_xyz_m ?? [0, 0, 0];

@@ -1,13 +1,13 @@
-// Points that were recorded while the arm was led by hand, and how few of them say the same.
+// Points recorded while the arm was guided by hand, and their reduction to few points.
 
 export interface Sample {
   t: number;
   q: number[];
 }
 
-/** Largest distance of a joint between a sample and the straight line between two others at its place, rad. */
+/** Largest distance of a joint between a sample and the nearest place on the line between two others, rad. */
 function aside(sample: Sample, from: Sample, to: Sample): number {
-  // By the nearest place on the line in joint space, and not by time: how fast a hand was says nothing about the way.
+  // By the nearest place on the line in joint space, not by time: the speed of a hand is irrelevant for the path.
   const way = to.q.map((value, i) => value - (from.q[i] ?? 0));
   const length = way.reduce((sum, value) => sum + value * value, 0);
   const along = sample.q.reduce((sum, value, i) => sum + (value - (from.q[i] ?? 0)) * (way[i] ?? 0), 0);
@@ -15,7 +15,7 @@ function aside(sample: Sample, from: Sample, to: Sample): number {
   return Math.max(...sample.q.map((value, i) => Math.abs(value - ((from.q[i] ?? 0) + share * (way[i] ?? 0)))));
 }
 
-/** The fewest samples so that no joint of any other is farther than `tolerance` from the way between them (Ramer 1972; Douglas & Peucker 1973). */
+/** Returns the fewest samples that keep every joint within `tolerance` of the path between them (Ramer 1972; Douglas & Peucker 1973). */
 export function thin(samples: readonly Sample[], tolerance: number): Sample[] {
   if (samples.length <= 2) return [...samples];
   const keep = new Array<boolean>(samples.length).fill(false);
@@ -38,7 +38,7 @@ export function thin(samples: readonly Sample[], tolerance: number): Sample[] {
   return samples.filter((_, i) => keep[i]);
 }
 
-/** Leaves out what repeats where the arm stood still. */
+/** Removes repeated samples while the arm stood still. */
 export function moved(samples: readonly Sample[], least = 0.002): Sample[] {
   const out: Sample[] = [];
   for (const sample of samples) {
@@ -48,7 +48,7 @@ export function moved(samples: readonly Sample[], least = 0.002): Sample[] {
   return out;
 }
 
-/** Waypoints as a file that the agent plans through. */
+/** Returns waypoints as a file for the planner of the agent. */
 export function waypoints(positions: readonly (readonly number[])[]): string {
   const rows = positions.map((q) => q.map((value) => value.toFixed(6)).join(','));
   return ['q1,q2,q3,q4,q5,q6', ...rows, ''].join('\n');

@@ -1,5 +1,5 @@
-// As much of TOML as arm files have: tables, arrays of tables, inline tables, arrays over several lines, comments. For looking at and comparing; what
-// an arm file is to the controller, the agent decides.
+// The part of TOML that arm files use: tables, arrays of tables, inline tables, arrays over several lines, comments.
+// For display and comparison; the agent decides how the controller uses an arm file.
 
 export type Value = string | number | boolean | Value[] | Table;
 export interface Table {
@@ -34,7 +34,7 @@ class Reader {
     return this.text.charAt(this.at);
   }
 
-  /** Blanks and comments; line ends too, where the value goes on over them. */
+  /** Skips blanks and comments; line ends too, if the value continues on the next line. */
   skip(lines: boolean): void {
     for (; !this.end; this.at += 1) {
       const c = this.peek();

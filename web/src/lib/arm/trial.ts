@@ -1,4 +1,4 @@
-// Tests of gains: a joint goes a step and back; what it was off meanwhile, beside the tests before.
+// Tests of gains: a joint moves a step and back; its errors meanwhile, next to those of earlier tests.
 import type { Gains } from './armfile.ts';
 import type { JointResult } from './types.ts';
 
@@ -13,7 +13,7 @@ export interface Trial {
   /** s since 1970. */
   start: number;
   times: number[];
-  /** rad; null where it is not known. */
+  /** rad; null if unknown. */
   errors: (number | null)[];
   figures: Figures | undefined;
 }
@@ -33,7 +33,7 @@ export function overlay(trials: readonly Trial[]): (number | null)[][] {
     trial.times.forEach((time, i) => {
       const error = trial.errors[i];
       if (error == null) return;
-      // 40 ms apart at least: rounded to that, tests share their times.
+      // At least 40 ms apart: rounded to that, tests share their times.
       const at = Math.round((time - first) / 0.04) * 0.04;
       const row = rows.get(at) ?? new Array<number | null>(trials.length).fill(null);
       row[k] = error * 1000;

@@ -1,4 +1,4 @@
-// The objects of the agent's API by the names that the page uses.
+// Objects of the agent's API with the names of the page.
 import type { ControllerObject, Happening, PageObject, PointsObject, PoseObject, StatusObject } from './api-types.ts';
 import type { Entry } from '../connection.ts';
 
@@ -9,7 +9,7 @@ export type {
 
 export type Controller = ControllerObject;
 export type Status = StatusObject;
-/** Of a kept trajectory; of what only this page knows there is no digest. */
+/** Points of a stored trajectory; a trajectory that only this page has is without a digest. */
 export type Points = Omit<PointsObject, 'digest'> & { digest?: string };
 export type Pose = PoseObject;
 export type Page = PageObject;

@@ -1,4 +1,4 @@
-// What the controller reports, in words: what is, why, and what leads on.
+// Reports of the controller as text: state, cause, and next step.
 import type { Controller, Happening, InfoObject } from './types.ts';
 import { count, duration } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
@@ -14,10 +14,10 @@ export interface Cause {
 export interface StateWords {
   tone: Tone;
   word: string;
-  /** Why it does not move, or what it does. */
+  /** Reason why the arm does not move, or its current action. */
   detail: string;
   causes: Cause[];
-  /** What leads on, in words, and what the button does. */
+  /** Next step as text, and the action of its button. */
   next: string;
   step?: Step;
 }
@@ -26,14 +26,14 @@ function sentence(words: string): string {
   return words.charAt(0).toUpperCase() + words.slice(1);
 }
 
-/** What is wrong now, the most particular first: the cause of a held stop, then what the errors say. `explain` takes each as it is. */
+/** Current errors, the most specific first: the cause of a held stop, then the error bits. `explain` accepts each unchanged. */
 export function causesOf(controller: Controller): Cause[] {
   const stop = controller.held_stop;
   const found = stop ? [{ words: sentence(stop.text), code: stop.code }] : [];
   return [...found, ...controller.causes.map((words) => ({ words: sentence(words), code: words }))];
 }
 
-/** What leads on from a held stop, as the agent words it. */
+/** Next step after a held stop, in the words of the agent. */
 function afterHeldStop({ held_stop: stop }: Controller): string {
   if (!stop) return 'Remove what it met, or set its payload, then acknowledge. Nothing moves until then.';
   const remedy = sentence(stop.remedy);
@@ -50,7 +50,7 @@ export function hasTorque(controller: Controller | null | undefined): boolean {
   return controller != null && ['HoldPos', 'Operate', 'Teaching'].includes(controller.state);
 }
 
-/** Drives that are not enabled yet, from 1: the controller holds its position with those that are. */
+/** Drives that are not enabled yet, from 1: the controller holds its position with the enabled ones. */
 export function enabling(controller: Controller): number[] {
   return controller.joints.filter((joint) => joint.state !== 'OperationEnable' && joint.state !== 'Start').map((joint) => joint.joint);
 }
@@ -60,12 +60,12 @@ export function isHeldStop(controller: Controller): boolean {
   return hasTorque(controller) && controller.error_codes.join() === 'internal-joint-error';
 }
 
-/** The arm can be led by hand from here, also in a held stop. */
+/** The arm can be guided by hand from here, also in a held stop. */
 export function canBeTaught(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0;
 }
 
-/** Every joint that is there is held: what moves the arm can begin. */
+/** Every present joint is held: a motion can begin. */
 export function isHeld(controller: Controller | null | undefined): boolean {
   return controller != null && controller.state === 'HoldPos' && enabling(controller).length === 0 && controller.errors.length === 0;
 }
@@ -78,7 +78,7 @@ export function isPaused(controller: Controller | null | undefined): boolean {
   return controller != null && controller.trajectory === 'Pause';
 }
 
-/** Why no joint can be jogged now; empty: jogging is possible. `job` is what runs, and how far it is. */
+/** Reason why no joint can be jogged; empty: jogging is possible. `job` is the running job and its stage. */
 export function noJog(controller: Controller | undefined, job?: { what: string; stage: 'begun' | 'uploading' | 'executing' }): string {
   if (!controller) return 'The state of the arm is not known.';
   if ((controller.state === 'HoldPos' || controller.state === 'Operate') && controller.errors.length === 0) {
@@ -94,7 +94,7 @@ export function noJog(controller: Controller | undefined, job?: { what: string; 
   return `Jogging needs the arm to hold position. ${word}: ${next || detail}`;
 }
 
-/** The question before a controller that lacks parameters uses its defaults: whose they are, and what is at risk if the arm is another. */
+/** Question before a controller without parameters uses its defaults: their origin, and the risk if the arm is another. */
 export function defaultsWords(info: Pick<InfoObject, 'arm' | 'defaults_stored'> | undefined, simulated: boolean): { question: string; used: string; risk: string; button: string } {
   const name = info?.arm || 'the built-in arm';
   const [stored, known] = [info?.defaults_stored ?? false, name === info?.arm];
@@ -117,7 +117,7 @@ export function fastest(controller: Controller): number {
 
 const MOVES_RAD_S = 0.01;
 
-/** `job` is what goes on, in words; `missing` are parameters that the controller has not been given. */
+/** `job` is the current job as text; `missing` are parameters that the controller lacks. */
 export function stateWords(controller: Controller, job: string | undefined, missing: readonly string[]): StateWords {
   const causes = causesOf(controller);
   const base = { causes, next: '' };
@@ -186,7 +186,7 @@ export function stateWords(controller: Controller, job: string | undefined, miss
   }
 }
 
-/** What Stop did, from what was seen when it was touched and what is seen now. */
+/** Effect of Stop, from the state when it was touched and the current state. */
 export function whatStopDid(before: string | undefined, wasMoving: boolean, now: Controller | undefined | null, tookMs: number): string {
   const took = `${(tookMs / 1000).toFixed(1)} s`;
   if (!now) return 'Stop was sent. No status has come since.';
@@ -196,12 +196,12 @@ export function whatStopDid(before: string | undefined, wasMoving: boolean, now:
   return isMoving(now) ? 'Stop was sent: the arm decelerates on its path.' : `Stopped on the path in ${took}; ${held}.`;
 }
 
-/** "recover" is what an event calls it; people read a sentence. */
+/** Returns a sentence for the event's name of a job, such as "recover". */
 export function jobWords(what: string): string {
   return sentence(what);
 }
 
-/** An event in words; undefined: not worth a line. */
+/** Returns an event as text; undefined for events without a line. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
   const of = 'job' in event ? `job ${event.job}` : '';
   const line = (text: string, tone: EventTone = 'info', whose = of) => ({ text, tone, of: whose });

@@ -1,4 +1,4 @@
-// What the page of a chain knows: bus, boards, values, jobs. Components read it, and ask by it.
+// State of the page of a chain: bus, boards, values, jobs. Components read it, and send requests through it.
 import { getContext, setContext } from 'svelte';
 
 import { History } from '../history.ts';
@@ -7,11 +7,11 @@ import { type Driven, provideSession, Session } from '../session.svelte.ts';
 import type { BoardObject, BoardsMessage, ChainEntry, Happening, JobObject, Status, Values, ValuesMessage } from './types.ts';
 import { boardWords, busWords, type BusWords, eventWords, jobResult, jobWords, stoppedWords } from './words.ts';
 
-/** Rows that are kept of the outputs of a board: two minutes at 25 Hz. */
+/** Number of stored rows of a board's outputs: two minutes at 25 Hz. */
 const ROWS = 3000;
-/** What people read changes so often at most, ms. */
+/** Shortest period of displayed text, ms. */
 const READ_MS = 120;
-/** Outputs that are older are not those of now, ms; the agent says so from half a second on. */
+/** Age above which outputs count as outdated, ms; the agent reports it from half a second on. */
 const OLD_MS = 900;
 const TICK_MS = 250;
 
@@ -33,12 +33,12 @@ export interface Course {
   client: string;
   own: boolean;
   over: boolean;
-  /** Of an update: who gets the image now, and how far it is. */
+  /** For an update: boards that get the image now, and the progress. */
   progress: { boards: number[]; attempt: number; cycle: number; bytes: number; total: number } | undefined;
   notes: string[];
 }
 
-/** A board, when that was received, and when its last heartbeat was, by this browser's clock. */
+/** A board, its time of reception, and the time of its last heartbeat, by this browser's clock. */
 export interface BoardView {
   board: BoardObject;
   at: number;
@@ -47,10 +47,10 @@ export interface BoardView {
 
 export type Tab = 'boards' | 'board' | 'update' | 'doctor' | 'jobs' | 'log';
 
-/** What is asked before it is done. */
+/** Questions before a command. */
 export type Question = { what: 'init' } | { what: 'run' } | { what: 'reset'; board: number };
 
-/** States of boards that nothing is lost of without somebody who commands. */
+/** States of boards that are safe without a lease holder. */
 const AT_REST = new Set(['exloader', 'programming']);
 
 const KEY = Symbol('chain');
@@ -62,13 +62,13 @@ export class ChainPage {
   tab = $state<Tab>('boards');
   chosen = $state<number | undefined>(undefined);
   views = $state.raw<BoardView[]>([]);
-  /** What is shown of boards is of now. */
+  /** The shown boards are current. */
   known = $state(false);
-  /** The newest values, each board; replaced a few times a second. */
+  /** The newest values of each board; replaced a few times a second. */
   values = $state.raw<ReadonlyMap<number, { values: Values; at: number }>>(new Map());
   course = $state<Course | undefined>(undefined);
   jobs = $state.raw<JobObject[]>([]);
-  /** What the last Stop that was sent did, as the boards have confirmed it or have not. */
+  /** Result of the last Stop that was sent: confirmed by the boards or not. */
   #did = $state<{ text: string; failed: boolean }>({ text: '', failed: false });
   readonly stopWords = $derived.by(() => {
     const { phase, text } = this.session.stopState;
@@ -78,16 +78,16 @@ export class ChainPage {
   question = $state<Question | undefined>(undefined);
   /** performance.now(), a few times a second: for ages. */
   now = $state(performance.now());
-  /** Counts Stops, of whomever: what waits to be sent is dropped. */
+  /** Counts Stops of all clients: waiting values are dropped. */
   halts = $state(0);
-  /** A result of a scan or of numbering that nobody has put away yet. */
+  /** A result of a scan or of numbering that is not closed yet. */
   found = $state.raw<JobObject | undefined>(undefined);
 
   readonly #newest = new Map<number, { values: Values; at: number }>();
   readonly #traces = new Map<number, { names: string; history: History; last: number }>();
   #read = 0;
   #agent = '';
-  /** Its boards were sent by this agent. */
+  /** This agent has sent its boards. */
   #boardsKnown = false;
   #stop: { at: number; ran: boolean } | undefined;
   #stopTimer: ReturnType<typeof setTimeout> | undefined;
@@ -110,9 +110,9 @@ export class ChainPage {
     this.session.onLoss(() => this.#lose());
     this.session.saysOfStop = () => ({ text: this.stopWords, failed: this.stopFailed });
     this.session.onMissed(() => void this.readJobs());
-    // One that is lost may run.
+    // A lost board may be running.
     this.session.isAtRest = () => this.known && this.#boardsKnown && !this.isRunning && this.boards.every((board) => AT_REST.has(board.state));
-    // Boards that this page commands are stopped when its lease lapses: it lasts for as long as they run and the page is looked at.
+    // Boards of this page stop when its lease expires: the lease lasts while the boards run and the page is visible.
     this.session.isBusy = () => this.session.leasePhase === 'held' && (this.runs || ((this.course?.own ?? false) && !this.course?.over));
   }
 
@@ -132,7 +132,7 @@ export class ChainPage {
     return this.views.find((view) => view.board.number === number);
   }
 
-  /** Whether outputs that came then are those of now. */
+  /** Returns `true` if outputs received at that time are outdated. */
   isOld(of: { values: Values; at: number } | undefined): boolean {
     return !this.known || !of || of.values.stale || (of.values.age_s ?? Infinity) * 1000 + (this.now - of.at) > OLD_MS;
   }
@@ -142,10 +142,10 @@ export class ChainPage {
     return this.#traces.get(number)?.history;
   }
 
-  /** A command for a board or the chain; what was refused is a message on the page. `ends`: it makes nothing move, and is done behind a Stop, too. */
+  /** Sends a command; a refusal is a message on the page. `ends`: moves no board, and is executed after a Stop, too. */
   async command<T = unknown>(what: string, method: string, path: string, body?: unknown, ends = false): Promise<{ value: T } | undefined> {
-    // Boards answer one after the other, and a job that goes on first ends what it has begun.
-    // Behind a Stop that this page had not shown nothing is done, however late it comes.
+    // Boards answer in sequence, and a running job first ends its own operation.
+    // After a Stop that this page had not yet shown, a command has no effect, even if it arrives late.
     return this.session.command<T>(what, method, path, { ...(body === undefined ? {} : { body }), moves: !ends, ends, within: 30_000 });
   }
 
@@ -159,7 +159,7 @@ export class ChainPage {
   }
 
   async stop(): Promise<void> {
-    // Before all else; the words come after.
+    // Before all other steps; the messages follow.
     const sent = this.session.stop();
     const at = this.session.stopState.at;
     this.halts += 1;
@@ -221,7 +221,7 @@ export class ChainPage {
     this.views = boards.map((board) => {
       const beat = board.heartbeat_age_s == null ? undefined : at - board.heartbeat_age_s * 1000;
       const last = before.get(board.number)?.beat;
-      // The same heartbeat, received twice: its time differs by what the messages were under way.
+      // One heartbeat, received twice: its time differs by the delay of the messages.
       return { board, at, beat: beat !== undefined && last !== undefined && Math.abs(beat - last) < BEAT_MS ? last : beat };
     });
     if (this.chosen === undefined || !boards.some((board) => board.number === this.chosen)) this.chosen = boards[0]?.number;
@@ -246,16 +246,16 @@ export class ChainPage {
       this.#traces.set(values.board, trace);
     }
     const row = values.outputs.map((output) => (typeof output.value === 'number' ? output.value : typeof output.value === 'boolean' ? Number(output.value) : NaN));
-    // A message that was long under way does not put a value before an earlier one.
+    // A delayed message does not put a value before an earlier one.
     trace.last = Math.max(trace.last + 0.001, Date.now() / 1000 - (values.age_s ?? 0));
     trace.history.push([trace.last, ...row]);
   }
 
-  /** Nothing that is known is of now. */
+  /** Marks all known data as outdated. */
   #lose(): void {
     this.known = false;
     this.halts += 1;
-    // A gap in the plots, and no line over it.
+    // A gap in the plots instead of a line.
     for (const trace of this.#traces.values()) {
       const row = new Array<number>(trace.history.channels).fill(NaN);
       row[0] = trace.last = Math.max(trace.last + 0.001, Date.now() / 1000);
@@ -267,7 +267,7 @@ export class ChainPage {
     const course = 'job' in event && this.course?.number === event.job ? this.course : undefined;
     switch (event.kind) {
       case 'begun':
-        // What a Stop did is shown until somebody goes on.
+        // The result of a Stop is shown until the next job.
         if (isNew && !this.#stop) {
           this.#say('', false);
           this.session.forgetStop();
@@ -301,7 +301,7 @@ export class ChainPage {
         break;
       }
       case 'state': {
-        // The inputs and outputs of another start are not those of this one.
+        // Inputs and outputs of another start are invalid for this one.
         const view = this.view(event.board);
         if (view && event.state === 'exloader' && this.#newest.delete(event.board)) this.values = new Map(this.#newest);
         break;
@@ -315,7 +315,7 @@ export class ChainPage {
     if (!job) return;
     if (job.chain) this.found = job;
     const own = this.course?.number === number && this.course.own;
-    // What was cancelled was cancelled by somebody, and the outcome of an update stands where it was asked for.
+    // A user already knows of a cancelled job, and the outcome of an update is shown on the update page.
     if (!own || job.stage === 'cancelled' || (job.update && this.tab === 'update')) return;
     if (job.error) this.session.toast({ tone: 'error', title: jobWords(job.what), text: job.error.message, problem: job.error });
     else if (job.stage === 'finished' && !job.chain) this.session.toast({ tone: 'good', title: jobWords(job.what), text: jobResult(job) });
@@ -331,7 +331,7 @@ export class ChainPage {
     }
   }
 
-  /** The values of a board that sends none: of one whose names are not known the board itself is asked. */
+  /** Reads the values of a board that sends none: a board with unknown names is asked itself. */
   async readValues(number: number): Promise<void> {
     await this.session.attempt(`Values of board ${number}`, async () => {
       const values = await this.session.api.get<Values>(`/api/boards/${number}/values`);
@@ -340,7 +340,7 @@ export class ChainPage {
     });
   }
 
-  /** Inputs and parameters as the agent has confirmed them, at once. */
+  /** Shows inputs and parameters at once, as confirmed by the agent. */
   confirm(number: number, list: 'inputs' | 'parameters', value: Values['inputs'][number]): void {
     const old = this.#newest.get(number);
     if (!old) return;
@@ -349,7 +349,7 @@ export class ChainPage {
     this.values = new Map(this.#newest);
   }
 
-  /** The state of a board in words; nothing is said of one of which nothing is known. */
+  /** Returns the state of a board as text; an unknown state is shown as unknown. */
   boardWords(board: BoardObject): ReturnType<typeof boardWords> {
     return this.known ? boardWords(board) : { tone: 'lost', word: 'Not known', detail: 'Nothing is received from the agent.' };
   }

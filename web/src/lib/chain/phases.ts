@@ -1,10 +1,10 @@
-// How far an update is: an image goes over twice, is checked, written, and read back.
+// Progress of an update: an image is transferred twice, is checked, written, and read back.
 import type { Course } from './chain.svelte.ts';
 
 export interface Phase {
   /** 0: checked, 1: written, 2: read back. */
   at: number;
-  /** 0 to 1, of all that is transferred to these boards. */
+  /** Share of the whole transfer to these boards, 0 to 1. */
   share: number;
   words: string;
 }

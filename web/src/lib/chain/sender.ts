@@ -1,9 +1,9 @@
-// Sends an input while somebody moves a slider: the newest value, so often at most, one request at a time.
+// Sends an input while a slider is moved: the newest value, at a limited rate, one request at a time.
 
 export interface Wires<T> {
   send(value: T): Promise<void>;
   refused(error: unknown): void;
-  /** It waits, sends, or rests. */
+  /** Called when the sender becomes busy or idle. */
   changed(busy: boolean): void;
   now(): number;
   later(act: () => void, ms: number): unknown;
@@ -30,7 +30,7 @@ export class Sender<T> {
     this.#go();
   }
 
-  /** What waits is not sent any more: after a Stop, and where nothing is known. */
+  /** Drops the waiting value: after a Stop, and if the state is unknown. */
   drop(): void {
     this.#next = undefined;
     this.#wires.never(this.#timer);
@@ -54,13 +54,13 @@ export class Sender<T> {
     void this.#wires
       .send(value)
       .catch((error: unknown) => {
-        // The rest of the same movement would be refused as well.
+        // The rest of the same drag would be refused as well.
         this.#next = undefined;
         this.#wires.refused(error);
       })
       .finally(() => {
         this.#sending = false;
-        // From its end: the first one may have taken the lease before it went.
+        // Counted from its end: the first request may have taken the lease before.
         this.#sent = this.#wires.now();
         if (!this.#next) this.#wires.changed(false);
         this.#go();

@@ -1,8 +1,8 @@
-// Inputs, outputs and parameters: their names, what a slider may set, and how a value is written in a request.
+// Inputs, outputs and parameters: names, ranges of sliders, and the format of values in a request.
 import { number, parse } from '../format.ts';
 import type { Value } from './types.ts';
 
-/** "position [0.01 deg]": boards put in brackets what one step of the word is. */
+/** "position [0.01 deg]": boards put the step of the word in brackets. */
 export function nameParts(name: string): { name: string; step: string } {
   const found = /^(.*?)\s*\[([^\]]*)\]\s*$/.exec(name);
   return found ? { name: found[1] ?? name, step: found[2] ?? '' } : { name, step: '' };
@@ -22,7 +22,7 @@ export function minus(text: string): string {
 
 export type Form = 'number' | 'switch' | 'word';
 
-/** How a value is set: what the signal table calls bits is no number. */
+/** Returns how a value is set: bits of the signal table are not a number. */
 export function formOf(value: Value): Form {
   if (typeof value.value === 'boolean') return 'switch';
   return typeof value.value === 'string' ? 'word' : 'number';
@@ -32,11 +32,11 @@ export interface Range {
   min: number;
   max: number;
   step: number;
-  /** By the signal table; else somebody has chosen it, or nobody. */
+  /** Source of the range: the signal table, the user, or none. */
   by: 'table' | 'page' | 'nobody';
 }
 
-/** A step that makes about a thousand of a range, and no more than a word has. */
+/** Returns a step that divides a range into about a thousand, and is not finer than a word. */
 export function stepOf(min: number, max: number, whole: boolean): number {
   const step = 10 ** Math.floor(Math.log10(Math.max(1e-9, (max - min) / 500)));
   return whole ? Math.max(1, step) : step;
@@ -44,7 +44,7 @@ export function stepOf(min: number, max: number, whole: boolean): number {
 
 const WORD = { min: -32768, max: 65535 };
 
-/** What a slider goes over. Without a table it is a small part of what a word can hold, so that a touch does not send the largest. */
+/** Range of a slider. Without a table it is a small part of the range of a word, so that a touch does not send the largest value. */
 export function rangeOf(value: Value, chosen: { min: number; max: number } | undefined): Range {
   const whole = !value.unit;
   const of = (min: number, max: number, by: Range['by']): Range => ({ min, max, step: stepOf(min, max, whole), by });
@@ -64,13 +64,13 @@ export function text(value: number, step: number, unit: string | null | undefine
   return `${number(value, digitsOf(step))}${unit ? ` ${unit}` : ''}`;
 }
 
-/** A number as the agent takes it: with its unit where there is one, since a bare one could mean something else. */
+/** Returns a number as the agent expects it: with its unit, if there is one, because a bare number could mean another value. */
 export function given(value: number, step: number, unit: string | null | undefined): number | string {
   const plain = value.toFixed(digitsOf(step));
   return unit ? `${plain} ${unit}` : Number(plain);
 }
 
-/** What somebody has typed: a number, or anything else that the agent understands, as 0x05DC, 15deg, on. */
+/** Parses typed text: a number, or any other text that the agent understands, as 0x05DC, 15deg, on. */
 export function typed(input: string, unit: string | null | undefined): number | string | undefined {
   const trimmed = input.trim();
   if (trimmed === '') return undefined;

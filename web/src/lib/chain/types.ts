@@ -1,11 +1,12 @@
-// Types of a chain's agent: those of its description, and the messages of its stream, which OpenAPI has no word for.
+// Types of a chain's agent: those of its OpenAPI description, and the messages of its stream, which OpenAPI does not
+// cover.
 import type { Entry } from '../connection.ts';
 import type { SessionStatus } from '../session.svelte.ts';
 import type { BoardObject, Happening, StatusObject, ValueObject } from './api-types.ts';
 
 export type { BoardObject, ChainObject, FindingObject, Happening, JobObject, UpdateObject, UpdateRequest, UpdatedObject } from './api-types.ts';
 
-/** Limits of the signal table, where the agent names them. */
+/** Limits of the signal table, if the agent sends them. */
 export type Value = ValueObject & { min?: number | null; max?: number | null };
 
 export interface Values {

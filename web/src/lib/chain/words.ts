@@ -1,4 +1,4 @@
-// What boards and bus report, in words: what is, why, and what leads on.
+// Reports of boards and bus as text: state, cause, and next step.
 import { count } from '../format.ts';
 import type { EventTone, Tone } from '../tone.ts';
 import type { BoardObject, Happening, JobObject, Status } from './types.ts';
@@ -165,7 +165,7 @@ export const OUTCOMES: Record<string, string> = {
   running: 'The application runs',
 };
 
-/** What came of a job, in one sentence. */
+/** Result of a job, in one sentence. */
 export function jobResult(job: JobObject): string {
   if (job.error) return job.error.message;
   if (job.stage === 'cancelled') return 'Cancelled.';
@@ -188,12 +188,12 @@ export function jobResult(job: JobObject): string {
   return job.stage === 'finished' ? 'Finished.' : job.stage === 'running' ? 'Goes on.' : 'Failed.';
 }
 
-/** What a Stop did, as boards have confirmed it. */
+/** Result of a Stop, as confirmed by boards. */
 export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran = true): { text: string; failed: boolean; why: string } {
   const { boards, not_stopped } = event;
   const done = boards.length === 0 ? '' : ran ? `Stopped: ${boardList(boards)} confirmed it.` : `Stop was sent. No board was running; ${boardList(boards)} confirmed it.`;
   if (not_stopped.length > 0) {
-    // The reasons are long, and what to do comes first.
+    // The reasons are long, and the next step comes first.
     const which = not_stopped.map((each) => /^(board \d+):/.exec(each)?.[1] ?? each);
     const rest = boards.length === 0 ? 'No board confirmed it.' : `${count(boards.length, 'board')} confirmed it.`;
     return { text: `NOT STOPPED: ${which.join(', ')}. Use the emergency stop. ${rest}`, failed: true, why: not_stopped.join('; ') };
@@ -201,7 +201,7 @@ export function stoppedWords(event: Extract<Happening, { kind: 'stopped' }>, ran
   return { text: done || 'Stop was sent. No board was running.', failed: false, why: '' };
 }
 
-/** An event in words; undefined: not worth a line. */
+/** Returns an event as text; undefined for events without a line. */
 export function eventWords(event: Happening): { text: string; tone: EventTone; of: string } | undefined {
   const line = (text: string, tone: EventTone, of: string) => ({ text, tone, of });
   switch (event.kind) {

@@ -67,12 +67,12 @@ pub(super) fn push(
     Ok(())
 }
 
-/// What was sent, in words.
+/// Describes what was sent.
 fn sent(p: &PushReport) -> String {
     format!("{}: {} bytes, {:.2} s", p.parameter.name(), p.bytes, p.time_s)
 }
 
-/// Settings are refused outside Init and Error.
+/// Returns the failure: settings are refused outside Init and Error.
 fn refused(error: Error, arm: &Arm) -> Failure {
     let failure = Failure::of(&error);
     match error {
@@ -87,7 +87,7 @@ fn refused(error: Error, arm: &Arm) -> Failure {
     }
 }
 
-/// A device that takes friction, gains and model only.
+/// Gives parameters to a controller that accepts friction, gains and model only.
 fn without_extensions(
     session: &mut Session<LinkPort>,
     arm: &Arm,
@@ -128,7 +128,7 @@ pub(super) fn pull(
     Ok(())
 }
 
-/// Lists what differs.
+/// Lists the differences.
 pub(super) fn diff(file: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let arm = Arm::load(file)?;
     let mut session = link.session()?;

@@ -40,7 +40,7 @@ pub(super) fn import(args: &ImportArgs, out: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was changed, by kind; the same change of several joints in one line.
+/// Lists the changes by kind; the same change of several joints is one line.
 fn changes(warnings: &[Warning]) -> String {
     let mut kinds: BTreeMap<Change, Vec<(&str, Vec<&str>)>> = BTreeMap::new();
     for w in warnings {
@@ -64,7 +64,7 @@ fn changes(warnings: &[Warning]) -> String {
     text
 }
 
-/// What was proposed: a row for each number, a column for each joint.
+/// Shows the proposed values: a row for each value, a column for each joint.
 fn as_table(values: &[ArmValue]) -> String {
     let mut rows: Vec<(&ArmValue, [String; 6])> = Vec::new();
     for v in values {

@@ -1,4 +1,4 @@
-//! `jtc arm show`: all numbers of an arm.
+//! `jtc arm show`: all parameters of an arm.
 
 use cli_kit::{Failure, Output, table};
 use jtc_host::arm::{Arm, ArmValue, Source};
@@ -8,7 +8,7 @@ use serde_json::json;
 /// Degrees in a radian.
 const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
-/// `name`: the file, or whose arm it is.
+/// Shows the arm; `name` is its file, or its owner.
 pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(), Failure> {
     let mut values = arm.values();
     if deg {
@@ -44,7 +44,7 @@ pub(super) fn show(arm: &Arm, name: &str, deg: bool, out: &Output) -> Result<(),
     Ok(())
 }
 
-/// The same number in degrees, if it is an angle or its rate.
+/// Converts the value to degrees, if it is an angle or its rate.
 fn in_degrees(v: &mut ArmValue) {
     let unit = match v.unit {
         "rad" => "°",
@@ -58,9 +58,9 @@ fn in_degrees(v: &mut ArmValue) {
     }
 }
 
-/// As a person reads it: five significant digits, no zeros behind them.
+/// Formats a number with five significant digits, without trailing zeros.
 pub(super) fn number(value: f64) -> String {
-    // Rounding of turned frames is no number that anybody gave.
+    // Rounding errors of rotated frames count as 0.
     if value.abs() < 1e-11 {
         return "0".into();
     }
@@ -96,7 +96,7 @@ fn gravity(values: &[ArmValue]) -> String {
     format!("gravity: {own} m/s² in the frame of the base, default {default}, from: {from}\n")
 }
 
-/// A row for each number of the joints.
+/// Returns a row for each parameter of the joints.
 fn by_joint(values: &[ArmValue]) -> String {
     let of_joints = |v: &&ArmValue| v.joint.is_some() && v.link.is_none();
     let mut names: Vec<&str> = Vec::new();
@@ -121,7 +121,7 @@ fn by_joint(values: &[ArmValue]) -> String {
     table(&["", ">1 ", ">2 ", ">3 ", ">4 ", ">5 ", ">6 ", "unit", "range", ">default", "from"], &rows)
 }
 
-/// Where the numbers of a row come from.
+/// Returns the source of the values in a row.
 fn source(all: &[&ArmValue]) -> String {
     let mut sources: Vec<&str> = all.iter().map(|v| v.from.name()).collect();
     sources.dedup();
@@ -130,7 +130,7 @@ fn source(all: &[&ArmValue]) -> String {
     sources.join(", ")
 }
 
-/// Settings of the controller that are of no joint.
+/// Returns settings of the controller that belong to no joint.
 fn of_controller(values: &[ArmValue]) -> String {
     let own = |v: &&ArmValue| v.joint.is_none() && v.link.is_none() && !v.name.starts_with("gravity");
     let row = |v: &ArmValue| {
@@ -147,7 +147,7 @@ fn of_controller(values: &[ArmValue]) -> String {
     table(&["", ">value", "unit", "range", ">default", "from"], &rows)
 }
 
-/// A row for each pose.
+/// Returns a row for each pose.
 pub fn poses(arm: &Arm, deg: bool) -> String {
     let row = |(name, position): (&String, &[f64; 6])| {
         let cells = position.iter().map(|v| number(if deg { v * DEGREES } else { *v }));

@@ -36,18 +36,18 @@ const COLUMNS: [Column; 7] = [
 /// Columns before the words of a joint, with the spaces between them.
 const WITH_WORDS: u16 = 56;
 
-/// How many rows there are.
+/// Returns the number of rows.
 pub fn count(s: &Status) -> usize {
     s.joints.len() + usize::from(s.gripper.is_some())
 }
 
-/// A joint that is measured reports an error.
+/// Returns `true` if a measured joint reports an error.
 fn is_broken(s: &Status, j: usize) -> bool {
     let joint = &s.joints[j];
     joint.state.is_fault() || joint.errors != 0 || joint.internal != 0 || joint.mc_current != 0
 }
 
-/// As many of the words as fit, and how many more there are; the head of the view has them all.
+/// Returns as many words as fit, and the number of the others; the head of the view has them all.
 fn fitting(words: &[&str], width: usize) -> String {
     for count in (1..=words.len()).rev() {
         let more = words.len() - count;
@@ -59,8 +59,8 @@ fn fitting(words: &[&str], width: usize) -> String {
     if words.is_empty() { String::new() } else { format!("{} above", words.len()) }
 }
 
-/// All rows, those of which nothing is known first, then those with an error: the last values of a joint that does not answer are no news of it. Where no status
-/// comes any more, nothing is known of any of them.
+/// Returns all rows, unknown joints first, then those with an error: the last values of a silent joint are outdated.
+/// Without statuses all joints are unknown.
 fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     let room = usize::from(width.saturating_sub(WITH_WORDS));
     let known = |j: usize| !silent && is_measured(s, j);
@@ -127,7 +127,7 @@ fn rows(s: &Status, silent: bool, width: u16) -> Vec<Row<'static>> {
     joints.chain(gripper).map(drawn).map(|(cells, style)| Row::new(cells).style(style)).collect()
 }
 
-/// The rows from `first` on, as far as the view is wide.
+/// Returns the rows from `first` on, at the width of the view.
 pub fn table(s: &Status, silent: bool, width: u16, framed: bool, first: usize) -> Table<'static> {
     let shown = |c: &&Column| width >= c.2;
     let mut widths: Vec<Constraint> = COLUMNS.iter().filter(shown).map(|c| Constraint::Length(c.1)).collect();

@@ -1,6 +1,6 @@
-//! The picture of `jtc monitor`, from a large terminal down to one of 40 columns and 12 rows: what is wrong and the next command come
-//! before anything else, the joints that are not measured lead the table, what has no room scrolls, the keys are always there, and
-//! curves are drawn where there is room left.
+//! View of `jtc monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first, and
+//! unmeasured joints lead the table. Text without space scrolls, the keys are always visible, and curves fill the
+//! remaining space.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -20,36 +20,36 @@ use super::joints::{self, COLOURS};
 
 /// Values that the curves show: 8 s of statuses.
 const HISTORY: usize = 200;
-/// Rows from which on there is one for the state of a link that is well.
+/// Least number of rows with a row for a good link.
 const LINK: u16 = 16;
 /// Least height of the curves.
 const CURVES: u16 = 6;
-/// Rows of joints that are shown however much is wrong, with their head.
+/// Least number of joint rows with their head, for any number of errors.
 const LEAST_ROWS: u16 = 3;
-/// Keys, of which the first are shown on terminals that are too small.
+/// Keys; terminals that are too small show only the first.
 const KEYS: &str = "s stops   q ends";
 
-/// What the view remembers.
+/// State of the view.
 pub struct View {
     port: String,
     last: Option<Status>,
-    /// No status has come for so long.
+    /// Time since the last status.
     pub silent: Option<Duration>,
-    /// Statuses a second.
+    /// Statuses per second.
     pub rate: f64,
-    /// Bytes that were in no frame.
+    /// Bytes outside of frames.
     pub bad_bytes: u64,
-    /// What became of the last key, until the next one.
+    /// Result of the last key, until the next one.
     pub reply: String,
-    /// How far causes and joints are scrolled.
+    /// Scroll positions of causes and joints.
     pub scroll: Scroll,
-    /// NaN where a joint was not measured.
+    /// NaN if a joint was not measured.
     position: [VecDeque<f64>; 6],
     torque: [VecDeque<f64>; 6],
 }
 
 impl View {
-    /// Of a controller at this port, of which nothing is known yet.
+    /// Creates the view of a controller at this port, without any status yet.
     pub fn new(port: String) -> Self {
         Self {
             port,
@@ -80,14 +80,14 @@ impl View {
         self.last = Some(s);
     }
 
-    /// The failure of the port, with what is known of the motion.
+    /// Returns the failure of the port, with the known state of the motion.
     pub fn lost(&self, failure: Failure) -> Failure {
         let moving = self.last.is_some_and(|s| s.is_executing());
         let message = format!("{}{}", failure.message, if moving { "; THE ARM MAY BE MOVING" } else { "" });
         Failure { message, ..failure }
     }
 
-    /// Draws all that there is room for.
+    /// Draws all parts that fit.
     pub fn draw(&mut self, frame: &mut Frame<'_>) {
         if too_small(frame, KEYS) {
             return;
@@ -97,7 +97,7 @@ impl View {
         let edge = if framed { 2 } else { 0 };
         let inner = area.width.saturating_sub(2 * edge);
         let head = self.head(inner, frame.area().height >= LINK);
-        // Joints keep some rows, whatever the causes need; with room for all of them they have all.
+        // Joints always keep some rows; with enough space they get all of theirs.
         let rows = if framed { 8 } else { LEAST_ROWS };
         let most = area.height.saturating_sub(head.len() as u16 + rows + 3 * edge);
         let (trouble, rest) = self.trouble().lines(inner, most.into());
@@ -124,7 +124,7 @@ impl View {
         frame.render_widget(Line::from(keys).style(Style::new().fg(Color::Gray)), foot);
     }
 
-    /// Causes that have no room above, and the joints; what has no room here scrolls.
+    /// Draws the causes that do not fit above, and the joints; rows without space scroll.
     fn rows(&mut self, frame: &mut Frame<'_>, area: Rect, rest: Vec<Line<'static>>, framed: bool) {
         let Some(s) = &self.last else { return };
         let (edge, heads) = (if framed { 2 } else { 0 }, 1);
@@ -136,7 +136,7 @@ impl View {
             Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(area);
         frame.render_widget(Paragraph::new(above), causes);
         let (inner, skip) = (area.width.saturating_sub(2 * edge), first.saturating_sub(rest.len()));
-        // A head without a row below it is of no use.
+        // A head without a row below it is useless.
         if table.height > heads + edge {
             frame.render_widget(joints::table(s, self.silent.is_some(), inner, framed, skip), table);
         }
@@ -162,7 +162,7 @@ impl View {
         lines
     }
 
-    /// What is wrong, and what to do.
+    /// Returns the errors and the next step.
     fn trouble(&self) -> Trouble {
         let reply = self.reply.clone();
         let (causes, warnings, next) = match (&self.last, self.silent) {
@@ -219,10 +219,10 @@ fn state_style(state: Code<ControllerState>) -> Style {
 fn curve(history: &VecDeque<f64>, j: usize, name: &str, width: u16, silent: bool) -> Sparkline<'static> {
     let known = || history.iter().copied().filter(|v| v.is_finite());
     let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    // A resting value is not blown up to full height.
+    // Values at rest are not scaled up to full height.
     let span = (high - low).max(0.01);
     let height = |v: &f64| v.is_finite().then(|| ((v - low) / span * 100.0) as u64 + 1);
-    // The newest that there is room for beside the frame.
+    // The newest values that fit next to the frame.
     let old = history.len().saturating_sub(usize::from(width.saturating_sub(4)));
     let heights: Vec<Option<u64>> = history.iter().skip(old).map(height).collect();
     let last = history.back().filter(|v| v.is_finite() && !silent);

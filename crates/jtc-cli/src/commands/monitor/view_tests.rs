@@ -38,7 +38,7 @@ fn drawn(view: &mut View, (width, height): (u16, u16)) -> Vec<String> {
     cells.chunks(width.into()).map(|row| row.iter().map(|c| c.symbol()).collect()).collect()
 }
 
-/// All rows that a view shows while it is scrolled to its end.
+/// Returns all rows that a view shows while it is scrolled to its end.
 fn scrolled(view: &mut View, size: (u16, u16)) -> Vec<String> {
     let mut all = drawn(view, size);
     loop {
@@ -51,7 +51,7 @@ fn scrolled(view: &mut View, size: (u16, u16)) -> Vec<String> {
     }
 }
 
-/// Rows as one text without what is around them, so that words that are broken over lines are found.
+/// Joins rows without their frames, so that wrapped words are found.
 fn joined(rows: &[String]) -> String {
     let words: Vec<&str> = rows.iter().flat_map(|row| row.split_whitespace()).filter(|w| *w != "│").collect();
     words.join(" ")
@@ -64,7 +64,7 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
         let rows = drawn(&mut view, size);
         let text = rows.join("\n");
         let place = |words: &str| rows.iter().position(|row| row.contains(words));
-        // What broke stands before anything else, then the next command, then state and joints.
+        // The failure comes first, then the next command, then state and joints.
         let named = place("joint 3 does not answer").unwrap_or_else(|| panic!("not named\n{text}"));
         let (next, state) = (place("next: jtc recover").unwrap(), place(" Error ").unwrap());
         assert!(named <= 1 && named < next && next < state, "{size:?}\n{text}");
@@ -81,7 +81,7 @@ fn a_joint_without_measurement_has_no_number_and_is_named_first() {
     }
 }
 
-/// However much is wrong: the first cause and the next command are whole, and all of the rest can be scrolled to.
+/// For any number of errors the first cause and the next command are complete, and the rest can be scrolled to.
 #[test]
 fn no_cause_is_cut_and_none_vanishes() {
     let mut s = Status {
@@ -116,7 +116,7 @@ fn no_cause_is_cut_and_none_vanishes() {
     }
 }
 
-/// A joint with a fault leads the table; of its words those that have room are shown whole, and the others are counted.
+/// A joint with a fault leads the table; words that fit are shown completely, and the others are counted.
 #[test]
 fn a_joint_with_a_fault_leads_the_table() {
     let mut s = Status { state: ControllerState::Error.into(), errors: 0x98, ..Status::default() };
@@ -157,7 +157,7 @@ fn every_cause_is_explained() {
     }
 }
 
-/// Numbers that came before the silence are not shown as if they were new.
+/// Values from before the silence are not shown as current.
 #[test]
 fn a_silent_controller_shows_no_old_value() {
     for size in SIZES {
@@ -196,7 +196,7 @@ fn a_terminal_that_is_too_small_says_the_size_that_is_needed() {
     }
 }
 
-/// A gripper that does not answer has no pump that stands.
+/// A gripper that does not answer has no valid pump state.
 #[test]
 fn a_silent_gripper_looks_so() {
     let mut s =

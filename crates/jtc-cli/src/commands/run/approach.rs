@@ -1,4 +1,4 @@
-//! The way from where the arm stands to the first point of a trajectory.
+//! Path from the position of the arm to the first point of a trajectory.
 
 use cli_kit::{ErrorKind, Failure, Output, error_object};
 use jtc_host::CheckError;
@@ -7,13 +7,13 @@ use serde_json::json;
 
 use super::Course;
 
-/// Prints how long an approach takes, and at which speed.
+/// Prints the duration and the speed of an approach.
 pub fn note(duration_s: f64, course: &Course, speed: MoveSpeed, out: &Output) {
     let of_speed = speed.note(course.speed_option).map_or(String::new(), |words| format!(", {words}"));
     out.note(format!("approach: {duration_s:.1} s to the first point{of_speed}"));
 }
 
-/// The failure of a run whose approach is not possible; with `--json` its verdict is printed.
+/// Returns the failure of a run whose approach is not possible; with `--json` its verdict is printed.
 pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Failure {
     let verdict = match error {
         ApproachError::Plan(e) => return refused(&e.to_string(), &course.words),
@@ -31,7 +31,7 @@ pub fn not_possible(error: ApproachError, course: &Course, out: &Output) -> Fail
     Failure::shown(failure.kind)
 }
 
-/// The way to the first point cannot be gone; the trajectory itself is sound.
+/// Returns the failure of the path to the first point; the trajectory itself is valid.
 fn refused(why: &str, file: &str) -> Failure {
     let message =
         format!("the straight way from where the arm stands to the first point of {file} is refused: {why}");
@@ -46,7 +46,7 @@ fn refused(why: &str, file: &str) -> Failure {
 mod tests {
     use super::*;
 
-    /// The file that was typed passed its check: what is refused is the way to it.
+    /// The typed file passed its check: the path to it is refused.
     #[test]
     fn a_refused_approach_does_not_send_people_to_correct_their_file() {
         let failure = refused("joint 2: no stop in time", "'my motion.csv'");

@@ -1,4 +1,4 @@
-//! How a run ended: its files, its figures, and the exit code.
+//! End of a run: its files, its figures, and the exit code.
 
 use std::collections::VecDeque;
 
@@ -16,22 +16,22 @@ use super::super::run_report;
 use super::terminal::{Reel, Taken};
 use crate::link::LinkPort;
 
-/// Motions whose figures are kept: many runs must not fill the memory of a PC.
+/// Number of motions whose figures are kept: many runs must not fill the memory of a PC.
 const KEPT: usize = 1000;
 
-/// A motion that was finished.
+/// A finished motion.
 pub struct Done {
     pub phase: Phase,
     pub summary: Summary,
 }
 
-/// Motions that were finished: how many, and the figures of the last ones.
+/// Finished motions: their number, and the figures of the last ones.
 #[derive(Default)]
 pub struct Finished {
     kept: VecDeque<Done>,
-    /// Runs among all of them, without approaches.
+    /// Number of runs, without approaches.
     runs: usize,
-    /// Runs and approaches that are not kept any more.
+    /// Runs and approaches that are no longer kept.
     left_out: usize,
 }
 
@@ -46,7 +46,7 @@ impl Finished {
     }
 }
 
-/// How a motion ended, in a word.
+/// Returns the end of a motion in a word.
 fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     match outcome {
         Ok(Outcome::Finished(_)) => "finished",
@@ -55,7 +55,7 @@ fn word(outcome: &Result<Outcome, Error>) -> &'static str {
     }
 }
 
-/// Writes the files of a run and prints how it ended.
+/// Writes the files of a run and prints its end.
 pub fn conclude(
     job: &Job,
     ended: Ended,
@@ -68,7 +68,7 @@ pub fn conclude(
     let Reel { mut info, tape, .. } = reel;
     let link = session.statistics();
     let facts = [Facts::of_link(&last.upload, &link, session.port().baud())];
-    // A person wants to see of a run that failed what broke first.
+    // After a failed run the user wants to see the first failure.
     let broken = last.outcome.as_ref().err().map(|error| RunFailure::of(error, &info, &samples));
     let word = if cut { "stopped" } else { word(&last.outcome) };
     let digest = Digest::of(&samples);
@@ -85,7 +85,7 @@ pub fn conclude(
     info.ending = Ending { outcome: word.into(), reason, ..Ending::default() };
     let input = ReportInput { facts: &facts, failure: broken.as_ref(), ..ReportInput::new(&info, &digest) };
     let (files, lost) = outputs.write(tape, &input);
-    // A file that is lost is reported even when the run failed, but the run comes first.
+    // A lost file is reported even if the run failed, but the run comes first.
     for failure in lost.iter().skip(usize::from(outcome.is_ok())) {
         out.note(format!("jtc: {}", failure.message));
     }
@@ -136,7 +136,7 @@ pub fn conclude(
     }
 }
 
-/// Every motion of the run as JSON, approaches among them; the last one ended it.
+/// Returns every motion of the run as JSON, approaches included; the last one ended it.
 fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     let before = done.kept.iter().map(|d| (d.phase, "finished", &d.summary));
     let mut number = done.runs - done.kept.iter().filter(|d| d.phase == Phase::Motion).count();
@@ -153,7 +153,7 @@ fn runs(done: &Finished, last: (Phase, &'static str, &Summary)) -> Vec<Value> {
     before.chain([last]).map(value).collect()
 }
 
-/// A line for each motion whose figures are kept: the worst of its joints.
+/// Returns a line for each motion whose figures are kept: the worst of its joints.
 fn each_run(runs: &[Value], left_out: usize) -> String {
     let row = |run: &Value| {
         let worst = |key: &str, scale: f64, digits: usize| {
@@ -184,7 +184,7 @@ mod tests {
 
     use super::*;
 
-    /// The memory of 100,000 runs is that of the last thousand, which have their numbers.
+    /// 100,000 runs use the memory of the last thousand, which have their numbers.
     #[test]
     fn figures_of_the_last_motions_are_kept() {
         let summary = Summary::of(&RecordingInfo::default(), &[Sample::default()]);

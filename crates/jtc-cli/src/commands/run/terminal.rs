@@ -30,7 +30,7 @@ use crate::tape::Tape;
 pub struct Reel {
     pub info: RecordingInfo,
     pub tape: Option<Tape>,
-    /// Begin of its first motion, on the clock of the session.
+    /// Start of its first motion, on the clock of the session.
     start: Duration,
     /// Earliest time of the next sample, s: right after the last one. The controller's time may run ahead of ours, in a simulator that is
     /// faster than real time.
@@ -47,7 +47,7 @@ impl Reel {
 pub struct Taken {
     /// Motions before the last one.
     pub done: Finished,
-    /// Samples of the last one, oldest first, on the clock of the whole run.
+    /// Samples of the last motion, oldest first, on the clock of the whole run.
     pub samples: Vec<Sample>,
     pub reel: Reel,
     pub outputs: Outputs,
@@ -67,10 +67,10 @@ pub struct Terminal<'a, 'o> {
     done: Finished,
     /// Bar of the upload or of the motion.
     bar: Option<ProgressBar>,
-    /// Of the motion that goes on, on a clock of its own, which begins so long after that of the run, s.
+    /// Samples of the current motion, on its own clock, which starts `offset_s` after that of the run.
     samples: Rc<RefCell<Vec<Sample>>>,
     offset_s: f64,
-    /// Of the motion that has ended.
+    /// Samples of the motion that has ended.
     last: Vec<Sample>,
     /// Runs that have finished.
     runs: u32,
@@ -105,12 +105,12 @@ impl<'a, 'o> Terminal<'a, 'o> {
     /// Returns the recording and the figures of the run.
     pub fn taken(self) -> Taken {
         let Self { job, outputs, reel, done, last: samples, .. } = self;
-        // Each motion begins it before it moves.
+        // Each motion begins the recording before it moves.
         let reel = reel.unwrap_or_else(|| Reel::new(RecordingInfo::of(&job.arm), None, Duration::ZERO));
         Taken { done, samples, reel, outputs }
     }
 
-    /// Begins the recording with the first motion. Returns where samples go.
+    /// Begins the recording with the first motion. Returns the sink of its samples.
     fn record(&mut self, phase: Phase, source: String, now: Duration) -> Result<Option<SampleSink>, Failure> {
         let reel = match &mut self.reel {
             Some(reel) => reel,
@@ -133,13 +133,13 @@ impl<'a, 'o> Terminal<'a, 'o> {
         Ok(reel.tape.as_ref().map(Tape::sink))
     }
 
-    /// Figures of the motion that has ended; its samples are in the recording.
+    /// Stores the figures of the motion that has ended; its samples are in the recording.
     fn keep_figures(&mut self, phase: Phase) {
         let Some(reel) = &self.reel else { return };
         self.done.push(Done { phase, summary: Summary::of(&reel.info, &self.last) });
     }
 
-    /// The refusal of a check.
+    /// Returns the refusal of a check.
     fn not_checked(&self, error: CheckError) -> Failure {
         match error {
             CheckError::Refused(verdict) => self.job.refuse(&verdict, self.operator.out),
@@ -247,7 +247,7 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
         }
         if leg.phase == Phase::Approach && leg.is_finished() {
             self.keep_figures(leg.phase);
-            // The recording is that of the motion: before the first one it is begun again.
+            // The recording covers only the motion: it is restarted before the first run.
             if self.runs == 0
                 && let Some(tape) = take(&mut self.reel).and_then(|reel| reel.tape)
             {
@@ -264,13 +264,13 @@ impl Observer<LinkPort> for Terminal<'_, '_> {
     }
 }
 
-/// The person ended the command before it moved anything; `during` names what went on.
+/// Returns the failure if the user ended the command before it moved the arm; `during` names the current step.
 pub fn cancelled(during: &str) -> Failure {
     let message = format!("cancelled during the {during}; the motion was not started");
     Failure { message, ..Failure::of(&Error::Cancelled) }
 }
 
-/// An output cannot be written, and nothing moved yet.
+/// Returns the failure if an output cannot be written before the arm has moved.
 fn not_started(failure: Failure) -> Failure {
     Failure { message: format!("{}; the motion was not started", failure.message), ..failure }
         .next("make room or name another place, and run again")

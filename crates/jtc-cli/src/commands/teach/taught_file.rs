@@ -1,4 +1,5 @@
-//! A motion by hand as a trajectory file that is written while the arm is led: what was led is in it whatever ends the program.
+//! Hand-guided motion as a trajectory file. It is written during teaching, so that it stays complete if the program
+//! ends.
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -9,36 +10,36 @@ use jtc_host::waypoints::{self, thinned};
 
 use crate::failure::recording_broken_off;
 
-/// Movement below this is standing still, rad.
+/// Movement below this counts as standing still, rad.
 const STILL: f64 = 0.002;
 /// The controller's own grid, s: the host's clock only shows which status was lost.
 const GRID_S: f64 = 0.04;
-/// Fewer rows are no motion.
+/// Least number of rows of a motion.
 const LEAST: usize = 3;
 const HEADER: &str = "t,q1,q2,q3,q4,q5,q6\n";
 
-/// One pose in the file.
+/// Pose in the file.
 struct Row {
     position: [f64; 6],
     /// Bytes of the file up to its end.
     end: usize,
 }
 
-/// Rows of the motion: without the standing still before and after it, but with the last resting pose of each.
+/// Rows of the motion: without the rest before and after it, but with the last resting pose of each.
 pub struct TaughtFile {
     name: String,
     output: Option<OutputFile>,
     file: Option<File>,
     text: String,
     rows: Vec<Row>,
-    /// Where the arm rested at first, and the last slot in which it did.
+    /// First resting pose, and the last slot at rest.
     rest: Option<([f64; 6], i64)>,
     start_slot: i64,
     last_slot: i64,
 }
 
 impl TaughtFile {
-    /// An output that stays as it is until the arm moves.
+    /// Takes an output that stays unchanged until the arm moves.
     pub fn new(output: OutputFile) -> Self {
         Self {
             name: output.name(),
@@ -52,17 +53,17 @@ impl TaughtFile {
         }
     }
 
-    /// As people name it.
+    /// Returns the name for users.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// A motion is in the file.
+    /// Returns `true` if the file contains a motion.
     pub fn is_begun(&self) -> bool {
         self.file.is_some()
     }
 
-    /// The pose at a time (s); in the file when this returns, if the arm has moved.
+    /// Takes the pose at a time (s); if the arm has moved, the pose is in the file on return.
     pub fn take(&mut self, time_s: f64, position: [f64; 6]) -> Result<(), Failure> {
         let slot = (time_s / GRID_S).round() as i64;
         if slot <= self.last_slot {
@@ -102,15 +103,15 @@ impl TaughtFile {
         self.rows.push(Row { position, end: self.text.len() });
     }
 
-    /// Rows up to the first one of the rest at the end.
+    /// Returns the number of rows before the rest at the end.
     fn in_motion(&self) -> usize {
         let Some(last) = self.rows.last() else { return 0 };
         let moving = self.rows.iter().rposition(|row| moved(&row.position, &last.position));
         moving.map_or(0, |i| i + 2).min(self.rows.len())
     }
 
-    /// Takes the rest at the end off, and returns what the file holds; none when the arm was not moved and nothing was written. With a
-    /// tolerance (rad) these are waypoints in the place of the motion.
+    /// Removes the rest at the end, and describes the file's content; `None` if the arm was not moved and no row was
+    /// written. With a tolerance (rad) waypoints replace the motion.
     pub fn finish(self, thin: Option<f64>) -> Result<Option<String>, Failure> {
         let kept = self.in_motion();
         let Self { name, file, mut text, mut rows, .. } = self;
@@ -184,7 +185,7 @@ mod tests {
         );
     }
 
-    /// A straight way has its two ends, whatever its speed was; the motion that was in the file before is gone.
+    /// A straight path becomes its two ends, for every speed; the earlier motion in the file is removed.
     #[test]
     fn a_motion_by_hand_becomes_waypoints() {
         let dir = tempfile::tempdir().unwrap();

@@ -9,9 +9,9 @@ use crate::Next;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
-    /// A fault that prevents any operation.
+    /// Problem that must be solved before anything works.
     Problem,
-    /// An operation with a defect.
+    /// Deviation that the system still works with.
     Warning,
     /// Correct state.
     Good,
@@ -75,7 +75,7 @@ impl Findings {
         self.add(Severity::Problem, what, why, next);
     }
 
-    /// Adds an operation with a defect.
+    /// Adds a deviation that the system still works with.
     pub fn warn(&mut self, what: impl Into<String>, why: impl Into<String>, next: impl Into<Next>) {
         self.add(Severity::Warning, what, why, next);
     }

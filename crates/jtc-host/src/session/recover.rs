@@ -81,11 +81,11 @@ impl<P: Port> Session<P> {
         Recovery::new(self, parameters, ended, report).from(status)
     }
 
-    fn give(&mut self, parameters: ParameterSource<'_>) -> Result<(), Error> {
+    fn give(&mut self, parameters: ParameterSource<'_>, ended: impl Fn() -> bool) -> Result<(), Error> {
         match parameters {
             ParameterSource::None => Ok(()),
             ParameterSource::ControllerDefaults => Ok(self.use_defaults()?),
-            ParameterSource::Arm { set, .. } => self.push(set, |_| {}).map(|_| ()),
+            ParameterSource::Arm { set, .. } => self.push_until(set, ended, |_| {}).map(|_| ()),
         }
     }
 
@@ -202,7 +202,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         };
         let stored = stored.map(|info| format!("{}, the arm that is stored in the controller", info.arm));
         (self.report)(&RecoverStep::Give(self.parameters.arm_name().or(stored)));
-        self.session.give(self.parameters)?;
+        self.session.give(self.parameters, &self.ended)?;
         self.given = true;
         self.session.pause_for(TAKEN_IN, &self.ended)
     }

@@ -121,6 +121,11 @@ impl Link {
         defaults: bool,
         accept_device_limits: bool,
     ) -> PyResult<Vec<String>> {
+        if arm.is_some() && defaults {
+            return Err(Failure::usage("arm and defaults name two sets of parameters; nothing was sent")
+                .next("pass one of them")
+                .into());
+        }
         let parameters = match arm.map(|arm| Arc::clone(&arm.inner)) {
             Some(arm) => RecoverParameters::Arm { arm, accept_device_limits },
             None if defaults => RecoverParameters::ControllerDefaults,

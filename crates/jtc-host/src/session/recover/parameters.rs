@@ -10,7 +10,7 @@ use crate::error::{CheckError, Error, ParametersError};
 use crate::port::Port;
 use crate::session::Session;
 
-/// Parameters that recover gives to a controller that has lost its own (J-55).
+/// Parameters that recover gives to a controller without torque (J-55).
 #[derive(Clone, Debug, Default)]
 pub enum RecoverParameters {
     /// None: recover refuses a controller that needs some.
@@ -46,7 +46,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// Those of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
-    /// limits than the arm and they are not accepted. Nothing is sent in these cases.
+    /// limits than the arm and they are not accepted. Nothing is changed in these cases.
     pub fn recover_with(
         &mut self,
         parameters: &RecoverParameters,
@@ -61,7 +61,10 @@ impl<P: Port> Session<P> {
             };
             return self.recover_until(source, ended, report);
         };
+        let stops = self.port.halts().stops;
         let differences = arm.device_differences(&self.device_config()?);
+        // A Stop that came meanwhile ends the recovery, too.
+        let stopped = self.port.halts().stops != stops;
         if !differences.is_empty() && !accept_device_limits {
             return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences }.into());
         }
@@ -69,6 +72,7 @@ impl<P: Port> Session<P> {
             report(&RecoverStep::Differs(difference));
         }
         let set = arm.parameter_set();
-        self.recover_until(ParameterSource::Arm { name: &arm.name, set: &set }, ended, report)
+        let source = ParameterSource::Arm { name: &arm.name, set: &set };
+        self.recover_until(source, || stopped || ended(), report)
     }
 }

@@ -58,7 +58,7 @@ impl std::fmt::Display for RecoverStep {
             RecoverStep::KeepHolding(arm) => write!(
                 f,
                 "the arm is held with the friction, gains and arm model that the controller was given before, not with those of \
-                 {arm}: `jtc params push` gives them"
+                 {arm}; a push of the parameters gives them"
             ),
             RecoverStep::WaitNodes(nodes) => write!(f, "waiting for {}", nodes.join(", ")),
             RecoverStep::HoldPos => write!(f, "HoldPos, no errors"),

@@ -26,17 +26,28 @@ pub struct Ended {
 pub trait Ran {
     /// Returns the output if the program failed.
     fn failure(&self) -> Option<&str>;
+
+    /// Returns `true` if the program ran and passed.
+    fn passed(&self) -> bool;
 }
 
 impl Ran for Result<Ended> {
     fn failure(&self) -> Option<&str> {
         self.as_ref().ok().filter(|ended| !ended.passed).map(|ended| &*ended.output)
     }
+
+    fn passed(&self) -> bool {
+        self.as_ref().is_ok_and(|ended| ended.passed)
+    }
 }
 
 impl Ran for Result<Option<Ended>> {
     fn failure(&self) -> Option<&str> {
         self.as_ref().ok()?.as_ref().filter(|ended| !ended.passed).map(|ended| &*ended.output)
+    }
+
+    fn passed(&self) -> bool {
+        self.as_ref().is_ok_and(|ended| ended.as_ref().is_some_and(|ended| ended.passed))
     }
 }
 
@@ -79,7 +90,7 @@ pub fn beside<T: Send, R: Ran + Send>(
     for item in failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let came = run(&item, &log);
         println!("\n-- the result of the second run:");
-        passed_alone += u64::from(came.failure().is_none());
+        passed_alone += u64::from(came.passed());
         ended.lock().unwrap_or_else(PoisonError::into_inner)(item, came);
     }
     Ok(passed_alone)

@@ -85,9 +85,9 @@ pub struct LinkArgs {
     /// Default: the only port found
     #[arg(long, env = "JTC_PORT", value_name = "PATH", help_heading = "Link")]
     pub port: Option<String>,
-    /// Read the token of the agent from this file.
+    /// Use this token file of the agent.
     ///
-    /// Default: the token file of an agent on this computer
+    /// `jtc serve` creates the file if it does not exist. Default: the token file of an agent on this computer
     #[arg(long, env = "JTC_TOKEN_FILE", value_name = "FILE", help_heading = "Link")]
     pub token_file: Option<std::path::PathBuf>,
     /// Trust an agent at https:// by these certificates, PEM.
@@ -133,7 +133,7 @@ pub enum Command {
         0.2 s. If the disk is full, the simulator reports it at once, continues, and ends with exit code 5.\n\n\
         Lines on the standard input are events:\n  \
         push 3 12 0.5    push joint 3 (counted from 1) with 12 N·m for 0.5 s\n  \
-        hand lead.csv    lead the arm along a trajectory file by hand, in teaching")]
+        hand lead.csv    let a simulated hand lead the arm along a trajectory file, in teaching")]
     Sim(SimArgs),
     /// Own the port, and serve it to many clients
     #[command(
@@ -199,11 +199,13 @@ pub enum Command {
     Payload(PayloadCommand),
     /// Plan the fastest motion through waypoints; nothing is sent
     #[command(
-        after_help = "A waypoint file is CSV, or JSON with the same keys (see `jtc help files`). Its columns are:\n  \
+        after_help = "A waypoint file is CSV, or JSON with the same keys (see `jtc help files`). Give each waypoint \
+            by joint positions, by a pose, or by position and orientation of the flange. The columns are:\n  \
             q1..q6 or q1_deg..q6_deg       joint positions, rad or degrees\n  \
             pose                           name of a pose from the arm file\n  \
             x,y,z                          position of the flange, m\n  \
-            qx,qy,qz,qw or roll,pitch,yaw  orientation of the flange\n  \
+            qx,qy,qz,qw or roll,pitch,yaw  orientation of the flange, rad\n  \
+            leg                            line, via or arc: motion to this waypoint\n  \
             t                              time, s, if the file gives times\n\n\
             The arm stops at each waypoint. --blend rounds a corner if that is faster than a stop. Legs are \
             straight in joint space. With --line, or if the column `leg` requests it, the flange follows \
@@ -267,10 +269,11 @@ pub enum Command {
     /// Switch the vacuum pump of the gripper on or off
     #[command(after_help = "Examples:\n  jtc gripper on\n  jtc gripper off")]
     Gripper(GripperArgs),
-    /// Take the torque off at rest, and return to Init
+    /// Take the torque off at rest: the drives go limp
     #[command(
-        after_help = "The drives go limp, and you must send the parameters again. An arm without holding brakes falls: \
-            support it first. On a terminal the command asks before it acts. --yes answers this question.\n\n\
+        after_help = "The controller returns to Init, and you must send the parameters again. An arm without holding \
+            brakes falls: support it first. On a terminal the command asks before it acts. --yes answers this \
+            question. Without a terminal, the command is refused unless you give --yes.\n\n\
             Examples:\n  \
             jtc disable\n  \
             jtc disable --yes"
@@ -282,7 +285,7 @@ pub enum Command {
         #[command(flatten)]
         link: LinkArgs,
     },
-    /// Jog joints with keys, or one joint while the command runs
+    /// Move single joints with keys, or one joint while the command runs
     #[command(
         after_help = "On a terminal, the keys 1 to 6 select a joint. Hold the left or right arrow to move it. The up and \
             down arrows change the rate, and q quits.\n\n\
@@ -302,8 +305,8 @@ pub enum Command {
             If the controller does not hold the arm, --arm FILE sends friction, gains and arm model of that \
             file. These replace the parameters that the controller has. If the arm is held, the present \
             parameters stay, and the command reports this.\n\n\
-            --defaults uses the parameters of the arm that is built into the controller, but only if some are \
-            missing. Without either option, a controller that has all three keeps them. A controller that lacks \
+            --defaults uses the default parameters of the controller, but only if some are missing. These are the \
+            parameters of the stored arm, or of the built-in arm if none is stored. Without either option, a controller that has all three keeps them. A controller that lacks \
             one is refused.\n\n\
             Examples:\n  \
             jtc recover\n  \

@@ -12,8 +12,8 @@ pub enum FirmwareCommand {
     /// List installed images and mounted board drives
     #[command(
         after_help = "The file firmware.json lists the images. The command reads it in the folder that OPENJTC_FIRMWARE \
-            names. Without this variable, the folder is ../share/openjtc/firmware next to this program, else \
-            /usr/share/openjtc/firmware.\n\n\
+            names. Without this variable, the folder is ../share/openjtc/firmware, seen from the directory of this \
+            program, else /usr/share/openjtc/firmware.\n\n\
             Examples:\n  \
             jtc firmware list\n  \
             jtc --json firmware list | jq -r .drives[].path"
@@ -27,7 +27,7 @@ pub enum FirmwareCommand {
             The command flashes without a question only under three conditions. The board's own port reports no \
             torque, every joint answers it, and the gripper is off. Otherwise the command asks on a terminal. \
             --yes answers this question.\n\n\
-            The core supply is known if that port reports exactly the board of the image. Otherwise a board \
+            The core supply is known if the board's own port reports exactly the board of the image. Otherwise a board \
             that exists with both supplies needs --accept-supply.\n\n\
             Afterwards the command asks over the same port which firmware runs. The firmware reports the CRC-32 \
             of its own flash, and the command compares it with the image. --baud is the rate before flashing. \
@@ -91,7 +91,7 @@ pub struct FlashArgs {
     /// You confirm that the solder bridges of the board are set to the core supply of the image
     #[arg(long)]
     pub accept_supply: bool,
-    /// Flash also a board that already runs this image
+    /// Flash even if the board already runs this image
     #[arg(long)]
     pub again: bool,
     /// Do not ask the controller afterwards which image it runs.
@@ -99,7 +99,7 @@ pub struct FlashArgs {
     /// Then the command cannot verify that the image arrived
     #[arg(long)]
     pub no_read_back: bool,
-    /// Wait this long for the board to run the image, s (1 to 3600)
+    /// Wait at most this long for the board to run the image, s (1 to 3600)
     #[arg(long, env = "JTC_WAIT", value_name = "S", default_value_t = 120, value_parser = clap::value_parser!(u64).range(1..=3600))]
     pub wait: u64,
     #[command(flatten)]

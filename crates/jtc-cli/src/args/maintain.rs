@@ -21,7 +21,7 @@ pub struct MonitorArgs {
 pub struct ClearArgs {
     #[command(flatten)]
     pub link: LinkArgs,
-    /// Clear also the memory of errors that occurred
+    /// Also clear the memory of errors that occurred
     #[arg(long)]
     pub occurred: bool,
 }
@@ -74,7 +74,7 @@ pub struct RecoverArgs {
     /// Send friction, gains and arm model of this arm file
     #[arg(long, value_name = "FILE")]
     pub arm: Option<PathBuf>,
-    /// Use the controller's built-in arm if parameters are missing
+    /// Use the controller's own defaults if parameters are missing
     #[arg(long)]
     pub defaults: bool,
     #[command(flatten)]

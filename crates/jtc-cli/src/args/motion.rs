@@ -34,7 +34,8 @@ pub(super) const STOP_EXAMPLES: &str = "The Stop reaches the arm also if an agen
 pub struct CheckArgs {
     /// Use the limits and masses of this arm, TOML or URDF.
     ///
-    /// Default: the built-in arm
+    /// Default: the built-in arm. Before a motion the arm of the controller takes its place, if the controller has
+    /// extensions
     #[arg(long, env = "JTC_ARM", value_name = "FILE")]
     pub arm: Option<PathBuf>,
     /// Set the speed in percent of the file's own (1 to 200).
@@ -225,7 +226,7 @@ pub struct ContinueArgs {
     /// Default: the trajectory in the recording
     #[arg(long, value_name = "FILE")]
     pub trajectory: Option<PathBuf>,
-    /// Set the number of runs, with finished ones (1 to 100000).
+    /// Set the number of runs, including finished ones (1 to 100000).
     ///
     /// Default: the number in the recording (MCAP)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -242,7 +243,7 @@ pub struct ContinueArgs {
 /// Options of every command that executes a motion.
 #[derive(Args, Clone, Debug)]
 pub struct ExecuteArgs {
-    /// Set the policy for a lost client.
+    /// Set what the motion does if this program is lost.
     ///
     /// The motion continues, pauses or stops if this program is killed or loses its agent. This works only through `jtc
     /// serve`

@@ -70,9 +70,10 @@ pub enum FrictionKind {
 /// Option for values of an arm file that no frame carries.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct AcceptArgs {
-    /// Continue although limits of the controller differ.
+    /// Continue even if limits, gravity or rotor inertia differ.
     ///
-    /// The controller then uses its own limits, gravity and rotor inertia instead of those of the arm file
+    /// The controller then uses its own values instead of those of the arm file. For a motion on a controller with
+    /// extensions, the option accepts every difference, also in masses, gains and friction
     #[arg(long)]
     pub accept_device_limits: bool,
 }

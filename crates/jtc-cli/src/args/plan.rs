@@ -18,8 +18,8 @@ pub struct PlanArgs {
     pub out: PathBuf,
     /// Round corners within this distance, rad (0 to 0.5).
     ///
-    /// This is the distance from the waypoint of the joint that is furthest away, with --deg in degrees. With 0 the arm
-    /// stops at each waypoint
+    /// The distance is that of the joint that is furthest from the waypoint. With --deg, it is in degrees (0 to 28.6).
+    /// With 0 the arm stops at each waypoint
     #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_hyphen_values = true)]
     pub blend: f64,
     /// Keep the flange on straight lines.

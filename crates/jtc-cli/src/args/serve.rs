@@ -45,7 +45,8 @@ pub struct ServeArgs {
     pub allow_origins: Vec<String>,
     /// Print the dashboard link with the operator's token.
     ///
-    /// The link is printed only on a terminal. Without this option it is printed once, when the token is made
+    /// The link with the token is printed only on a terminal. Without this option it is printed once, when the token is
+    /// made
     #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// Append each command to this file.
@@ -69,7 +70,7 @@ pub struct ServeArgs {
     pub tls_cert: Option<PathBuf>,
     /// Use this private key of the certificate, PEM.
     ///
-    /// Other users must not be able to read the file
+    /// The file must not be readable by every user
     #[arg(long, env = "JTC_TLS_KEY", value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
     /// Record each motion of every client to this directory

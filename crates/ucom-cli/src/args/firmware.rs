@@ -60,7 +60,7 @@ pub struct UpdateArgs {
     /// Then no other board accepts the image
     #[arg(long, conflicts_with = "group")]
     pub name_target: bool,
-    /// Program all boards by one broadcast transfer.
+    /// Program the named boards by one broadcast transfer.
     ///
     /// Without this option the boards are programmed one after the other
     #[arg(long)]
@@ -90,7 +90,7 @@ pub struct UpdateArgs {
     /// The exit code is then 0 for `program-up-to-date`, and if the profile leaves nothing to compare
     #[arg(long)]
     pub unverified: bool,
-    /// Write also if the board already shows this program.
+    /// Write even if the board already shows this program.
     ///
     /// The option does not skip any check
     #[arg(long)]

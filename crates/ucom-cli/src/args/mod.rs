@@ -80,7 +80,7 @@ pub struct LinkArgs {
 /// Option that overrides the checks of the bus.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ForceArgs {
-    /// Continue although a check of the bus would refuse.
+    /// Continue even if a check of the bus would refuse.
     ///
     /// The checks are for another PC on the bus, a running board, and the bus load
     #[arg(long)]
@@ -140,7 +140,7 @@ pub enum Command {
         after_help = "Examples:\n  ucom reset          all boards; `ucom init` numbers them again\n  ucom reset 2"
     )]
     Reset(ResetArgs),
-    /// Enter the exloader with programming enabled
+    /// Put boards into the exloader, with programming enabled
     #[command(after_help = "The command stops the applications of the boards.\n\n\
         Examples:\n  \
         ucom xreset 2\n  \
@@ -164,8 +164,8 @@ pub enum Command {
             ucom update 3 program.hex --data data.hex\n  \
             ucom update 3 raw.bin --expect-program-id 0x4B3F\n\n\
             Image formats are raw binary, Intel HEX and Motorola S-record. The command recognises them by their \
-            content. The order of the records shows if their addresses count bytes or words. --addresses sets \
-            this unit. The profile decides if two files are sent: `prog.plan`, see `ucom help profile`.\n\n\
+            content. Records that follow each other without gaps show if their addresses count bytes or words. \
+            --addresses sets this unit. The profile decides if two files are sent: `prog.plan`, see `ucom help profile`.\n\n\
             `all` means the boards that answer and the boards of the inventory. A missing board is reported.\n\n\
             A board shows only its Program ID and date, not its load address or other memories. A board is up \
             to date if the inventory also says that an update wrote the same bytes to the same address. The \
@@ -287,8 +287,8 @@ pub enum Command {
             ucom send 240#                     ask for all boards (PC_REPORT to all)\n  \
             ucom send 1C1#0202 201# --intrusive\n\n\
             The command sends the frames in the order of the command line. Frames that reset, number, program, \
-            start or move boards need --intrusive. Without it the command sends no frames, and ends with exit \
-            code 4. To see the answers of boards, run ucom decode --live in another terminal.")]
+            start or move boards need --intrusive. If one of the frames needs it and you do not give it, the command \
+            sends none of the frames, and ends with exit code 4. To see the answers of boards, run ucom decode --live in another terminal.")]
     Send(SendArgs),
     /// Decode frames of a file, stdin or the live bus
     #[command(
@@ -300,7 +300,7 @@ pub enum Command {
         after_help = "Examples:\n  ucom probe\n  ucom probe --init --out boards.toml\n  ucom probe --image firmware.hex"
     )]
     Probe(ProbeArgs),
-    /// Test that boards follow the protocol page
+    /// Test that boards follow the protocol page; by default only ask
     #[command(after_help = "Examples:\n  \
             ucom conformance\n  \
             ucom conformance 1 --run\n  \

@@ -43,10 +43,12 @@ pub struct SimArgs {
 /// Options of `ucom init`.
 #[derive(Args, Debug)]
 pub struct InitArgs {
-    /// Write this inventory, and compare it if it exists
+    /// Write this inventory; compare with it if it exists
     #[arg(long, env = "UCOM_INVENTORY", value_name = "FILE", default_value = "ucom-inventory.toml")]
     pub inventory: PathBuf,
-    /// Write a new inventory, and ignore the old contents
+    /// Write a new inventory without comparing it to the old one.
+    ///
+    /// Names and flash records are kept for boards with the same flash number
     #[arg(long)]
     pub renew: bool,
     #[command(flatten)]
@@ -136,7 +138,7 @@ pub struct IoArgs {
 /// Options of the cache of descriptions.
 #[derive(Args, Clone, Debug)]
 pub struct CacheArgs {
-    /// Ask the board also if its descriptions are known
+    /// Ask the board even if its descriptions are known
     #[arg(long, env = "UCOM_FRESH", value_parser = on_off)]
     pub fresh: bool,
     /// Keep known descriptions in this directory.
@@ -152,9 +154,9 @@ pub struct CiArgs {
     /// Board number
     #[arg(value_name = "BOARD", value_parser = one_board)]
     pub board: u8,
-    /// Name, or index, and value.
+    /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. Upper and lower case are equal, and you can omit the unit
+    /// `ucom io` shows the names. Case does not matter, and you can omit the unit of the name
     #[arg(value_name = "NAME=VALUE")]
     pub values: Vec<Assignment>,
     /// Run the board under supervision for this time, s.
@@ -173,12 +175,12 @@ pub struct CiArgs {
 pub struct ParArgs {
     /// Board number, list, range, or all.
     ///
-    /// With --apply the boards are those of the file
+    /// With --apply, all means the boards of the file; numbers select some of them
     #[arg(value_name = "BOARDS", default_value = "all")]
     pub boards: Boards,
-    /// Name, or index, and value.
+    /// Name or index of the signal, and its value.
     ///
-    /// `ucom io` shows the names. Upper and lower case are equal, and you can omit the unit
+    /// `ucom io` shows the names. Case does not matter, and you can omit the unit of the name
     #[arg(value_name = "NAME=VALUE", conflicts_with = "apply")]
     pub values: Vec<Assignment>,
     /// Write a parameter file, YAML; - is stdout.
@@ -239,7 +241,7 @@ pub struct RunArgs {
     /// Enable the outputs (boards move)
     #[arg(long)]
     pub active: bool,
-    /// Set first inputs, as BOARD.NAME=VALUE
+    /// Set initial inputs, as BOARD.NAME=VALUE
     #[arg(long, value_name = "B.NAME=V", value_delimiter = ',')]
     pub ci: Vec<Assignment>,
     /// Set parameters before the start, as BOARD.NAME=VALUE
@@ -305,7 +307,7 @@ pub struct RecordArgs {
 pub struct ReplayArgs {
     /// Recording: .log, .fzi or .mcap
     pub file: PathBuf,
-    /// Send also frames that change boards.
+    /// Also send frames that change boards.
     ///
     /// These frames reset, number, program, start or move boards
     #[arg(long)]
@@ -325,7 +327,7 @@ pub struct SendArgs {
     /// For example 240#, 1C1#0202, 12345678#11, 123#R
     #[arg(value_name = "FRAME", required = true)]
     pub frames: Vec<String>,
-    /// Send also frames that change boards.
+    /// Also send frames that change boards.
     ///
     /// These frames reset, number, program, start or move boards
     #[arg(long)]
@@ -407,7 +409,7 @@ pub struct ConformanceArgs {
     /// Run only these tests, as D-T10,D-T11
     #[arg(long, value_name = "TESTS", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Test also if another PC is on the bus.
+    /// Test even if another PC is on the bus.
     ///
     /// Running boards are never tested with --init, --run or --program
     #[arg(long)]

@@ -38,7 +38,8 @@ pub struct ServeArgs {
     pub names: Vec<String>,
     /// Print the dashboard link with the operator's token.
     ///
-    /// The link is printed only on a terminal. Without this option it is printed once, when the token is made
+    /// The link with the token is printed only on a terminal. Without this option it is printed once, when the token is
+    /// made
     #[arg(id = "link_with_token", long = "link")]
     pub link_with_token: bool,
     /// Append each command to this file.

@@ -79,6 +79,8 @@ actions! {
     Info: "jtc info", "GET /api/info", "robot.info";
     /// Move one joint while it is asked for.
     Jog: "jtc jog", "Jog (POST /api/jog)", "robot.jog(…)";
+    /// Accept limits that the controller has otherwise.
+    AcceptDeviceLimits: "--accept-device-limits", "accept_device_limits: true", "accept_device_limits=True";
     /// Give positions in degrees.
     Degrees: "--deg", "degrees: true", "degrees=True";
     /// Choose the rate of the serial line.
@@ -90,7 +92,7 @@ actions! {
     /// Set the payload.
     PayloadSet: "jtc payload set", "Payload (PUT /api/payload)", "robot.payload = …";
     /// Remove the payload.
-    PayloadClear: "jtc payload clear", "Payload (PUT /api/payload with mass_kg: 0)", "robot.payload = None";
+    PayloadClear: "jtc payload clear", "Payload (PUT /api/payload with mass_kg: 0 and com_m: [0, 0, 0])", "robot.payload = None";
     /// Return to a held arm from any state.
     Recover: "jtc recover", "Recover (POST /api/recover with {})", "robot.recover()";
     /// Return to a held arm and give the controller this arm.

@@ -169,7 +169,7 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
                 Severity::Warning,
                 what,
                 "no motion is executed, no teaching",
-                next!("{} ends it", BenchPresent),
+                next!("{} ends it, without torque", BenchPresent),
             );
         } else {
             all.add(

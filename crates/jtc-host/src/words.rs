@@ -260,6 +260,7 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_held_stop() {
         after_removing("remove the cause")
     } else if (s.errors != 0 || s.state == ControllerState::Error) && s.jtc_init != 0 {
+        // The short form of the command, after its long one.
         next!("{}, or ", RecoverWithArm)
             .then(Next::typed(Action::RecoverWithDefaults, "--defaults"))
             .then(" for the arm that is built into the controller")
@@ -274,7 +275,8 @@ pub fn next_step(s: &Status) -> Next {
     } else if s.is_executing() {
         next!("{} ends the motion", Stop)
     } else if s.state == ControllerState::HoldPos && !absent(s).is_empty() {
-        let then = next!(" moves a joint that is there; {} ends the work on a bench", BenchPresent);
+        let then =
+            next!(" moves a joint that is there; {} ends the work on a bench, without torque", BenchPresent);
         Next::typed(Action::Jog, "jtc jog JOINT RATE").then(then)
     } else if s.state == ControllerState::HoldPos {
         next!("{} moves the arm", TrajRun)

@@ -1,7 +1,7 @@
 //! The job that brings the controller back to a held arm.
 use agent_kit::api::Problem;
 use jtc_host::session::RecoverParameters;
-use jtc_host::{CheckError, Error, Session};
+use jtc_host::{Error, Session};
 
 use super::{Done, Task};
 use crate::owner::ClientPort;
@@ -15,9 +15,6 @@ pub fn recover(
     let recovered = session.recover_with(parameters, || task.is_halted(), |step| task.note(step.to_string()));
     let error = recovered.err().map(|error| match error {
         Error::Cancelled => task.stopped(),
-        Error::Check(error @ CheckError::DeviceLimits { .. }) => Problem::of(&error).next(
-            "PUT /api/arm gives the whole arm; if the controller's values are safe for it, ask with accept_device_limits: true",
-        ),
         error => Problem::of(&error),
     });
     (Done { finished: error.is_none(), ..Done::default() }, error)

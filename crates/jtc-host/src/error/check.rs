@@ -42,9 +42,14 @@ impl Diagnose for CheckError {
             Self::DeviceLimits { .. } => Diagnosis::new(
                 ErrorKind::Refused,
                 "device-limits",
-                next!("a controller with extensions takes the whole arm by {}; ", ArmPush).then(format!(
-                    "for others no frame carries {NOT_CARRIED}: they belong into the firmware"
-                )),
+                next!("a controller with extensions takes the whole arm by {}; ", ArmPush)
+                    .then(format!(
+                        "for others no frame carries {NOT_CARRIED}: they belong into the firmware. "
+                    ))
+                    .then(next!(
+                        "If its own values are safe for this arm, {} accepts them",
+                        AcceptDeviceLimits
+                    )),
             ),
             Self::Arm(e) => e.diagnosis(),
         }

@@ -132,10 +132,8 @@ actions! {
 enum Part {
     /// Words for all front ends. Commands stand between backticks.
     Words(Cow<'static, str>),
-    /// Action, which each front end names itself.
-    Action(Action),
-    /// Action with the whole command as a user types it.
-    Typed(Action, String),
+    /// Action, which each front end names itself. The command line shows this command instead of the name, if there is one.
+    Action(Action, Option<String>),
 }
 
 /// Sentence about the next step, without a full stop; empty if no step helps.
@@ -172,17 +170,17 @@ impl Next {
 
     /// Returns `true` if the sentence names this action.
     pub fn names(&self, wanted: Action) -> bool {
-        self.0
-            .iter()
-            .any(|part| matches!(part, Part::Action(action) | Part::Typed(action, _) if *action == wanted))
+        self.0.iter().any(|part| matches!(part, Part::Action(action, _) if *action == wanted))
     }
 
     /// Sets the command of an action, with all arguments, wherever the sentence names the action.
     #[must_use]
     pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
         for part in &mut self.0 {
-            if matches!(part, Part::Action(action) | Part::Typed(action, _) if *action == wanted) {
-                *part = Part::Typed(wanted, command.to_owned());
+            if let Part::Action(action, typed) = part
+                && *action == wanted
+            {
+                *typed = Some(command.to_owned());
             }
         }
         self
@@ -197,7 +195,7 @@ impl Next {
 
     /// Makes a next step of an action and its command with all arguments.
     pub fn typed(action: Action, command: impl Into<String>) -> Self {
-        Self(vec![Part::Typed(action, command.into())])
+        Self(vec![Part::Action(action, Some(command.into()))])
     }
 
     /// Returns the sentence of a front end, with commands, requests and expressions between backticks.
@@ -205,10 +203,10 @@ impl Next {
         let parts = self.0.iter().map(|part| {
             let name = match part {
                 Part::Words(words) => return words.clone(),
-                Part::Typed(_, command) if front_end == FrontEnd::Command => {
+                Part::Action(_, Some(command)) if front_end == FrontEnd::Command => {
                     return format!("`{command}`").into();
                 }
-                Part::Action(action) | Part::Typed(action, _) => action.name(front_end),
+                Part::Action(action, _) => action.name(front_end),
             };
             // Some names are words with an expression among them.
             if name.contains('`') { name.into() } else { format!("`{name}`").into() }
@@ -236,7 +234,7 @@ impl Serialize for Next {
 
 impl From<Action> for Next {
     fn from(action: Action) -> Self {
-        Self(vec![Part::Action(action)])
+        Self(vec![Part::Action(action, None)])
     }
 }
 

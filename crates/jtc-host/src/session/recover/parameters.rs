@@ -54,12 +54,12 @@ impl<P: Port> Session<P> {
         mut report: impl FnMut(&RecoverStep),
     ) -> Result<Status, Error> {
         parameters.check()?;
-        let RecoverParameters::Arm { arm, accept_device_limits } = parameters else {
-            let source = match parameters {
-                RecoverParameters::ControllerDefaults => ParameterSource::ControllerDefaults,
-                _ => ParameterSource::None,
-            };
-            return self.recover_until(source, ended, report);
+        let (arm, accept_device_limits) = match parameters {
+            RecoverParameters::None => return self.recover_until(ParameterSource::None, ended, report),
+            RecoverParameters::ControllerDefaults => {
+                return self.recover_until(ParameterSource::ControllerDefaults, ended, report);
+            }
+            RecoverParameters::Arm { arm, accept_device_limits } => (arm, *accept_device_limits),
         };
         let stops = self.port.halts().stops;
         let differences = arm.device_differences(&self.device_config()?);

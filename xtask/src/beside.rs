@@ -24,30 +24,29 @@ pub struct Ended {
 
 /// Result of a program that ran at the same time as others.
 pub trait Ran {
+    /// Returns the output and the end of the program if the program ran.
+    fn ended(&self) -> Option<&Ended>;
+
     /// Returns the output if the program failed.
-    fn failure(&self) -> Option<&str>;
+    fn failure(&self) -> Option<&str> {
+        self.ended().filter(|ended| !ended.passed).map(|ended| &*ended.output)
+    }
 
     /// Returns `true` if the program ran and passed.
-    fn passed(&self) -> bool;
+    fn passed(&self) -> bool {
+        self.ended().is_some_and(|ended| ended.passed)
+    }
 }
 
 impl Ran for Result<Ended> {
-    fn failure(&self) -> Option<&str> {
-        self.as_ref().ok().filter(|ended| !ended.passed).map(|ended| &*ended.output)
-    }
-
-    fn passed(&self) -> bool {
-        self.as_ref().is_ok_and(|ended| ended.passed)
+    fn ended(&self) -> Option<&Ended> {
+        self.as_ref().ok()
     }
 }
 
 impl Ran for Result<Option<Ended>> {
-    fn failure(&self) -> Option<&str> {
-        self.as_ref().ok()?.as_ref().filter(|ended| !ended.passed).map(|ended| &*ended.output)
-    }
-
-    fn passed(&self) -> bool {
-        self.as_ref().is_ok_and(|ended| ended.as_ref().is_some_and(|ended| ended.passed))
+    fn ended(&self) -> Option<&Ended> {
+        self.as_ref().ok()?.as_ref()
     }
 }
 

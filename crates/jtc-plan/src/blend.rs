@@ -7,7 +7,7 @@ use crate::{JOINTS, JointVec, PlanError, thin};
 
 /// Distance below which waypoints count as equal, rad.
 const SAME: f64 = 1e-9;
-/// Difference of directions below which there is no corner.
+/// Smallest difference of directions that counts as a corner.
 const STRAIGHT: f64 = 1e-9;
 /// Size of the sum of directions below which the path turns back: a stop instead of a corner (some 3°).
 const BACK: f64 = 0.05;

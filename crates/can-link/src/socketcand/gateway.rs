@@ -72,7 +72,7 @@ impl SocketcandGateway {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Delivers a frame to this client only: for hosts that make each client a member of its own, for example of a
+    /// Delivers a frame to this client only: for hosts in which each client is a separate member, for example of a
     /// [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);

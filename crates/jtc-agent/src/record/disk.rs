@@ -1,4 +1,4 @@
-//! Writer of recordings, on a thread of its own, so that a slow or full disk delays nothing else.
+//! Writer of recordings, in a separate thread, so that a slow or full disk delays nothing else.
 #[cfg(test)]
 mod tests;
 

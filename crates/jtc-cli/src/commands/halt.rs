@@ -419,7 +419,7 @@ fn reach_arm(arm: &Arm) -> Result<Reached, NotHalted> {
     }
 }
 
-/// Stops over an own line. If the controller refuses the Stop, there is no motion to stop.
+/// Stops through a separate connection. If the controller refuses the Stop, there is no motion to stop.
 fn directly(
     mut session: Session<LinkPort>,
     progress: &Progress,

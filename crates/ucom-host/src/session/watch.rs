@@ -30,7 +30,7 @@ pub struct Watch {
     pub competing_master: Option<CompetingMaster>,
     /// `true` if nothing may be sent.
     pub listen_only: bool,
-    /// `true` if the boards shall be asked for their identity.
+    /// `true` to ask the boards for their identity.
     pub ask: bool,
     /// Profile of the boards.
     pub profile: Profile,

@@ -11,6 +11,7 @@ mod likeness;
 #[cfg(feature = "mcap")]
 pub mod mcap;
 mod next;
+pub mod owner;
 mod user_folder;
 mod whole;
 

@@ -6,7 +6,6 @@ mod happening;
 mod jobs;
 mod owner;
 mod picture;
-mod work;
 
 pub use happening::{Happening, Policy};
 pub use owner::{Config, Owner};

@@ -17,7 +17,7 @@ use super::hands::Config;
 use super::owner::Owner;
 use super::recording::{ChainRecording, Sink, Tap};
 use super::samples::ChainSamples;
-use super::shared::{Halt, Kind, Listener};
+use super::shared::{Halt, Listener};
 use super::simulated::{Simulated, SimulatedChain};
 use super::update::{Read, Source, Update};
 use super::{procedures, running, update, values};

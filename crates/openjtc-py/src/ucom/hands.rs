@@ -110,7 +110,7 @@ impl Hands {
     /// Runs the bus for one turn.
     fn turn(&mut self) -> Result<(), SessionError> {
         self.session.turn(TURN)?;
-        if self.shared.stop_waits() {
+        if self.shared.queue.stop_waits() {
             return Ok(());
         }
         let notices = self.session.look();

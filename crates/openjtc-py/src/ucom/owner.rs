@@ -5,12 +5,13 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use host_kit::ErrorKind;
+use host_kit::owner::{Kind, Refused, Request};
 use pyo3::prelude::*;
 use serde_json::Value;
 use ucom_host::session::Link;
 
 use super::hands::{Config, Hands};
-use super::shared::{Halt, Kind, Process, Shared, Work, failure, fault, lock};
+use super::shared::{Halt, Process, Shared, failure, fault, lock};
 use crate::error::Failure;
 use crate::json;
 
@@ -85,7 +86,7 @@ impl Owner {
             // Checked also while reports arrive without a gap.
             let result = reported.and_then(|()| py.check_signals());
             if let Err(error) = result {
-                self.shared.cancel(id);
+                self.shared.queue.cancel(|request| *request == id);
                 self.interrupted(py);
                 self.add_outcomes(py, before, &error);
                 return Err(error);
@@ -154,9 +155,10 @@ impl Owner {
     ) -> (u64, Mutex<mpsc::Receiver<Message<T>>>) {
         let (sender, answers) = mpsc::channel();
         let id = self.shared.next_id();
-        let act = move |hands: Result<&mut Hands, Failure>| {
+        let own = self.shared.clone();
+        let act = move |hands: Result<&mut Hands, Refused>| {
             let report = |value| drop(sender.send(Message::Progress(value)));
-            let done = hands.and_then(|hands| {
+            let done = hands.map_err(|refused| own.refusal(refused)).and_then(|hands| {
                 let done = act(hands, &report);
                 hands.settle();
                 done
@@ -164,7 +166,12 @@ impl Owner {
             // A caller that stopped waiting needs no answer.
             let _ = sender.send(Message::Done(done));
         };
-        self.shared.put(Work { id, kind, act: Box::new(act) });
+        self.shared.asked();
+        let (queue, act) = (&self.shared.queue, Box::new(act));
+        match kind {
+            Kind::Stop => drop(queue.stop(id, act)),
+            _ => queue.put(Request { kind, after: queue.stops(), tag: id, act }),
+        }
         (id, Mutex::new(answers))
     }
 

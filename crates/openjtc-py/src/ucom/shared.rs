@@ -6,6 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
 use host_kit::ErrorKind;
+use host_kit::owner::{Queue, Refused};
 use serde_json::{Value, json};
 use ucom_host::master::io::Snapshot;
 use ucom_host::session::Known;
@@ -22,42 +23,12 @@ const SAMPLES_MAX: usize = 65_536;
 /// Kind of events with the result of an update for a board.
 pub const UPDATED: &str = "updated";
 
-/// Kind of a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// A command; a stop cancels it.
-    Command,
-    /// An update; a stop does not cancel it, because a board with half-written flash would not work.
-    Update,
-    /// A stop; it cancels a running command.
-    Stop,
-}
-
 /// Control loops that must end before any other frame is sent.
 pub enum Halt {
     All,
     Boards(Vec<u8>),
     /// Control loops of the boards that this session has started.
     Started,
-}
-
-/// Function that works with the session, or receives the reason why it cannot run.
-pub type Act = Box<dyn FnOnce(Result<&mut Hands, Failure>) + Send>;
-
-/// A request in the queue.
-pub struct Work {
-    pub id: u64,
-    pub kind: Kind,
-    pub act: Act,
-}
-
-#[derive(Default)]
-struct Queue {
-    works: VecDeque<Work>,
-    /// Running request, and `true` if it is cancelled.
-    current: Option<(u64, Kind, bool)>,
-    /// Reason why the queue is closed.
-    closed: Option<Failure>,
 }
 
 /// All outputs of a board at one time.
@@ -96,7 +67,10 @@ impl Listener {
 /// State that the thread shares with its callers.
 #[derive(Default)]
 pub struct Shared {
-    queue: Mutex<Queue>,
+    /// Requests to the thread, each with its number.
+    pub queue: Queue<Hands, u64>,
+    /// Reason why the queue is closed.
+    closed: Mutex<Option<Failure>>,
     halts: Mutex<Vec<Halt>>,
     ended: AtomicBool,
     next_id: AtomicU64,
@@ -148,7 +122,7 @@ pub fn fault() -> Failure {
 impl Shared {
     /// Returns `true` if the running request is cancelled or the session ends.
     pub fn is_cancelled(&self) -> bool {
-        self.has_ended() || lock(&self.queue).current.is_some_and(|(_, _, cancelled)| cancelled)
+        self.has_ended() || self.queue.is_cancelled()
     }
 
     /// Returns a number for the next request.
@@ -194,11 +168,6 @@ impl Shared {
     /// Takes the control loops that must end now.
     pub fn halts(&self) -> Vec<Halt> {
         std::mem::take(&mut *lock(&self.halts))
-    }
-
-    /// Returns `true` if the next request is a stop.
-    pub fn stop_waits(&self) -> bool {
-        lock(&self.queue).works.front().is_some_and(|work| work.kind == Kind::Stop)
     }
 
     /// Adds an event.
@@ -301,75 +270,30 @@ impl Shared {
 
     /// Takes the next request and runs it.
     pub fn take(&self, hands: &mut Hands) -> bool {
-        let work = {
-            let mut queue = lock(&self.queue);
-            let work = queue.works.pop_front();
-            queue.current = work.as_ref().map(|work| (work.id, work.kind, false));
-            work
-        };
-        let Some(work) = work else { return false };
+        let Some(turn) = self.queue.take() else { return false };
         hands.quiet();
-        (work.act)(Ok(hands));
+        turn.run(hands);
         self.asked();
-        lock(&self.queue).current = None;
+        self.queue.done();
         true
     }
 
     /// Returns the reason why the queue is closed; `None`: it is open.
     pub fn gone(&self) -> Option<Failure> {
-        lock(&self.queue).closed.clone()
+        lock(&self.closed).clone()
     }
 
     /// Closes the queue.
     pub fn close(&self, why: Failure) {
-        let works = {
-            let mut queue = lock(&self.queue);
-            queue.closed.get_or_insert(why.clone());
-            std::mem::take(&mut queue.works)
-        };
-        works.into_iter().for_each(|work| (work.act)(Err(why.clone())));
+        lock(&self.closed).get_or_insert(why);
+        self.queue.close();
     }
 
-    /// Queues a request. A stop cancels a running command and discards all waiting requests except stops.
-    pub fn put(&self, work: Work) {
-        self.asked();
-        let (refused, why) = {
-            let mut queue = lock(&self.queue);
-            match (&queue.closed, work.kind) {
-                (Some(why), _) => (VecDeque::from([work]), why.clone()),
-                (None, Kind::Stop) => {
-                    if let Some((_, Kind::Command, cancelled)) = &mut queue.current {
-                        *cancelled = true;
-                    }
-                    let waiting = std::mem::take(&mut queue.works);
-                    let (stops, others) = waiting.into_iter().partition(|other| other.kind == Kind::Stop);
-                    queue.works = stops;
-                    queue.works.push_front(work);
-                    (others, stopped())
-                }
-                (None, _) => {
-                    queue.works.push_back(work);
-                    return;
-                }
-            }
-        };
-        refused.into_iter().for_each(|work: Work| (work.act)(Err(why.clone())));
-    }
-
-    /// Cancels a request; changes that it must undo on the boards are still undone.
-    pub fn cancel(&self, id: u64) {
-        let waiting = {
-            let mut queue = lock(&self.queue);
-            if let Some((current, _, cancelled)) = &mut queue.current
-                && *current == id
-            {
-                *cancelled = true;
-            }
-            let place = queue.works.iter().position(|work| work.id == id);
-            place.and_then(|place| queue.works.remove(place))
-        };
-        if let Some(work) = waiting {
-            (work.act)(Err(stopped()));
+    /// Returns the failure of a request that is not done.
+    pub fn refusal(&self, refused: Refused) -> Failure {
+        match refused {
+            Refused::Stopped | Refused::Cancelled => stopped(),
+            Refused::Closed => self.gone().unwrap_or_else(fault),
         }
     }
 }

@@ -19,8 +19,7 @@ use super::commands::GivenValue;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
-use crate::owner::Hands;
-use crate::work::Kind;
+use crate::owner::{Hands, Kind};
 
 /// Listening time of a doctor before it asks.
 const LISTEN: Duration = Duration::from_millis(1500);
@@ -60,7 +59,7 @@ pub(super) async fn scan(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&asker, None), (Kind::Question, "scan"), |hands| match hands.driver.run(Request::Scan)? {
+    agent.begin((&asker, None), (Kind::Command, "scan"), |hands| match hands.driver.run(Request::Scan)? {
         Outcome::Scan(report) => Ok((Done::Chain(report.boards, texts(&report.findings)), None)),
         other => Err(other.into()),
     })
@@ -128,7 +127,7 @@ pub(super) async fn doctor(
     State(agent): State<Agent>,
     asker: Asker,
 ) -> Result<(StatusCode, Json<JobObject>), Problem> {
-    agent.begin((&asker, None), (Kind::Question, "doctor"), |hands| {
+    agent.begin((&asker, None), (Kind::Command, "doctor"), |hands| {
         let seen = hands.driver.examine(LISTEN)?;
         Ok((Done::Findings(seen.findings), None))
     })

@@ -23,8 +23,7 @@ use super::boards::numbers;
 use super::objects::JobObject;
 use super::{Agent, Denials};
 use crate::jobs::Done;
-use crate::owner::fault;
-use crate::work::Kind;
+use crate::owner::{Kind, fault};
 
 /// Board to update.
 #[derive(Clone, Copy, Debug, serde::Deserialize, ToSchema)]

@@ -3,21 +3,95 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use agent_kit::api::Problem;
+use agent_kit::lease::ClientId;
+use host_kit::ErrorKind;
+use host_kit::owner::{Kind, Refused, Request};
 use tokio::sync::oneshot;
 
 use super::Hands;
-use super::shared::{CANCELLED, STOPPED, Shared, cancelled};
+use super::shared::{CANCELLED, STOPPED, Shared};
 use crate::happening::Happening;
 use crate::jobs::{Done, Job, Stage};
-use crate::work::{Asked, Cancelled, Kind, Work};
 
 /// Longest wait for a turn; after it the request is refused, because its HTTP request times out after ten seconds.
 const PATIENCE: Duration = Duration::from_secs(5);
 
+/// Largest numbers of waiting commands, and of waiting questions without the lease; questions do not block commands.
+const WAITING_MAX: usize = 32;
+const QUESTIONS_MAX: usize = 8;
+
+/// Queue of the owner.
+pub(super) type Queue = host_kit::owner::Queue<Hands, Tag>;
+type Place<'a> = host_kit::owner::Place<'a, Hands, Tag>;
+
+/// Request of the lease holder. Before its turn a Stop may come, or the lease may pass to another client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Asked {
+    pub client: ClientId,
+    /// Number of the last Stop before the request.
+    pub halt: u64,
+    /// `true` if the request may move boards. Requests that can only end a motion are executed even if their client has
+    /// disconnected.
+    pub moves: bool,
+}
+
+/// What the agent knows about a request in the queue.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tag {
+    /// Number of its job.
+    pub job: Option<u64>,
+    /// Request of the lease holder; missing: a question without the lease, or the check after a Stop.
+    pub asked: Option<Asked>,
+}
+
+impl Tag {
+    /// Returns `true` for a request of this client that may move boards.
+    pub fn moves_for(&self, client: ClientId) -> bool {
+        self.asked.is_some_and(|asked| asked.moves && asked.client == client)
+    }
+}
+
 impl Shared {
+    /// Returns a place in the queue. While a job runs or waits, no other request is accepted.
+    fn place(&self, is_question: bool) -> Result<Place<'_>, Problem> {
+        let place = self.queue.place().ok_or_else(gone)?;
+        if let Some(job) = place.tags().find_map(|tag| tag.job) {
+            return Err(Problem::new(
+                "busy",
+                format!("job {job} is going on: one thing at a time"),
+                "wait until it is over; a Stop is taken meanwhile, and DELETE /api/jobs/NUMBER cancels it",
+            ));
+        }
+        let most = if is_question { QUESTIONS_MAX } else { WAITING_MAX };
+        if place.waiting(|kind| (kind == Kind::Question) == is_question) >= most {
+            return Err(Problem::new("busy", "too much is asked at once", "ask again in a moment"));
+        }
+        Ok(place)
+    }
+
+    /// Returns the device for a request whose turn has come, or the reason why the request is not done: a Stop came before, or its
+    /// client has lost the lease.
+    fn turn<'a>(
+        &self,
+        hands: Result<&'a mut Hands, Refused>,
+        asked: Option<Asked>,
+    ) -> Result<&'a mut Hands, Problem> {
+        let hands = hands.map_err(|refused| match refused {
+            Refused::Stopped => self.stopped(),
+            Refused::Cancelled => cancelled(),
+            Refused::Closed => gone(),
+        })?;
+        let late = asked.and_then(|asked| self.too_late(asked));
+        if late.is_some() {
+            // Before its client learns of it.
+            self.queue.done();
+        }
+        late.map_or(Ok(hands), Err)
+    }
+
     /// Runs a short function in the owner's thread and waits for it: a command, or a question that needs no lease.
     pub async fn call<T: Send + 'static>(
-        &self,
+        self: &Arc<Self>,
         asked: Option<Asked>,
         act: impl FnOnce(&mut Hands) -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
@@ -25,7 +99,9 @@ impl Shared {
         let kind = if asked.is_some() { Kind::Command } else { Kind::Question };
         let only_ends = asked.is_some_and(|asked| !asked.moves);
         let begun = Instant::now();
-        let act = move |hands: Result<&mut Hands, Problem>| {
+        let own = self.clone();
+        let act = move |hands: Result<&mut Hands, Refused>| {
+            let hands = own.turn(hands, asked);
             // A request of a client that has given up must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
@@ -44,7 +120,8 @@ impl Shared {
                 done
             }));
         };
-        self.queue.place(asked.is_none())?.fill(Work { kind, job: None, asked, act: Box::new(act) });
+        let (after, tag) = (asked.map_or(0, |asked| asked.halt), Tag { job: None, asked });
+        self.place(asked.is_none())?.put(Request { kind, after, tag, act: Box::new(act) });
         answered.await.unwrap_or_else(|_| Err(fault()))
     }
 
@@ -55,11 +132,12 @@ impl Shared {
         (what, client): (&str, &str),
         act: impl FnOnce(&mut Hands) -> Result<(Done, Option<Problem>), Problem> + Send + 'static,
     ) -> Result<Job, Problem> {
-        let place = self.queue.place(false)?;
+        let place = self.place(false)?;
         let job = self.jobs.add(what, client);
         let (number, own, begun) = (job.number, self.clone(), job.clone());
         let unfinished = Unfinished { shared: self.clone(), number };
-        let act = move |hands: Result<&mut Hands, Problem>| {
+        let act = move |hands: Result<&mut Hands, Refused>| {
+            let hands = own.turn(hands, Some(asked));
             let Job { number, what, client, .. } = begun;
             own.journal.write(Happening::Begun { job: number, what, client });
             let acted = hands.and_then(|hands| {
@@ -79,27 +157,34 @@ impl Shared {
             };
             unfinished.end(stage, done, error);
         };
-        place.fill(Work { kind, job: Some(number), asked: Some(asked), act: Box::new(act) });
+        let tag = Tag { job: Some(number), asked: Some(asked) };
+        place.put(Request { kind, after: asked.halt, tag, act: Box::new(act) });
         Ok(job)
     }
 
     /// Cancels a job, which still undoes its steps on the boards. Returns `false` if it has ended.
     pub fn cancel_job(&self, number: u64) -> bool {
-        match self.queue.cancel_job(number) {
-            Some(Cancelled::Current) => true,
-            Some(Cancelled::Waiting(work)) => {
-                (work.act)(Err(cancelled()));
-                true
-            }
-            None => false,
-        }
+        self.queue.cancel(|tag| tag.job == Some(number))
     }
 }
 
 /// Returns the problem for a fault of the agent itself.
 pub(crate) fn fault() -> Problem {
-    Problem::new("fault", "the agent has a fault", "look at what the agent printed")
-        .kind(host_kit::ErrorKind::Fault)
+    Problem::new("fault", "the agent has a fault", "look at what the agent printed").kind(ErrorKind::Fault)
+}
+
+/// Returns the problem for a cancelled request.
+pub(super) fn cancelled() -> Problem {
+    Problem::new(CANCELLED, "it was cancelled", "ask for it again")
+}
+
+fn gone() -> Problem {
+    Problem::new(
+        "gone",
+        "the bus is gone, or the agent ends",
+        "GET /api/status shows whether the bus is there",
+    )
+    .kind(ErrorKind::NoLink)
 }
 
 /// Job that has not ended; if this is dropped because of a fault of the agent, the job ends as failed.

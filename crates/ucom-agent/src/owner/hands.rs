@@ -6,16 +6,16 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use agent_kit::api::Problem;
-use host_kit::{Diagnose as _, ErrorKind};
+use host_kit::{Diagnose as _, ErrorKind, owner};
 use ucom_host::master::Request;
 use ucom_host::session::{Driver, FlashRecords, Held, Known, Link, Session, SessionError};
 
 use super::Config;
+use super::ask::Tag;
 use super::operator::{Hand, Local};
 use super::shared::Shared;
 use crate::happening::Happening;
 use crate::picture::Values;
-use crate::work::Work;
 
 /// Longest wait of a turn.
 const TURN: Duration = Duration::from_millis(5);
@@ -73,9 +73,9 @@ impl Hands {
                 }
             }
             while !self.shared.has_ended()
-                && let Some(work) = self.shared.queue.take()
+                && let Some(turn) = self.shared.queue.take()
             {
-                self.work(work);
+                self.serve_one(turn);
                 self.turn()?;
                 // Also if questions arrive without pause.
                 self.rest();
@@ -110,17 +110,12 @@ impl Hands {
         self.shared.queue.done();
     }
 
-    fn work(&mut self, work: Work) {
+    /// Does one request.
+    fn serve_one(&mut self, turn: owner::Turn<Self, Tag>) {
         // Questions in the background must not keep a board busy.
         self.quiet();
-        self.local.borrow_mut().job = work.job;
-        match work.asked.and_then(|asked| self.shared.too_late(asked)) {
-            Some(late) => {
-                self.shared.queue.done();
-                (work.act)(Err(late));
-            }
-            None => (work.act)(Ok(self)),
-        }
+        self.local.borrow_mut().job = turn.tag.job;
+        turn.run(self);
         self.local.borrow_mut().job = None;
         // Requests that were abandoned or not begun have not called `settle`.
         self.shared.queue.done();

@@ -15,6 +15,7 @@ use ucom_host::session::{Cache, CleanupList, Link, Prompt, SessionError};
 
 pub(crate) use ask::fault;
 pub(crate) use hands::Hands;
+pub(crate) use host_kit::owner::Kind;
 pub(crate) use shared::Shared;
 
 /// Configuration of the boards that is known beforehand.

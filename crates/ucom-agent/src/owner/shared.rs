@@ -6,14 +6,15 @@ use std::time::{Duration, Instant};
 use agent_kit::api::Problem;
 use agent_kit::halt::AskedAfter;
 use agent_kit::lease::{ClientId, Leases};
+use host_kit::owner::Refused;
 use tokio::sync::watch;
 use ucom::Profile;
 
 use super::Hands;
+use super::ask::{Asked, Queue, Tag, cancelled};
 use crate::happening::{Happening, Journal, Policy};
 use crate::jobs::Jobs;
 use crate::picture::Picture;
-use crate::work::{Asked, Queue};
 
 /// Hold-off after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
@@ -33,10 +34,9 @@ struct Halt {
     at: Instant,
 }
 
-/// Requested Stops.
+/// Requesters of the last Stops, which the queue counts.
 #[derive(Default)]
 struct Halts {
-    count: u64,
     /// Time of the last event; the next field is the number of Stops since then.
     shown: Option<Instant>,
     more: u64,
@@ -47,7 +47,6 @@ struct Halts {
 
 impl Halts {
     fn add(&mut self, by: &str, client: Option<ClientId>) {
-        self.count += 1;
         self.more += 1;
         let new = Halt { by: by.to_owned(), client, at: Instant::now() };
         if let Some(old) = self.last.replace(new).filter(|old| old.client != client) {
@@ -131,31 +130,29 @@ impl Shared {
 
     /// Stops all boards ahead of all other requests, and checks that they have stopped. Returns the number of the Stop.
     pub fn halt(&self, by: &str, client: Option<ClientId>) -> u64 {
-        let number = {
-            // Under one lock: the current request ends, and a request whose turn comes now sees the Stop.
-            let mut halts = lock(&self.halts);
-            self.queue.cancel_by_stop();
-            halts.add(by, client);
-            halts.count
-        };
-        self.show_halts();
-        let act = |hands: Result<&mut Hands, Problem>| {
+        let act = |hands: Result<&mut Hands, Refused>| {
             if let Ok(hands) = hands {
                 hands.see_to_stop();
             }
         };
-        self.queue.stop(Box::new(act));
+        let number = {
+            // Under one lock: who sees the number of a Stop also sees its requester.
+            let mut halts = lock(&self.halts);
+            halts.add(by, client);
+            self.queue.stop_alike(Tag::default(), Box::new(act))
+        };
+        self.show_halts();
         number
     }
 
     /// Returns the number of requested Stops, which is the number of the last one.
     pub fn halts(&self) -> u64 {
-        lock(&self.halts).count
+        self.queue.stops()
     }
 
     /// Returns `true` while a request of this client that may move boards is running or waiting.
     pub fn moves_for(&self, client: ClientId) -> bool {
-        self.queue.moves_for(client)
+        self.queue.has(|tag| tag.moves_for(client))
     }
 
     /// Returns a new request of this client. A request that may move boards names the last Stop before it in `after`.
@@ -165,15 +162,16 @@ impl Shared {
     /// The request may move boards, and a newer Stop exists, or another client stopped the boards within the last 3 s.
     pub fn asked(&self, client: ClientId, after: Option<AskedAfter>) -> Result<Asked, Problem> {
         let halts = lock(&self.halts);
+        let count = self.queue.stops();
         if let Some(AskedAfter(after)) = after {
-            if halts.count != after {
+            if count != after {
                 return Err(stopped(halts.last_by()));
             }
             if let Some(halt) = halts.keeps_calm(client) {
                 return Err(stopped(&halt.by));
             }
         }
-        Ok(Asked { client, halt: halts.count, moves: after.is_some() })
+        Ok(Asked { client, halt: count, moves: after.is_some() })
     }
 
     /// Returns the leases and the present time. A lease that has lapsed is ended first and its policy applied, before
@@ -223,20 +221,18 @@ impl Shared {
         }
     }
 
-    /// Returns the reason why a request can no longer run at its turn: a Stop came before, or its client has lost the
-    /// lease.
+    /// Returns the problem for a request whose client has lost the lease before its turn.
     pub(super) fn too_late(&self, asked: Asked) -> Option<Problem> {
-        {
-            let halts = lock(&self.halts);
-            if halts.count > asked.halt {
-                return Some(stopped(halts.last_by()));
-            }
-        }
         let may = !asked.moves || lock(&self.leases).holds(asked.client, self.now());
         (!may).then(|| {
             let message = "its client commanded no more when its turn came: it is not done";
             Problem::new("late", message, "take the lease again, and ask again")
         })
+    }
+
+    /// Returns the problem for a request that the last Stop has overtaken.
+    pub(super) fn stopped(&self) -> Problem {
+        stopped(lock(&self.halts).last_by())
     }
 
     /// Returns the reason of a cancellation.
@@ -266,11 +262,6 @@ impl Shared {
         self.journal.write(Happening::Lost { why });
         self.changed.send_replace(());
     }
-}
-
-/// Returns the problem for a cancelled request.
-pub(super) fn cancelled() -> Problem {
-    Problem::new(CANCELLED, "it was cancelled", "ask for it again")
 }
 
 fn stopped(by: &str) -> Problem {

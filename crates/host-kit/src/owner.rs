@@ -1,0 +1,384 @@
+//! Requests to the thread that owns a device, and the Stops that overtake them.
+//!
+//! One thread owns a device: it alone calls the device's functions. Other threads put requests into the [`Queue`] of this thread, which
+//! takes them one at a time. Stops are numbered. A Stop cancels the request that is being done, and each command that was requested before
+//! the Stop is refused when its turn comes. So a command that was requested before a Stop never begins after it.
+//!
+//! A front end adds what it knows about a request in a tag: the client, the number of a job.
+use std::collections::VecDeque;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Kind of a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Stop: see [`Queue::stop`]. It is taken before all others, the newest Stop first.
+    Stop,
+    /// Update of a device's program. A Stop refuses it while it waits. Once begun it is not cancelled by a Stop, because a device with a
+    /// half-written program could not work afterwards.
+    Update,
+    /// Command. A Stop refuses it while it waits, and cancels it once begun.
+    Command,
+    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. It is taken after all commands.
+    Question,
+}
+
+impl Kind {
+    /// Returns `true` if a request that waits is refused after a Stop.
+    fn is_refused_after_stop(self) -> bool {
+        matches!(self, Self::Update | Self::Command)
+    }
+
+    /// Returns `true` if a Stop cancels a request that has begun.
+    fn is_cancelled_by_stop(self) -> bool {
+        matches!(self, Self::Command | Self::Question)
+    }
+}
+
+/// Reason why a request is not done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// A Stop was requested after it.
+    Stopped,
+    /// Its requester has cancelled it.
+    Cancelled,
+    /// The owner has closed the queue.
+    Closed,
+}
+
+/// Function of a request: it is called once, with the device `D` or with the reason why the request is not done.
+pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
+
+/// Request to the owner of a device `D`, with a tag of the front end.
+pub struct Request<D, T> {
+    /// Kind of the request.
+    pub kind: Kind,
+    /// Number of the last Stop before the request: see [`Queue::stops`].
+    pub after: u64,
+    /// What the front end knows about the request.
+    pub tag: T,
+    /// Function of the request.
+    pub act: Act<D>,
+}
+
+/// Request that is being done.
+struct Current<T> {
+    kind: Kind,
+    tag: T,
+    cancelled: bool,
+}
+
+struct State<D, T> {
+    waiting: VecDeque<Request<D, T>>,
+    current: Option<Current<T>>,
+    stops: u64,
+    closed: bool,
+}
+
+/// Queue of requests to the owner of a device.
+pub struct Queue<D, T>(Mutex<State<D, T>>);
+
+impl<D, T> Default for Queue<D, T> {
+    fn default() -> Self {
+        let waiting = VecDeque::new();
+        Self(Mutex::new(State { waiting, current: None, stops: 0, closed: false }))
+    }
+}
+
+impl<D, T: Clone> Queue<D, T> {
+    fn lock(&self) -> MutexGuard<'_, State<D, T>> {
+        // If another thread panicked, an incomplete state matters less than a Stop.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Returns the number of Stops so far, which is the number of the last one.
+    pub fn stops(&self) -> u64 {
+        self.lock().stops
+    }
+
+    /// Requests a Stop: cancels the current request, unless that is an update or a Stop, and puts `act` before all others. Returns the
+    /// number of the Stop.
+    ///
+    /// The owner must watch [`Queue::stops`] or [`Queue::is_cancelled`] while it does a request: `act` has its turn only when the current
+    /// request has ended.
+    pub fn stop(&self, tag: T, act: Act<D>) -> u64 {
+        self.overtake(tag, act, false)
+    }
+
+    /// Like [`Queue::stop`], for Stops whose functions all do the same: `act` is dropped if another Stop waits.
+    pub fn stop_alike(&self, tag: T, act: Act<D>) -> u64 {
+        self.overtake(tag, act, true)
+    }
+
+    fn overtake(&self, tag: T, act: Act<D>, alike: bool) -> u64 {
+        let mut state = self.lock();
+        state.stops += 1;
+        if let Some(current) = &mut state.current {
+            current.cancelled |= current.kind.is_cancelled_by_stop();
+        }
+        let number = state.stops;
+        if state.closed {
+            drop(state);
+            act(Err(Refused::Closed));
+        } else if !alike || state.waiting.front().is_none_or(|next| next.kind != Kind::Stop) {
+            state.waiting.push_front(Request { kind: Kind::Stop, after: number, tag, act });
+        }
+        number
+    }
+
+    /// Returns the right to put one request, while nobody else puts or takes one. `None`: the queue is closed.
+    pub fn place(&self) -> Option<Place<'_, D, T>> {
+        Some(Place(self.lock())).filter(|place| !place.0.closed)
+    }
+
+    /// Puts a request; refuses it at once if the queue is closed.
+    pub fn put(&self, request: Request<D, T>) {
+        match self.place() {
+            Some(place) => place.put(request),
+            None => (request.act)(Err(Refused::Closed)),
+        }
+    }
+
+    /// Takes the next request, which is the current one until [`Queue::done`]; a command or an update from before a Stop is refused.
+    pub fn take(&self) -> Option<Turn<D, T>> {
+        let mut state = self.lock();
+        let Request { kind, after, tag, act } = state.waiting.pop_front()?;
+        let is_late = kind.is_refused_after_stop() && after < state.stops;
+        // A refused request is never the current one: when its requester learns of the refusal, nothing is being done for it.
+        state.current = (!is_late).then(|| Current { kind, tag: tag.clone(), cancelled: false });
+        Some(Turn { tag, refused: is_late.then_some(Refused::Stopped), act })
+    }
+
+    /// Marks the current request as done.
+    pub fn done(&self) {
+        self.lock().current = None;
+    }
+
+    /// Returns `true` if the current request must end.
+    pub fn is_cancelled(&self) -> bool {
+        self.lock().current.as_ref().is_some_and(|current| current.cancelled)
+    }
+
+    /// Returns `true` if the next request is a Stop.
+    pub fn stop_waits(&self) -> bool {
+        self.lock().waiting.front().is_some_and(|next| next.kind == Kind::Stop)
+    }
+
+    /// Returns `true` if a request with such a tag is being done or waits.
+    pub fn has(&self, is_it: impl Fn(&T) -> bool) -> bool {
+        self.lock().tags().any(is_it)
+    }
+
+    /// Cancels the request with such a tag: the current one must end, a waiting one is refused. Returns `false` if there is none.
+    pub fn cancel(&self, is_it: impl Fn(&T) -> bool) -> bool {
+        let request = {
+            let mut state = self.lock();
+            if let Some(current) = state.current.as_mut().filter(|current| is_it(&current.tag)) {
+                current.cancelled = true;
+                return true;
+            }
+            let at = state.waiting.iter().position(|request| is_it(&request.tag));
+            at.and_then(|at| state.waiting.remove(at))
+        };
+        // Without the lock, because the function of the request may use the queue.
+        request.map(|request| (request.act)(Err(Refused::Cancelled))).is_some()
+    }
+
+    /// Closes the queue: waiting requests are refused, and all that come later.
+    pub fn close(&self) {
+        let waiting = {
+            let mut state = self.lock();
+            state.closed = true;
+            std::mem::take(&mut state.waiting)
+        };
+        waiting.into_iter().for_each(|request| (request.act)(Err(Refused::Closed)));
+    }
+}
+
+impl<D, T> State<D, T> {
+    fn tags(&self) -> impl Iterator<Item = &T> {
+        let current = self.current.iter().map(|current| &current.tag);
+        current.chain(self.waiting.iter().map(|request| &request.tag))
+    }
+}
+
+/// Right to put one request into a queue.
+pub struct Place<'a, D, T>(MutexGuard<'a, State<D, T>>);
+
+impl<D, T> Place<'_, D, T> {
+    /// Returns the tags of the current request and of all that wait.
+    pub fn tags(&self) -> impl Iterator<Item = &T> {
+        self.0.tags()
+    }
+
+    /// Returns the number of waiting requests of this kind.
+    pub fn waiting(&self, is_it: impl Fn(Kind) -> bool) -> usize {
+        self.0.waiting.iter().filter(|request| is_it(request.kind)).count()
+    }
+
+    /// Puts the request: a command or an update before all questions.
+    pub fn put(mut self, request: Request<D, T>) {
+        let waiting = &mut self.0.waiting;
+        let is_command = request.kind != Kind::Question;
+        let behind = waiting.iter().position(|other| is_command && other.kind == Kind::Question);
+        let at = behind.unwrap_or(waiting.len());
+        waiting.insert(at, request);
+    }
+}
+
+/// Request whose turn has come.
+pub struct Turn<D, T> {
+    /// Tag of the request.
+    pub tag: T,
+    refused: Option<Refused>,
+    act: Act<D>,
+}
+
+impl<D, T> Turn<D, T> {
+    /// Does the request, or refuses it.
+    pub fn run(self, device: &mut D) {
+        (self.act)(match self.refused {
+            Some(refused) => Err(refused),
+            None => Ok(device),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+
+    /// Device that keeps the tags of the requests that were done.
+    type Done = Vec<u32>;
+    type Log = Arc<Mutex<Vec<(u32, Option<Refused>)>>>;
+
+    #[derive(Default)]
+    struct Bench {
+        queue: Queue<Done, u32>,
+        log: Log,
+        device: Done,
+    }
+
+    impl Bench {
+        fn act(&self, tag: u32) -> Act<Done> {
+            let log = self.log.clone();
+            Box::new(move |device| {
+                log.lock().expect("log").push((tag, device.as_ref().err().copied()));
+                if let Ok(device) = device {
+                    device.push(tag);
+                }
+            })
+        }
+
+        fn request(&self, kind: Kind, after: u64, tag: u32) {
+            let act = self.act(tag);
+            self.queue.put(Request { kind, after, tag, act });
+        }
+
+        fn stop(&self, tag: u32) -> u64 {
+            self.queue.stop(tag, self.act(tag))
+        }
+
+        /// Does all that waits.
+        fn serve(&mut self) {
+            while let Some(turn) = self.queue.take() {
+                turn.run(&mut self.device);
+                self.queue.done();
+            }
+        }
+
+        fn log(&self) -> Vec<(u32, Option<Refused>)> {
+            self.log.lock().expect("log").clone()
+        }
+    }
+
+    #[test]
+    fn commands_are_done_before_questions_and_stops_before_both() {
+        let mut bench = Bench::default();
+        bench.request(Kind::Question, 0, 1);
+        bench.request(Kind::Command, 0, 2);
+        bench.request(Kind::Update, 0, 3);
+        bench.request(Kind::Question, 0, 4);
+        assert_eq!((bench.stop(5), bench.stop(6)), (1, 2));
+        bench.request(Kind::Command, 2, 7);
+        assert!(bench.queue.stop_waits());
+        bench.serve();
+        assert_eq!(bench.device, [6, 5, 7, 1, 4]);
+    }
+
+    #[test]
+    fn one_waiting_stop_is_enough_if_all_do_the_same() {
+        let mut bench = Bench::default();
+        let stop = |bench: &Bench, tag| bench.queue.stop_alike(tag, bench.act(tag));
+        assert_eq!((stop(&bench, 1), stop(&bench, 2)), (1, 2));
+        let turn = bench.queue.take().expect("the first waits");
+        // The first has begun, and may have looked before the third was requested.
+        assert_eq!(stop(&bench, 3), 3);
+        turn.run(&mut bench.device);
+        bench.serve();
+        assert_eq!(bench.device, [1, 3]);
+    }
+
+    #[test]
+    fn what_was_requested_before_a_stop_is_not_begun_after_it() {
+        let mut bench = Bench::default();
+        let before = bench.queue.stops();
+        bench.request(Kind::Command, before, 1);
+        bench.request(Kind::Update, before, 2);
+        bench.request(Kind::Question, before, 3);
+        assert_eq!(bench.stop(6), before + 1);
+        // Requested before, put later: its way to the queue was long.
+        bench.request(Kind::Command, before, 4);
+        bench.request(Kind::Command, bench.queue.stops(), 5);
+        bench.serve();
+        assert_eq!(bench.device, [6, 5, 3]);
+        let stopped = Some(Refused::Stopped);
+        assert_eq!(bench.log()[1..], [(1, stopped), (2, stopped), (4, stopped), (5, None), (3, None)]);
+    }
+
+    #[test]
+    fn a_stop_cancels_a_command_and_a_question_but_no_update() {
+        for (kind, cancelled) in [(Kind::Command, true), (Kind::Question, true), (Kind::Update, false)] {
+            let bench = Bench::default();
+            bench.request(kind, 0, 1);
+            let turn = bench.queue.take().expect("it waits");
+            assert!(!bench.queue.is_cancelled());
+            bench.stop(2);
+            assert_eq!(bench.queue.is_cancelled(), cancelled, "{kind:?}");
+            drop(turn);
+            bench.queue.done();
+            assert!(!bench.queue.is_cancelled());
+        }
+    }
+
+    #[test]
+    fn the_requester_cancels_its_own_request() {
+        let mut bench = Bench::default();
+        bench.request(Kind::Update, 0, 1);
+        bench.request(Kind::Command, 0, 2);
+        let turn = bench.queue.take().expect("it waits");
+        assert!(bench.queue.has(|tag| *tag == 1) && bench.queue.has(|tag| *tag == 2));
+        assert!(bench.queue.cancel(|tag| *tag == 2));
+        assert!(!bench.queue.is_cancelled() && !bench.queue.has(|tag| *tag == 2));
+        // A person may end an update.
+        assert!(bench.queue.cancel(|tag| *tag == 1));
+        assert!(bench.queue.is_cancelled());
+        turn.run(&mut bench.device);
+        bench.queue.done();
+        assert!(!bench.queue.cancel(|tag| *tag == 1));
+        assert_eq!(bench.log(), [(2, Some(Refused::Cancelled)), (1, None)]);
+    }
+
+    #[test]
+    fn a_closed_queue_refuses_all_requests() {
+        let mut bench = Bench::default();
+        bench.request(Kind::Command, 0, 1);
+        bench.queue.close();
+        bench.stop(2);
+        assert!(bench.queue.place().is_none());
+        bench.serve();
+        let closed = Some(Refused::Closed);
+        assert_eq!((bench.log(), bench.device.len()), (vec![(1, closed), (2, closed)], 0));
+    }
+}

@@ -11,6 +11,7 @@ use std::time::Instant;
 use anyhow::Result;
 
 use crate::shell::Scratch;
+use crate::tally::{Outcome, Tally};
 
 /// Output and result of a program.
 pub struct Ended {
@@ -47,6 +48,43 @@ impl Ran for Result<Ended> {
 impl Ran for Result<Option<Ended>> {
     fn ended(&self) -> Option<&Ended> {
         self.as_ref().ok()?.as_ref()
+    }
+}
+
+/// Function that runs a program with this file for its output; `None`: the program cannot run.
+type Run<'a> = Box<dyn Fn(&Path) -> Result<Option<Ended>> + Send + Sync + 'a>;
+
+/// Check that runs at the same time as others, as a step of its own.
+pub struct Check<'a> {
+    /// Title of the step.
+    pub title: String,
+    /// Runs the check.
+    pub run: Run<'a>,
+    /// Returns the outcome of the step.
+    pub outcome: fn(&Ended) -> Result<Outcome>,
+    /// Reason why the check cannot run, if so.
+    pub missing: String,
+}
+
+/// Runs the checks whose steps are wanted, each as a step. The longest should come first.
+pub fn steps(tally: &mut Tally, mut checks: Vec<Check>) {
+    checks.retain(|check| tally.wants(&check.title));
+    let ran = beside(
+        checks,
+        |check, log| (check.run)(log),
+        |check, ended| {
+            tally.step(&check.title, || match ended? {
+                None => Ok(Outcome::Skipped(check.missing)),
+                Some(ended) => {
+                    println!("{}\n({:.1} s, beside others)", ended.output.trim_end(), ended.seconds);
+                    (check.outcome)(&ended)
+                }
+            });
+        },
+    );
+    match ran {
+        Ok(passed_alone) => tally.passed_alone(passed_alone),
+        Err(error) => tally.step("checks beside each other", || Err(error)),
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use crate::beside;
+use crate::beside::{self, Ended};
 use crate::python;
 use crate::shell::{self, Scratch, root, run};
 use crate::suite;
@@ -47,14 +47,14 @@ pub fn build() -> Result<PathBuf> {
         .args(["build", "--release", "--locked", "--quiet", "--compatibility", "linux", "--interpreter"])
         .arg(&python);
     build.arg("--out").arg(&folder).arg("--manifest-path").arg("crates/openjtc-py/Cargo.toml");
-    run(build.env("CARGO_TARGET_DIR", shell::target()))?;
+    run(shell::lint(build.env("CARGO_TARGET_DIR", shell::target()))?)?;
     let mut made =
         std::fs::read_dir(&folder)?.flatten().map(|entry| entry.path()).filter(|path| is_own(path));
     made.next().context("Maturin left no wheel")
 }
 
-/// The steps of `cargo xtask test`.
-pub fn steps(tally: &mut Tally) {
+/// Runs the steps of the wheel, and returns the check that tests it.
+pub fn checks<'a>(tally: &mut Tally) -> Vec<beside::Check<'a>> {
     let mut wheel = None;
     tally.step("Python package: wheel", || {
         wheel = Some(build()?);
@@ -64,10 +64,18 @@ pub fn steps(tally: &mut Tally) {
         let wheel = wheel.as_deref().context("there is no wheel")?;
         fresh(wheel).map(|()| Outcome::Passed)
     });
-    tally.step("Python package: types and tests", || {
-        let wheel = wheel.as_deref().context("there is no wheel")?;
-        tested(wheel)
-    });
+    let test = move |wheel: PathBuf| beside::Check {
+        title: "Python package: types and tests".into(),
+        run: Box::new(move |log| tested(&wheel, log).map(Some)),
+        outcome: |ended| {
+            let counts = counted(&ended.output);
+            ensure!(ended.passed || counts.failed > 0, "the tests broke off");
+            ensure!(counts.passed > 0, "no test was run at all");
+            Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
+        },
+        missing: String::new(),
+    };
+    wheel.into_iter().map(test).collect()
 }
 
 /// Tests the wheel as on a computer with only Python.
@@ -80,7 +88,8 @@ fn fresh(wheel: &Path) -> Result<()> {
     run(shell::command(&python).args(["-c", FIRST_LINES]).current_dir(scratch.path()))
 }
 
-fn tested(wheel: &Path) -> Result<Outcome> {
+/// Checks the types of the installed wheel and runs its tests.
+fn tested(wheel: &Path, log: &Path) -> Result<Ended> {
     let python = python::environment(REQUIREMENTS)?;
     run(python::pip_install(&python).args(["--force-reinstall", "--no-deps"]).arg(wheel))?;
     let programs = suite::programs()?;
@@ -94,17 +103,12 @@ fn tested(wheel: &Path) -> Result<Outcome> {
     mypy(&["mypy.stubtest", "openjtc._native"])?;
     let mut tests = shell::command(&python);
     tests
-        .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "3"])
+        .args(["-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", "-n", "2"])
         .arg(root().join("crates/openjtc-py/tests"));
     tests.env("JTC", programs.join("jtc")).env("UCOM", programs.join("ucom"));
     tests.env("OPENJTC_ROBOTS", python::robots());
     tests.env("PYTHONDONTWRITEBYTECODE", "1").env("MPLBACKEND", "agg").current_dir(scratch.path());
-    let ended = beside::run(&mut tests, &scratch.path().join("log"))?;
-    println!("{}\n({:.1} s)", ended.output.trim_end(), ended.seconds);
-    let counts = counted(&ended.output);
-    ensure!(ended.passed || counts.failed > 0, "the tests broke off");
-    ensure!(counts.passed > 0, "no test was run at all");
-    Ok(Outcome::Counted(counts, tally::failures(&ended.output, "FAILURES").to_owned()))
+    beside::run(&mut tests, log)
 }
 
 /// The numbers in the last line of pytest.

@@ -10,7 +10,6 @@ use crate::beside::{self, Ended};
 use crate::shell::{self, apt_install, command, root, run, works};
 use crate::suite;
 use crate::tally::{Outcome, Tally};
-use crate::web;
 
 /// Returns the interpreter of a virtual environment with the packages of references/`requirements`; makes the environment
 /// if it does not exist.
@@ -99,8 +98,8 @@ static CHECKS: [Check; 24] = [
     Check { script: "ucom/check_pc_probe.py", program: Some("ucom"), demo_files: &[] },
 ];
 
-/// Runs a step for each reference; `demo` is the folder of the demo's files.
-pub fn checks(tally: &mut Tally, demo: &Path) {
+/// Runs the steps before the references, and returns a check for each reference; `demo` is the folder of the demo's files.
+pub fn checks<'a>(tally: &mut Tally, demo: &'a Path) -> Vec<beside::Check<'a>> {
     let mut python = None;
     tally.step("Python environment of the references", || {
         python = Some(environment("requirements.txt")?);
@@ -125,52 +124,21 @@ pub fn checks(tally: &mut Tally, demo: &Path) {
     });
     let Some(python) = python.filter(|_| built) else {
         tally.step("references", || bail!("there is no Python environment, or the programs were not built"));
-        return;
+        return Vec::new();
     };
-    // The longest first.
-    let beside = [Beside::Browser].into_iter().chain(CHECKS.iter().map(Beside::Reference));
-    let ran = beside::beside(
-        beside.filter(|one| tally.wants(&one.title())).collect(),
-        |one, log| match one {
-            Beside::Reference(check) => check.run((&python, demo), log),
-            Beside::Browser => web::browser(log),
-        },
-        |one, ended| {
-            tally.step(&one.title(), || match (&one, ended?) {
-                (Beside::Reference(_), None) => Ok(Outcome::Skipped("the demo left no file for it".into())),
-                (Beside::Browser, None) => Ok(Outcome::Skipped(format!(
-                    "there is no {}; install it by hand: sudo apt-get install chromium",
-                    web::BROWSER
-                ))),
-                (Beside::Browser, Some(ended)) => web::counted(&ended),
-                (Beside::Reference(_), Some(Ended { output, passed, seconds })) => {
-                    println!("{}\n({seconds:.1} s, beside others)", output.trim_end());
-                    ensure!(passed, "it ended with an error");
-                    Ok(Outcome::Passed)
-                }
-            });
-        },
-    );
-    match ran {
-        Ok(passed_alone) => tally.passed_alone(passed_alone),
-        Err(error) => tally.step("references", || Err(error)),
-    }
-}
-
-/// Checks that run in parallel.
-enum Beside {
-    Reference(&'static Check),
-    /// The dashboard, used in a browser.
-    Browser,
-}
-
-impl Beside {
-    fn title(&self) -> String {
-        match self {
-            Self::Reference(check) => format!("references/{}", check.script),
-            Self::Browser => "dashboard: used in a browser".to_owned(),
+    let check = |check: &'static Check| {
+        let python = python.clone();
+        beside::Check {
+            title: format!("references/{}", check.script),
+            run: Box::new(move |log| check.run((&python, demo), log)),
+            outcome: |ended| {
+                ensure!(ended.passed, "it ended with an error");
+                Ok(Outcome::Passed)
+            },
+            missing: "the demo left no file for it".into(),
         }
-    }
+    };
+    CHECKS.iter().map(check).collect()
 }
 
 impl Check {

@@ -42,6 +42,17 @@ pub fn cargo(arguments: &[&str]) -> Command {
     cargo
 }
 
+/// Lets cargo compile the packages of the workspace with Clippy, which is the compiler with more warnings. One build then makes the
+/// programs and finds what `cargo clippy` finds; that command alone would compile all dependencies once more.
+pub fn lint(cargo: &mut Command) -> Result<&mut Command> {
+    let sysroot = read(command("rustc").args(["--print", "sysroot"]))?;
+    let clippy = Path::new(sysroot.trim()).join("bin/clippy-driver");
+    if !clippy.exists() {
+        bail!("{} is missing; install it: rustup component add clippy", clippy.display());
+    }
+    Ok(cargo.env("RUSTC_WORKSPACE_WRAPPER", clippy).env("CLIPPY_ARGS", ""))
+}
+
 /// Returns the processor time of all programs that have ended so far, with their child processes; `None` if the system has no `/proc`.
 ///
 /// The programs of [`in_background`] count when they end.
@@ -116,6 +127,14 @@ pub fn run(command: &mut Command) -> Result<()> {
 
 /// Runs a command, shows each line of its standard output as it comes and passes it to `line`, too.
 pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
+    read_lines(command, |text| {
+        println!("{text}");
+        line(text);
+    })
+}
+
+/// Runs a command and passes each line of its standard output to `line` as it comes.
+pub fn read_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()> {
     announce(command);
     let mut child = command
         .stdout(Stdio::piped())
@@ -124,7 +143,6 @@ pub fn run_lines(command: &mut Command, mut line: impl FnMut(&str)) -> Result<()
     if let Some(output) = child.stdout.take() {
         for text in BufReader::new(output).split(b'\n') {
             let text = String::from_utf8_lossy(&text?).into_owned();
-            println!("{text}");
             line(&text);
         }
     }

@@ -35,7 +35,7 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
     let mut printed = String::new();
     let failures = run_all(tests, &mut counts, &mut printed)?;
     let mut documentation = cargo(&["test", "--release", "--workspace", "--no-fail-fast", "--doc"]);
-    let documented = run_lines(&mut documentation, |line| count_results(line, &mut counts));
+    let documented = run_lines(shell::lint(&mut documentation)?, |line| count_results(line, &mut counts));
     for failure in &failures {
         println!("failed: {failure}");
     }
@@ -52,17 +52,41 @@ pub fn run(built: impl FnOnce()) -> Result<Outcome> {
 ///
 /// Cargo chooses features for the packages that it is given. For one package it would build half of the dependencies a second time.
 pub fn programs() -> Result<PathBuf> {
-    shell::run(&mut cargo(&["build", "--release", "--workspace", "--bins", "--examples"]))?;
+    compile(&["build", "--bins", "--examples"], |_| {})?;
     Ok(shell::target().join("release"))
+}
+
+/// Builds everything; a warning of the compiler or of Clippy is an error.
+pub fn lints() -> Result<()> {
+    let mut warnings = 0;
+    for build in [&["test", "--tests", "--no-run"], &["build", "--bins", "--examples"]] {
+        compile(build, |message| {
+            warnings += u32::from(message["reason"] == "compiler-message");
+        })?;
+    }
+    ensure!(warnings == 0, "{warnings} warnings");
+    Ok(())
+}
+
+/// Builds a part of the workspace, prints what the compiler and Clippy say, and passes each message of cargo to `each`.
+fn compile(arguments: &[&str], mut each: impl FnMut(&Value)) -> Result<()> {
+    let mut build = cargo(arguments);
+    build.args(["--release", "--workspace", "--message-format=json"]);
+    shell::read_lines(shell::lint(&mut build)?, |line| {
+        let Ok(message) = serde_json::from_str::<Value>(line) else { return };
+        if let Some(text) = message["message"]["rendered"].as_str() {
+            println!("{text}");
+        }
+        each(&message);
+    })
 }
 
 /// Builds the test programs.
 fn build() -> Result<Vec<Program>> {
-    let mut build = cargo(&["test", "--release", "--workspace", "--tests", "--no-run"]);
-    build.arg("--message-format=json-render-diagnostics");
-    let messages = shell::read(&mut build)?;
+    let mut messages = Vec::new();
+    compile(&["test", "--tests", "--no-run"], |message| messages.push(message.clone()))?;
     let mut programs = Vec::new();
-    for message in messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok()) {
+    for message in messages {
         let executable = message["executable"].as_str();
         if let (Some(executable), true) = (executable, message["profile"]["test"] == true) {
             let manifest = message["manifest_path"].as_str().context("cargo names no manifest of a test")?;

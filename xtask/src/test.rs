@@ -9,8 +9,8 @@ use crate::ahead::Ahead;
 use crate::shell::{self, Scratch, cargo, run};
 use crate::tally::{Outcome, Tally};
 use crate::{
-    book, deny, dependencies, dist, emulate, firmware, links, package, plain_words, python, rules, size,
-    suite, test_files, web, worked_bytes,
+    beside, book, deny, dependencies, dist, emulate, firmware, links, package, plain_words, python, rules,
+    size, suite, test_files, web, worked_bytes,
 };
 
 /// Crates that run on the board.
@@ -38,10 +38,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     tally.step("the book has every page", || passed(book::check()));
     tally.step("every dependency is documented", || passed(dependencies::check()));
     tally.step("licences, sources and bans of dependencies", || passed(deny::check()));
-    tally.step("lints", || {
-        let mut clippy = cargo(&["clippy", "--release", "--workspace", "--all-targets"]);
-        passed(run(clippy.args(["--", "-D", "warnings"])))
-    });
+    tally.step("lints, and the build of all programs", || passed(suite::lints()));
     web::steps(&mut tally);
     tally.step("tests, properties and fuzz regressions", || suite::run(built));
     if !quick {
@@ -56,9 +53,12 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         tally.step("book: made, every link leads somewhere", || passed(book::made()));
         let scratch = Scratch::new("demo")?;
         tally.step("demo", || passed(demo(scratch.path())));
-        python::checks(&mut tally, scratch.path());
-        package::steps(&mut tally);
-        emulate::steps(&mut tally, false);
+        let references = python::checks(&mut tally, scratch.path());
+        let package = package::checks(&mut tally);
+        let board = emulate::checks(&mut tally);
+        // The longest first: most of these checks wait for simulated arms and browsers.
+        let all = [web::browser()].into_iter().chain(board).chain(package).chain(references);
+        beside::steps(&mut tally, all.collect());
         dist::steps(&mut tally);
     }
     tally.step("the working tree is as it was", || {

@@ -44,7 +44,9 @@ pub fn steps(tally: &mut Tally) {
         run(command("npm")?.args(["run", "--silent", "check"]))?;
         let scratch = Scratch::new("web")?;
         let mut test = command("npm")?;
-        counted(&beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?)
+        let ended = beside::run(test.args(["run", "--silent", "test"]), &scratch.path().join("log"))?;
+        println!("{}", ended.output.trim_end());
+        counted(&ended)
     });
     tally.step("dashboard: the built files are those of its source", || {
         install().and_then(|()| same_build()).map(|()| Outcome::Passed)
@@ -95,8 +97,18 @@ pub fn install_browser() -> Result<()> {
     if Path::new(BROWSER).exists() { Ok(()) } else { shell::apt_install(&["chromium"]) }
 }
 
-/// Uses the dashboard in a browser, with the released programs; returns the output. `None`: no browser is installed, and none can be.
-pub fn browser(log: &Path) -> Result<Option<Ended>> {
+/// Returns the check that uses the dashboard in a browser.
+pub fn browser<'a>() -> beside::Check<'a> {
+    beside::Check {
+        title: "dashboard: used in a browser".into(),
+        run: Box::new(use_in_browser),
+        outcome: counted,
+        missing: format!("there is no {BROWSER}; install it by hand: sudo apt-get install chromium"),
+    }
+}
+
+/// Uses the dashboard in a browser, with the built programs; returns the output. `None`: no browser is installed, and none can be.
+fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     if install_browser().is_err() {
         return Ok(None);
     }
@@ -110,8 +122,7 @@ pub fn browser(log: &Path) -> Result<Option<Ended>> {
 }
 
 /// The numbers of Node's own test runner.
-pub fn counted(Ended { output, passed, seconds }: &Ended) -> Result<Outcome> {
-    println!("{}\n({seconds:.1} s)", output.trim_end());
+fn counted(Ended { output, passed, .. }: &Ended) -> Result<Outcome> {
     let number = |word: &str| {
         let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));
         lines.filter_map(|line| line.strip_prefix(word)?.trim().parse::<u64>().ok()).sum::<u64>()

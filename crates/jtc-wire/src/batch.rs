@@ -1,28 +1,28 @@
-//! What the parsers of the lines found, copied in order for the controller, so that the parsers can take more bytes while
-//! the controller works.
+//! Events that the parsers of all lines have found, copied in order for the controller. The parsers can take more bytes while the
+//! controller works.
 use crate::frame::{FRAME_MAX, FrameRef, FrameType};
 use crate::response::{DataStatus, FrameStatus, Response};
 use crate::stream::LinkEvent;
 
-/// Events of a batch at most: what a controller executes in one tick at most.
+/// Maximum number of events in a batch, and of events that a controller executes in one tick.
 pub const EVENTS_MAX: usize = 16;
 
-/// An event and where it came from.
+/// An event with its line and its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceivedEvent<'a> {
     /// Number of its line.
     pub line: usize,
-    /// Where in the stream of that line it began.
+    /// Position in the stream of that line at which it began.
     pub position: u64,
-    /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51).
+    /// Set if a frame came on a plain line, which had no extension request in the 2 s before the frame's first byte (J-51).
     pub plain: bool,
-    /// What was received.
+    /// The received event.
     pub event: LinkEvent<'a>,
 }
 
-/// Events in the order in which they are to be executed. Integers only: all zeros are an empty batch.
+/// Events in the order of execution. All fields are integers, so that all zeros are an empty batch.
 pub struct EventBatch {
-    /// Events put in, and how many of them are done.
+    /// Number of events stored, and number of those that are done.
     len: u16,
     done: u16,
     /// Bytes used.
@@ -49,14 +49,14 @@ const BAD: u8 = 1;
 const NOISE: u8 = 2;
 
 impl EventBatch {
-    /// Empty.
+    /// Creates an empty batch.
     pub const fn new() -> Self {
         let entry =
             Entry { position: 0, start: 0, length: 0, line: 0, plain: 0, sort: 0, frame_type: 0, status: 0 };
         Self { len: 0, done: 0, used: 0, entries: [entry; EVENTS_MAX], bytes: [0; FRAME_MAX] }
     }
 
-    /// Copies an event; false when there is no room for it.
+    /// Copies an event. Returns false if the batch has too few free entries or bytes for it.
     pub fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
         let start = usize::from(self.used);
         let Some(entry) = self.entries.get_mut(usize::from(self.len)) else { return false };
@@ -85,7 +85,7 @@ impl EventBatch {
         true
     }
 
-    /// The `n`-th of the events that are not done.
+    /// Returns the `n`-th of the events that are not done.
     pub fn get(&self, n: usize) -> Option<ReceivedEvent<'_>> {
         let n = usize::from(self.done).checked_add(n)?;
         let entry = self.entries.get(..usize::from(self.len))?.get(n)?;
@@ -112,7 +112,7 @@ impl EventBatch {
         })
     }
 
-    /// The oldest `count` events are done. When all are, there is room for as many again.
+    /// Marks the oldest `count` events as done. When all events are done, the batch is empty again.
     pub fn done(&mut self, count: usize) {
         let left = usize::from(self.len - self.done);
         self.done += count.min(left) as u16;
@@ -121,7 +121,7 @@ impl EventBatch {
         }
     }
 
-    /// No event is left.
+    /// Returns true if no event is left.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -2,8 +2,8 @@
 use core::fmt;
 use core::marker::PhantomData;
 
-/// Declares a closed list of codes: an enum, all of it, which one a byte is, and the names. A name without a text of its own is the
-/// variant's.
+/// Declares a closed list of codes: an enum, the list of its variants, the conversion from a byte, and the names. A variant without a text
+/// is named by its identifier.
 macro_rules! codes {
     (@text $name:ident $text:literal) => { $text };
     (@text $name:ident) => { stringify!($name) };
@@ -46,9 +46,9 @@ pub(crate) use codes;
 
 /// A closed list of codes with their names.
 pub trait Known: Copy + Eq + fmt::Debug + 'static {
-    /// Every one, in the order of the codes.
+    /// All codes of the list, in the order of their numbers.
     const ALL: &'static [Self];
-    /// What a code is called that is none of them.
+    /// Name of a code that is not in the list.
     const UNKNOWN: &'static str;
 
     /// The byte on the wire.
@@ -60,7 +60,7 @@ pub trait Known: Copy + Eq + fmt::Debug + 'static {
 
 /// A code as it was received: one of `T`, or one that this version does not know.
 ///
-/// It is compared with what is known, never with a number.
+/// A code is compared with variants of `T`, never with a number.
 ///
 /// ```
 /// use jtc_wire::{Code, ControllerState};
@@ -87,12 +87,12 @@ impl<T: Known> Code<T> {
         self.byte
     }
 
-    /// Which one it is; `None` when this version does not know it.
+    /// Returns the variant of this code, or `None` if this version does not know the code.
     pub fn known(self) -> Option<T> {
         T::ALL.iter().copied().find(|known| known.code() == self.byte)
     }
 
-    /// It is one of `wanted`.
+    /// Returns true if the code is one of `wanted`.
     pub fn is_in(self, wanted: &[T]) -> bool {
         wanted.iter().any(|&wanted| self == wanted)
     }

@@ -20,30 +20,30 @@ codes! {
 pub struct Floats<'a>(pub(crate) &'a [u8]);
 
 impl<'a> Floats<'a> {
-    /// View of big-endian f32; a rest of fewer than four bytes is left out.
+    /// Creates a view of big-endian f32. Ignores an incomplete float at the end.
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(&bytes[..bytes.len() & !3])
     }
-    /// All in order.
+    /// Returns all floats in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
         self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_be_bytes(*bytes))
     }
-    /// The bytes viewed.
+    /// Returns the viewed bytes.
     pub fn as_bytes(&self) -> &'a [u8] {
         self.0
     }
 }
 
 impl Floats<'_> {
-    /// Number of floats.
+    /// Returns the number of floats.
     pub fn len(&self) -> usize {
         self.0.len() / 4
     }
-    /// No float at all.
+    /// Returns true if the list has no floats.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Float `i`; `None` past the end.
+    /// Returns float `i`, or `None` past the end.
     pub fn get(&self, i: usize) -> Option<f32> {
         self.0.as_chunks::<4>().0.get(i).map(|bytes| f32::from_be_bytes(*bytes))
     }
@@ -64,7 +64,7 @@ pub enum Command<'a> {
     },
     /// Clear current and occurred errors.
     ClearOccurredErrors,
-    /// One segment.
+    /// Segment of a trajectory.
     Trajectory(Segment<'a>),
     /// 6 × (20 velocities, 20 temperatures, 400 torques).
     FrictionTable(Floats<'a>),
@@ -98,11 +98,11 @@ pub enum Command<'a> {
         /// On.
         pump: bool,
     },
-    /// Who the device is, and what it runs (J-52).
+    /// Request for the identity of the device and of its firmware (J-52).
     GetInfo,
-    /// Settings from this one on, in the order of the device's table (J-53).
+    /// Request for the settings from number `first` on, in the order of the device's table (J-53).
     GetSettings {
-        /// How many to leave out.
+        /// Number of settings to skip.
         first: u16,
     },
     /// Settings to change, all of them or none (J-53).
@@ -111,10 +111,10 @@ pub enum Command<'a> {
     SetName(Name),
     /// A part of the arm image (J-54).
     GetArm {
-        /// Its first byte.
+        /// First requested byte of the image.
         offset: u16,
     },
-    /// Keeps the arm in use over a loss of power (J-54).
+    /// Store the arm in use, so that it survives a loss of power (J-54).
     StoreArm,
     /// Torque off, back to Init (J-53).
     Disable,
@@ -124,39 +124,40 @@ pub enum Command<'a> {
     GetLog {
         /// Number of a block.
         block: u32,
-        /// Its first byte that is wanted.
+        /// First requested byte of the block.
         offset: u16,
     },
-    /// Forget the log of the flight recorder, and record anew (J-56).
+    /// Clear the log of the flight recorder and start a new recording (J-56).
     ClearLog,
     /// Points of the trajectory in memory (J-56).
     GetPoints {
-        /// How many to leave out.
+        /// Number of points to skip.
         first: u16,
     },
 }
 
-/// Where the parts of the short bodies are, from their first byte.
+/// Positions of the parts of the short bodies, counted from the first byte of the body.
 pub mod field {
     /// ClearCurrentErrors: bit 0 the controller itself.
     pub const CLEAR_JTC: usize = 0;
     /// ClearCurrentErrors: bits 0..6 the nodes.
     pub const CLEAR_NODES: usize = 1;
-    /// TrajSetExecStatus: what to do.
+    /// TrajSetExecStatus: the command.
     pub const EXEC: usize = 0;
     /// ResetCanDevices: bits 0..6 the nodes.
     pub const RESET_NODES: usize = 0;
     /// GripperControl: pump 0 or 1.
     pub const PUMP: usize = 0;
-    /// GetSettings, GetArm and GetPoints: where to begin, u16.
+    /// GetSettings, GetArm and GetPoints: number of the first item or byte, u16.
     pub const FROM: core::ops::Range<usize> = 0..2;
     /// GetLog: block, u32, and byte in it, u16.
     pub const LOG: core::ops::Range<usize> = 0..6;
 }
 
 impl<'a> Command<'a> {
-    /// Device side. Errors: `IncorrectValue` for a command or pump byte that is none of those listed, `NotAllowed` for a
-    /// JtcStatus. A body that is too short for its type, which [`crate::Receiver`] never hands out, is `IncorrectValue`.
+    /// Parses a frame on the device. Returns `IncorrectValue` for a command or pump byte that is not listed, and `NotAllowed` for a frame
+    /// that only a device sends, such as JtcStatus. A body that is too short for its type is `IncorrectValue`; [`crate::Receiver`] never
+    /// returns such a frame.
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
@@ -220,13 +221,13 @@ impl<'a> Command<'a> {
             }
             FrameType::ClearLog => Self::ClearLog,
             FrameType::GetPoints => Self::GetPoints { first: from()? },
-            // Those of the device: JtcStatus, Info, Settings, Arm. Without this arm the numbers between the types, which none has,
+            // Frames that a device sends: JtcStatus and the answers. Without this arm, the numbers between the types, which no type has,
             // would lead into a trap.
             _ => return Err(DataStatus::NotAllowed),
         })
     }
 
-    /// The type of its frame.
+    /// Returns the type of its frame.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::ClearCurrentErrors { .. } => FrameType::ClearCurrentErrors,

@@ -1,4 +1,5 @@
-//! Frames from the host: every command into a caller's buffer, numbers checked and scaled, never wrapped or clipped.
+//! Encoders of the host's frames, which write every command into the caller's buffer. Numbers are checked and scaled, never wrapped or
+//! clipped.
 use core::fmt;
 
 use crate::command::{Command, Floats};
@@ -13,7 +14,7 @@ use crate::segment::{
     ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, Segment, VELOCITY_SCALE, field,
 };
 
-/// One of the three lists of numbers of a trajectory point.
+/// A quantity that a trajectory point has for each joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// rad.
@@ -54,9 +55,9 @@ impl Channel {
 /// A number that a trajectory point cannot carry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfScale {
-    /// 0..5.
+    /// Joint, 0..5.
     pub joint: usize,
-    /// Which of its numbers.
+    /// Quantity of the number.
     pub channel: Channel,
     /// The number: too large in magnitude, infinite, or not a number.
     pub value: f64,
@@ -79,7 +80,7 @@ impl fmt::Display for OutOfScale {
 impl core::error::Error for OutOfScale {}
 
 impl RawPoint {
-    /// The nearest point that the wire carries: rad, rad/s, rad/s². A number outside the scale, or none at all, is an error.
+    /// Returns the nearest point that the wire carries, from rad, rad/s and rad/s². A number outside the scale or a NaN is an error.
     pub fn from_si(
         position: &[f64; JOINTS],
         velocity: &[f64; JOINTS],
@@ -119,23 +120,23 @@ pub enum EncodeError {
     },
     /// More points than a frame can have.
     TooManyPoints {
-        /// How many (at least).
+        /// Number of points, at least.
         points: usize,
-        /// How many fit into a frame.
+        /// Maximum number of points in a frame.
         limit: usize,
     },
     /// Frames of this type do not have that many floats.
     WrongCount {
         /// Type of the frame.
         frame_type: FrameType,
-        /// How many floats (at least).
+        /// Number of floats, at least.
         count: usize,
     },
     /// A float is infinite or not a number, or too large for an f32.
     NotFinite {
         /// Type of the frame.
         frame_type: FrameType,
-        /// Which float, from 0, in the order of the wire.
+        /// Index of the float from 0, in the order of the wire.
         index: usize,
         /// Its value.
         value: f64,
@@ -161,13 +162,13 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// What a float of a frame is: its type and the index from 0 in the order of the wire. Displays as `PidParam joint 3 Ki`, joints
-/// counted from 1.
+/// Name of a float in a frame, from the frame's type and the float's index from 0 in the order of the wire. Displays as `PidParam joint 3
+/// Ki`, joints counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FloatName(pub FrameType, pub usize);
 
 impl FloatName {
-    /// What the numbers of a link are, in the order of the wire; the first six are those of an origin, too.
+    /// Names of the numbers of a link, in the order of the wire. The first six are also the names of an origin's numbers.
     pub const LINK: [&'static str; 13] =
         ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
 }
@@ -216,7 +217,7 @@ fn frame(
     Ok(n)
 }
 
-/// A Trajectory frame; returns its length. What it writes is meaningless after an error.
+/// Writes a Trajectory frame and returns its length. After an error the content of the buffer is meaningless.
 pub fn trajectory(
     out: &mut [u8],
     (number, segment, segments): (u16, u16, u16),
@@ -244,7 +245,7 @@ pub fn trajectory(
     })
 }
 
-/// A frame of floats in the order of the wire: FrictionTable, PidParam, ArmModel or FrictionPolynomial; returns its length.
+/// Writes a frame of floats in the order of the wire (FrictionTable, PidParam, ArmModel, FrictionPolynomial or Jog) and returns its length.
 pub fn floats(
     out: &mut [u8],
     frame_type: FrameType,
@@ -271,12 +272,12 @@ fn check_count(frame_type: FrameType, count: usize) -> Result<(), EncodeError> {
     fits.then_some(()).ok_or(EncodeError::WrongCount { frame_type, count })
 }
 
-/// A PidParam frame: per joint Kp, Ki, Kd, IntMin, IntMax (the last two in rad·s).
+/// Writes a PidParam frame: per joint Kp, Ki, Kd, IntMin, IntMax (the last two in rad·s).
 pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, EncodeError> {
     floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
 }
 
-/// An ArmModel frame: joint origins (x, y, z in m, roll, pitch, yaw in rad), and links (origin likewise, Ixx Ixy Ixz Iyy Iyz
+/// Writes an ArmModel frame: joint origins (x, y, z in m, roll, pitch, yaw in rad), and links (origin likewise, Ixx Ixy Ixz Iyy Iyz
 /// Izz in kg·m², mass in kg).
 pub fn arm_model(
     out: &mut [u8],
@@ -287,7 +288,7 @@ pub fn arm_model(
     floats(out, FrameType::ArmModel, values.copied())
 }
 
-/// A FrictionPolynomial frame. `coefficients` in the order of their index, c0 first, 4 or 6 per joint; the wire carries the
+/// Writes a FrictionPolynomial frame. `coefficients` has 4 or 6 per joint in the order of their index, c0 first. The wire carries the
 /// highest first.
 pub fn friction_polynomial<const N: usize>(
     out: &mut [u8],
@@ -309,7 +310,7 @@ pub struct FrictionTable<'a> {
     pub torque: &'a [[f32; 20]; 20],
 }
 
-/// A FrictionTable frame.
+/// Writes a FrictionTable frame.
 pub fn friction_table(out: &mut [u8], tables: &[FrictionTable<'_>; JOINTS]) -> Result<usize, EncodeError> {
     let values = tables
         .iter()
@@ -326,7 +327,7 @@ fn raw_floats(out: &mut [u8], frame_type: FrameType, floats: Floats<'_>) -> Resu
 }
 
 impl Command<'_> {
-    /// Writes its frame; returns the length. Floats are copied as they are.
+    /// Writes the frame of the command and returns its length. Floats are copied unchanged.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let mut fixed = |bytes: &[u8]| {
             let given = out.len();
@@ -366,7 +367,7 @@ impl Command<'_> {
     }
 }
 
-/// A SetSettings frame; returns its length.
+/// Writes a SetSettings frame and returns its length.
 pub fn set_settings(
     out: &mut [u8],
     values: impl IntoIterator<Item = SettingValue>,

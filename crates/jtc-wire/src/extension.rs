@@ -1,5 +1,6 @@
-//! The extensions of the protocol (J-50): identity, settings, the arm as one thing. Requests are types 0x40 to 0x4F; what one
-//! returns beside its record comes in a frame of type 0x50 to 0x5F, on the line of the request and only after one.
+//! The extensions of the protocol (J-50): identity, settings and the arm image. Requests are types 0x40 to 0x4F. A device can answer a
+//! request with a frame of type 0x50 to 0x5F, in addition to the response record. The device sends such a frame only after a request, and
+//! only on the line of the request.
 use core::fmt;
 
 use crate::crc16;
@@ -21,13 +22,13 @@ pub use info::{BootCause, INFO_LEN, INFO_WRITTEN, Info, Program, SIMULATOR, Stor
 
 /// Version of the extensions that this crate speaks. Later ones only add.
 pub const EXTENSION_VERSION: u8 = 1;
-/// Longest frame that returns something (J-56).
+/// Longest frame that answers an extension request (J-56).
 pub const ANSWER_MAX: usize = 256;
 /// Bytes of a [`SettingValue`].
 pub const VALUE_LEN: usize = 10;
 /// Most values in a SetSettings frame.
 pub const SET_VALUES_MAX: usize = 256;
-/// Bytes in front of what a Settings or an Arm frame carries: where it begins, and how much there is altogether.
+/// Bytes before the content of a Settings, Arm or Points frame: number of the first item or byte, and total number.
 pub const PAGE_HEAD_LEN: usize = 4;
 /// Most values in a Settings frame.
 pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
@@ -43,14 +44,14 @@ pub const NAME_LEN: usize = 32;
 pub struct Name([u8; NAME_LEN]);
 
 impl Name {
-    /// A name; `None` when it has more than [`NAME_LEN`] bytes or control characters.
+    /// Creates a name. Returns `None` if `text` has more than [`NAME_LEN`] bytes, or control characters.
     pub fn new(text: &str) -> Option<Self> {
         let mut bytes = [0; NAME_LEN];
         bytes.get_mut(..text.len())?.copy_from_slice(text.as_bytes());
         (!text.chars().any(char::is_control)).then_some(Self(bytes))
     }
 
-    /// As many whole characters of `text` as fit, without its control characters.
+    /// Returns as many whole characters of `text` as fit, without its control characters.
     pub fn cut(text: &str) -> Self {
         let (mut bytes, mut len) = ([0; NAME_LEN], 0);
         for c in text.chars().filter(|c| !c.is_control()) {
@@ -61,7 +62,7 @@ impl Name {
         Self(bytes)
     }
 
-    /// From the wire; `None` when it is no text, or something follows its end.
+    /// Parses a name from the wire. Returns `None` if it is not valid text, or if a byte that is not zero follows its end.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let bytes: [u8; NAME_LEN] = bytes.try_into().ok()?;
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
@@ -71,13 +72,13 @@ impl Name {
         Self::new(core::str::from_utf8(bytes.get(..end)?).ok()?)
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn as_str(&self) -> &str {
         let end = self.0.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
         self.0.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or_default()
     }
 
-    /// As on the wire.
+    /// Returns the bytes on the wire.
     pub const fn as_bytes(&self) -> &[u8; NAME_LEN] {
         &self.0
     }
@@ -89,25 +90,25 @@ impl fmt::Display for Name {
     }
 }
 
-/// The value of a setting (J-53). Which setting a number means, its unit and its range, stands in the controller's table.
+/// The value of a setting (J-53). The controller's table has the name, unit and range of each setting number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettingValue {
     /// Number of the setting.
     pub setting: u8,
-    /// Joint from 1, base to wrist; 0 where the setting is not one of a joint.
+    /// Joint from 1, base to wrist; 0 if the setting does not belong to a joint.
     pub joint: u8,
-    /// The value in the unit of the setting; of a switch 0 or 1.
+    /// Value in the unit of the setting; 0 or 1 for a switch.
     pub value: f64,
 }
 
 impl SettingValue {
-    /// As on the wire: setting, joint, value.
+    /// Returns the bytes on the wire: setting, joint, value.
     pub fn emit(&self) -> [u8; VALUE_LEN] {
         let [a, b, c, d, e, f, g, h] = self.value.to_be_bytes();
         [self.setting, self.joint, a, b, c, d, e, f, g, h]
     }
 
-    /// From the wire.
+    /// Parses a value from the wire.
     pub fn parse(bytes: &[u8; VALUE_LEN]) -> Self {
         let [setting, joint, value @ ..] = *bytes;
         Self { setting, joint, value: f64::from_be_bytes(value) }
@@ -119,22 +120,22 @@ impl SettingValue {
 pub struct Values<'a>(&'a [u8]);
 
 impl<'a> Values<'a> {
-    /// `None` when the bytes are no whole number of values.
+    /// Parses a list of values. Returns `None` if the bytes are not a whole number of values.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         bytes.len().is_multiple_of(VALUE_LEN).then_some(Self(bytes))
     }
 
-    /// All in order.
+    /// Returns all values in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = SettingValue> + use<'a> {
         self.0.as_chunks::<VALUE_LEN>().0.iter().map(SettingValue::parse)
     }
 
-    /// How many.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         self.0.len() / VALUE_LEN
     }
 
-    /// There are none.
+    /// Returns true if the list is empty.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -156,38 +157,38 @@ impl fmt::Display for Values<'_> {
     }
 }
 
-/// What a device returns to an extension request, beside the record.
+/// A device's answer to an extension request, in addition to the response record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer<'a> {
     /// To GetInfo.
     Info(Info),
     /// To GetSettings.
     Settings {
-        /// How many values are before the first of these.
+        /// Number of values before the first of these.
         first: u16,
-        /// How many there are altogether.
+        /// Total number of values.
         total: u16,
-        /// These.
+        /// The values.
         values: Values<'a>,
     },
     /// To GetArm: bytes of the arm image.
     Arm {
-        /// Where they are.
+        /// Position of the first of these bytes in the image.
         offset: u16,
         /// Length of the image.
         total: u16,
-        /// These.
+        /// The bytes.
         bytes: &'a [u8],
     },
     /// To GetLog: bytes of the flight recorder's log.
     Log(LogPage<'a>),
     /// To GetPoints: points of the trajectory in memory.
     Points {
-        /// How many points are before the first of these.
+        /// Number of points before the first of these.
         first: u16,
-        /// How many there are altogether.
+        /// Total number of points.
         total: u16,
-        /// These.
+        /// The points.
         points: Points<'a>,
     },
 }
@@ -197,19 +198,19 @@ pub enum Answer<'a> {
 pub struct Points<'a>(&'a [u8]);
 
 impl<'a> Points<'a> {
-    /// `None` when the bytes are no whole number of points.
+    /// Parses a list of points. Returns `None` if the bytes are not a whole number of points.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         bytes.len().is_multiple_of(POINT_LEN).then_some(Self(bytes))
     }
 
-    /// All in order.
+    /// Returns all points in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.0.as_chunks::<POINT_LEN>().0.iter().map(RawPoint::parse)
     }
 }
 
 impl<'a> Answer<'a> {
-    /// `None` when the frame is none of these, or its body is none of a device.
+    /// Parses an answer. Returns `None` if the frame is of another type or its body is not valid.
     pub fn parse(frame: FrameRef<'a>) -> Option<Self> {
         let body = frame.body();
         let page = || {
@@ -235,7 +236,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// The type of its frame.
+    /// Returns the type of its frame.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::Info(_) => FrameType::Info,
@@ -246,7 +247,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// Writes its frame; returns the length.
+    /// Writes the frame of the answer and returns its length.
     ///
     /// # Errors
     /// [`EncodeError::BufferTooShort`], also for more than a frame of [`ANSWER_MAX`] bytes carries.
@@ -269,7 +270,7 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Writes a frame whose body has two parts; returns its length. It is written on the board: without a slice that could panic.
+/// Writes a frame whose body has two parts and returns its length. The board runs this function, so it uses no slice that could panic.
 fn sealed(out: &mut [u8], frame_type: FrameType, first: &[u8], second: &[u8]) -> Result<usize, EncodeError> {
     let (n, given) = (FRAME_MIN + first.len() + second.len(), out.len().min(ANSWER_MAX));
     let short = EncodeError::BufferTooShort { needed: n, given };

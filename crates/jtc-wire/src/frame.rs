@@ -1,4 +1,4 @@
-//! What a frame is: header, type, length, body, CRC, and which lengths each type can have.
+//! Structure of a frame: header, type, length, body, CRC, and the lengths that each type can have.
 use core::ops::Range;
 
 use crate::code::codes;
@@ -14,7 +14,7 @@ pub const FRAME_MAX: usize = 60_000;
 /// Joints of the arm.
 pub const JOINTS: usize = 6;
 
-/// Where the parts of a frame are.
+/// Positions of the parts of a frame.
 pub mod field {
     use super::Range;
 
@@ -79,15 +79,15 @@ codes! {
 /// Lengths that frames of one type can have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lengths {
-    /// One of these.
+    /// A list of lengths.
     OneOf(&'static [u16]),
     /// `first` and every `step` bytes more, up to `last`.
     Steps {
-        /// Shortest.
+        /// Shortest length.
         first: u16,
-        /// Bytes from one to the next.
+        /// Bytes from one length to the next.
         step: u16,
-        /// None is longer.
+        /// Upper bound of the lengths.
         last: u16,
     },
 }
@@ -100,8 +100,8 @@ pub const POINT_LEN: usize = 36;
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
-    /// Lengths of whole frames of this type. The 6 bytes of ClearCurrentErrors and FrictionPolynomial are what some
-    /// hosts send (J-06); the three of JtcStatus are those of J-08.
+    /// Returns the lengths of whole frames of this type. Some hosts send ClearCurrentErrors and FrictionPolynomial with 6 bytes (J-06). The
+    /// three lengths of JtcStatus are those of J-08.
     pub const fn lengths(self) -> Lengths {
         use FrameType::*;
         match self {
@@ -138,7 +138,7 @@ impl FrameType {
         }
     }
 
-    /// A whole frame of this type can have `n` bytes.
+    /// Returns true if a whole frame of this type can have `n` bytes.
     pub const fn can_have(self, n: usize) -> bool {
         match self.lengths() {
             Lengths::OneOf(list) => {
@@ -158,7 +158,7 @@ impl FrameType {
         }
     }
 
-    /// How many floats a body of this type may be made of; none where it is no list of floats.
+    /// Returns the numbers of floats that a body of this type can have; empty if the body is not a list of floats.
     pub(crate) const fn float_counts(self) -> &'static [usize] {
         match self {
             FrameType::FrictionTable => &[2640],
@@ -170,12 +170,12 @@ impl FrameType {
         }
     }
 
-    /// Sent by the host; the others come from the device.
+    /// Returns true if the host sends this type. The device sends the others.
     pub const fn from_host(self) -> bool {
         !matches!(self, FrameType::JtcStatus) && !self.is_answer()
     }
 
-    /// It has the controller use parameters that it holds.
+    /// Returns true for a UseDefault frame, which selects parameters that the controller already has.
     pub const fn is_default(self) -> bool {
         use FrameType::*;
         matches!(
@@ -184,12 +184,12 @@ impl FrameType {
         )
     }
 
-    /// What an extension request returns beside its record (J-50).
+    /// Returns true if the frame answers an extension request, in addition to the response record (J-50).
     pub const fn is_answer(self) -> bool {
         self as u8 >= 0x50
     }
 
-    /// An extension request: existing devices do not know it, existing hosts do not send it (J-50).
+    /// Returns true for an extension request. Existing devices do not know it, and existing hosts do not send it (J-50).
     pub const fn is_extension(self) -> bool {
         matches!(self as u8, 0x40..0x50)
     }
@@ -209,7 +209,7 @@ pub struct FrameRef<'a> {
 }
 
 impl<'a> FrameRef<'a> {
-    /// Checks a whole frame: header, type, a length that its type can have and that is that of `bytes`, CRC.
+    /// Checks a whole frame: header, type, length and CRC. The length must be that of `bytes`, and one that the type can have.
     pub fn new_checked(bytes: &'a [u8]) -> Option<Self> {
         let (head, _) = bytes.split_first_chunk::<4>()?;
         let frame_type = FrameType::from_byte(head[field::TYPE])?;
@@ -222,7 +222,7 @@ impl<'a> FrameRef<'a> {
         good.then_some(Self { frame_type, bytes })
     }
 
-    /// Bytes between the length and the CRC.
+    /// Returns the bytes between the length and the CRC.
     pub fn body(&self) -> &'a [u8] {
         let end = self.bytes.len().saturating_sub(field::CRC_LEN);
         self.bytes.get(field::BODY..end).unwrap_or(&[])

@@ -13,7 +13,7 @@ pub use reference::{Event, events};
 pub use script::{stream_parser, stream_regions};
 pub use status::status_stream;
 
-/// A frame of any type and body, with a right CRC, whether or not its type can have that length.
+/// Builds a frame of any type and body with a correct CRC. Its length may be one that its type cannot have.
 pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
     let mut bytes = vec![crate::HEADER, kind];
     bytes.extend((body.len() as u16 + 6).to_be_bytes());
@@ -22,7 +22,7 @@ pub fn sealed(kind: u8, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// A body length that `kind` can have, the one that `pick` points to.
+/// Returns a body length that `kind` can have, selected by `pick`.
 fn body_len(kind: FrameType, pick: u8) -> usize {
     match kind.lengths() {
         Lengths::OneOf(list) => usize::from(list[usize::from(pick) % list.len()]) - 6,
@@ -51,7 +51,7 @@ pub fn frame_bodies(data: &[u8]) {
     let frame = FrameRef::new_checked(&bytes).expect("a good frame");
     assert_eq!(frame.body(), &bytes[4..bytes.len() - 2]);
 
-    // A body that no receiver hands out must not break anything either.
+    // A body that no receiver returns must not break anything either.
     let raw = FrameRef { frame_type: frame.frame_type, bytes: &data[2..] };
     if let Ok(command) = Command::parse(raw) {
         let mut out = vec![0; data.len() + 64];

@@ -1,4 +1,4 @@
-//! The host's stream parser: finds JtcStatus frames, and what extension requests return, in bytes that arrive in any pieces.
+//! The host's stream parser: finds JtcStatus frames and answers to extension requests in bytes that arrive in pieces of any length.
 use crate::extension::{ANSWER_MAX, Answer};
 use crate::frame::{FrameRef, FrameType, HEADER, field};
 use crate::status::Status;
@@ -8,9 +8,9 @@ use crate::status::Status;
 pub struct StatusCounters {
     /// Good statuses.
     pub frames: u64,
-    /// Bytes that looked like a status but had a wrong CRC.
+    /// Runs of bytes that looked like a frame of the device but had a wrong CRC or body.
     pub bad_frames: u64,
-    /// Bytes that belong to no good status.
+    /// Bytes that belong to no good frame.
     pub skipped_bytes: u64,
 }
 
@@ -18,14 +18,14 @@ pub struct StatusCounters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum FromDevice<'a> {
-    /// Its report.
+    /// The status of the controller.
     Status(Status),
-    /// What an extension request returns (J-50).
+    /// An answer to an extension request (J-50).
     Answer(Answer<'a>),
 }
 
-/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and the frames that extension requests return. It
-/// resynchronises after noise and lost bytes without losing a good frame that follows them.
+/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and for answers to extension requests. The parser
+/// resynchronises after noise and lost bytes, without losing a good frame that follows them.
 ///
 /// ```
 /// use jtc_wire::{Status, StatusReceiver};
@@ -42,7 +42,7 @@ pub enum FromDevice<'a> {
 pub struct StatusReceiver {
     held: [u8; ANSWER_MAX],
     len: usize,
-    /// Bytes in front of the held ones that were handed out and are to go.
+    /// Bytes at the front of `held` that were returned to the caller and that the next call removes.
     used: usize,
     counters: StatusCounters,
 }
@@ -55,14 +55,14 @@ impl Default for StatusReceiver {
 
 /// The scan result at the first held byte.
 enum ScanResult {
-    /// The first held byte begins no status.
+    /// No frame of the device begins at the first held byte.
     Nothing,
     /// This many bytes are needed to decide.
     Needs(usize),
 }
 
 impl StatusReceiver {
-    /// Nothing held.
+    /// Creates a parser that holds no bytes.
     pub const fn new() -> Self {
         Self {
             held: [0; ANSWER_MAX],
@@ -72,8 +72,8 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a status is complete; `None` when all are taken. What extension requests return is
-    /// passed over.
+    /// Takes bytes from the front of `bytes` until a status is complete. Returns `None` when all are taken. Skips answers to extension
+    /// requests.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
             if let FromDevice::Status(status) = self.next_frame(bytes)? {
@@ -82,7 +82,7 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is complete; `None` when all are taken.
+    /// Takes bytes from the front of `bytes` until a frame is complete. Returns `None` when all are taken.
     pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Option<FromDevice<'_>> {
         self.drop_front(self.used);
         self.used = 0;
@@ -111,7 +111,7 @@ impl StatusReceiver {
         Some(frame)
     }
 
-    /// The bytes of the frame that [`next_frame`](Self::next_frame) returned last, for passing it on.
+    /// Returns the bytes of the frame that [`next_frame`](Self::next_frame) returned last, to pass it on.
     pub fn frame_bytes(&self) -> &[u8] {
         self.held.get(..self.used).unwrap_or(&[])
     }
@@ -121,7 +121,7 @@ impl StatusReceiver {
         self.counters
     }
 
-    /// Bytes held that may become a frame.
+    /// Returns the number of held bytes that may become a frame.
     pub fn held(&self) -> usize {
         self.len - self.used
     }
@@ -132,7 +132,7 @@ impl StatusReceiver {
         (self.len, self.used) = (0, 0);
     }
 
-    /// Skips the first byte and all up to the next header.
+    /// Skips the first byte and all bytes up to the next header.
     fn skip(&mut self) {
         let rest = &self.held[1..self.len];
         let more = rest.iter().position(|byte| *byte == HEADER).unwrap_or(rest.len());
@@ -220,7 +220,7 @@ mod tests {
         use crate::response::{DataStatus, Response};
         let emitted = Status { point: 77, ..Status::default() }.emit();
         let record = Response::good(FrameType::GetInfo, DataStatus::NotAllowed, 6);
-        // As other builds send it, too: without a gripper, and with a short index.
+        // Also the layouts that other builds send: without a gripper, and with a short index.
         for (cut, length) in [(0..0, 175), (163..173, 165), (17..19, 173)] {
             let mut bytes: Vec<u8> =
                 emitted.iter().enumerate().filter(|(i, _)| !cut.contains(i)).map(|(_, b)| *b).collect();

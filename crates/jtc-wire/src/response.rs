@@ -40,13 +40,13 @@ codes! {
 /// A response record (J-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Response {
-    /// Type byte as received, 0 where unknown.
+    /// Type byte as received, 0 if unknown.
     pub frame_type: u8,
-    /// How the frame arrived.
+    /// Result of receiving the frame.
     pub status: FrameStatus,
-    /// What became of its data; Idle unless `status` is NoError.
+    /// Result for the data of the frame; Idle unless `status` is NoError.
     pub data: DataStatus,
-    /// Bytes received, 0 where unknown.
+    /// Bytes received, 0 if unknown.
     pub length: u16,
 }
 
@@ -54,22 +54,22 @@ impl Response {
     /// No record.
     pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
 
-    /// The record of a frame that could not be taken.
+    /// Creates the record of a frame with a fault.
     pub const fn bad(frame_type: u8, status: FrameStatus, length: u16) -> Self {
         Self { frame_type, status, data: DataStatus::Idle, length }
     }
 
-    /// The record of a good frame.
+    /// Creates the record of a good frame.
     pub const fn good(frame_type: FrameType, data: DataStatus, length: u16) -> Self {
         Self { frame_type: frame_type as u8, status: FrameStatus::NoError, data, length }
     }
 
-    /// A status that carries it carries no record.
+    /// Returns true if a status with this value carries no record.
     pub const fn is_idle(&self) -> bool {
         matches!(self.status, FrameStatus::Idle)
     }
 
-    /// The frame arrived well and was obeyed.
+    /// Returns true if the frame arrived without a fault and was accepted.
     pub const fn accepted(&self) -> bool {
         matches!((self.status, self.data), (FrameStatus::NoError, DataStatus::NoError))
     }

@@ -1,7 +1,7 @@
 //! Trajectory bodies: four numbers and points of eighteen int16.
 use crate::frame::{JOINTS, POINT_LEN};
 
-/// One trajectory point as the wire carries it.
+/// A trajectory point as the wire carries it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(C)]
 pub struct RawPoint {
@@ -25,7 +25,7 @@ pub const ACCELERATION_SCALE: f64 = 12.566370;
 /// Raw value at full scale.
 pub const RAW_FULL_SCALE: f64 = 32767.0;
 
-/// Where the parts of a Trajectory body are, from its first byte.
+/// Positions of the parts of a Trajectory body, counted from its first byte.
 pub mod field {
     use core::ops::Range;
 
@@ -42,7 +42,7 @@ pub mod field {
 }
 
 impl RawPoint {
-    /// From the 36 bytes of a point.
+    /// Parses the 36 bytes of a point.
     #[inline]
     pub fn parse(bytes: &[u8; POINT_LEN]) -> Self {
         let i16_at = |i: usize| i16::from_be_bytes([bytes[2 * i], bytes[2 * i + 1]]);
@@ -53,7 +53,7 @@ impl RawPoint {
         }
     }
 
-    /// The 36 bytes of a point.
+    /// Returns the 36 bytes of a point.
     pub fn emit(&self) -> [u8; POINT_LEN] {
         let mut bytes = [0; POINT_LEN];
         let values = self.position.iter().chain(&self.velocity).chain(&self.acceleration);
@@ -94,7 +94,7 @@ pub struct Segment<'a> {
 }
 
 impl<'a> Segment<'a> {
-    /// From a body; `None` when it is too short for the four numbers. A rest that is no whole point is left out.
+    /// Parses a body. Returns `None` if it is too short for the four numbers. Ignores an incomplete point at the end.
     pub fn parse(body: &'a [u8]) -> Option<Self> {
         let (head, points) = body.split_first_chunk::<{ field::POINTS }>()?;
         let u16_at = |i: usize| u16::from_be_bytes([head[i], head[i + 1]]);
@@ -107,27 +107,27 @@ impl<'a> Segment<'a> {
         })
     }
 
-    /// All points in order.
+    /// Returns all points in order.
     pub fn points(&self) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.points_from(0)
     }
 
-    /// The points from number `first` on; none past the end.
+    /// Returns the points from number `first` on; none past the end.
     pub fn points_from(&self, first: usize) -> impl ExactSizeIterator<Item = RawPoint> + use<'a> {
         self.points.as_chunks::<POINT_LEN>().0.get(first..).unwrap_or(&[]).iter().map(RawPoint::parse)
     }
 }
 
 impl Segment<'_> {
-    /// Number of points.
+    /// Returns the number of points.
     pub fn len(&self) -> usize {
         self.points.len() / POINT_LEN
     }
-    /// No point at all.
+    /// Returns true if the segment has no points.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Point `i`; `None` past the end.
+    /// Returns point `i`, or `None` past the end.
     pub fn point(&self, i: usize) -> Option<RawPoint> {
         self.points.as_chunks::<POINT_LEN>().0.get(i).map(RawPoint::parse)
     }

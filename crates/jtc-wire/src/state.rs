@@ -45,7 +45,7 @@ states! {
 }
 
 impl ControllerState {
-    /// Torque is commanded: without it the arm falls.
+    /// Returns true if the controller commands torque. Without torque the arm falls.
     pub fn has_torque(self) -> bool {
         matches!(self, Self::HoldPos | Self::Operate | Self::Teaching)
     }

@@ -14,7 +14,7 @@ pub const STATUS_LEN_SHORT_INDEX: usize = 173;
 /// Length of the layout without gripper (J-08).
 pub const STATUS_LEN_NO_GRIPPER: usize = 165;
 
-/// Where the parts of the 175-byte frame are.
+/// Positions of the parts of the 175-byte frame.
 ///
 /// The 165-byte layout ends after the joints; in the 173-byte layout the point index has two bytes and all that follows
 /// it comes two bytes earlier.
@@ -35,7 +35,7 @@ pub mod field {
     pub const ERRORS: Range<usize> = 10..12;
     /// Occurred errors, u16.
     pub const OCCURRED: Range<usize> = 12..14;
-    /// What the host has not given yet.
+    /// Parameters that the controller has not received yet.
     pub const JTC_INIT: usize = 14;
     /// Nodes that are not ready yet.
     pub const NODE_INIT: usize = 15;
@@ -60,7 +60,7 @@ pub mod field {
     /// CRC.
     pub const CRC: Range<usize> = 173..175;
 
-    /// Where the parts of a joint are, from its first byte.
+    /// Positions of the parts of a joint, counted from its first byte.
     pub mod joint {
         use super::Range;
 
@@ -100,11 +100,11 @@ pub struct Status {
     pub errors: u16,
     /// Occurred errors, same bits.
     pub occurred: u16,
-    /// What is missing: bits of [`crate::missing_parameter`].
+    /// Parameters that are missing: bits of [`crate::missing_parameter`].
     pub jtc_init: u8,
     /// Nodes that are missing: bits of [`crate::words::NODES`].
     pub node_init: u8,
-    /// What becomes of the trajectory.
+    /// State of the trajectory.
     pub trajectory: Code<TrajectoryState>,
     /// Index of the current 1 ms point.
     pub point: u32,
@@ -122,7 +122,7 @@ pub struct Status {
     pub gripper: Option<GripperStatus>,
 }
 
-/// One joint in JtcStatus.
+/// A joint in JtcStatus.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointStatus {
     /// State of the drive.
@@ -166,7 +166,7 @@ pub struct GripperStatus {
     pub warnings: u8,
 }
 
-/// `N` bytes of `bytes` from `at`; zeros past the end (no caller goes there).
+/// Returns `N` bytes of `bytes` from `at`, or zeros past the end. No caller reads past the end.
 fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
 }
@@ -206,14 +206,14 @@ impl JointStatus {
 }
 
 impl Status {
-    /// The 175-byte frame with CRC (a missing gripper is emitted as zeros).
+    /// Returns the 175-byte frame with CRC. A missing gripper is emitted as zeros.
     pub fn emit(&self) -> [u8; STATUS_LEN] {
         let mut frame = [0; STATUS_LEN];
         self.emit_to(&mut frame);
         frame
     }
 
-    /// The same, in place of what is in `b`.
+    /// Like [`emit`](Self::emit), into `b`.
     pub fn emit_to(&self, b: &mut [u8; STATUS_LEN]) {
         use field::*;
         b[frame_field::HEADER] = HEADER;
@@ -251,7 +251,7 @@ impl Status {
         b[CRC].copy_from_slice(&crc.to_be_bytes());
     }
 
-    /// From a whole frame of 165, 173 or 175 bytes; `None` when type, length or CRC is wrong.
+    /// Parses a whole frame of 165, 173 or 175 bytes. Returns `None` if type, length or CRC is wrong.
     ///
     /// A record with a code that this version does not know reads as one of status Idle, so that it confirms nothing.
     pub fn parse(bytes: &[u8]) -> Option<Status> {
@@ -260,7 +260,7 @@ impl Status {
             return None;
         }
         let short_index = bytes.len() == STATUS_LEN_SHORT_INDEX;
-        // Where a byte is that follows the point index.
+        // Position of a byte that follows the point index.
         let late = |at: usize| if short_index { at - 2 } else { at };
         let byte = |at: usize| get::<1>(bytes, at)[0];
         let response = match (
@@ -305,8 +305,8 @@ impl Status {
         })
     }
 
-    /// Puts another record into the bytes of a good status, whatever its layout: for whoever passes it on to several hosts. False, and
-    /// nothing is changed, when the bytes are none.
+    /// Replaces the response record in the bytes of a good status of any layout, for a program that passes the status on to several hosts.
+    /// Returns false and changes nothing if the bytes are not a good status.
     pub fn replace_response(bytes: &mut [u8], response: &Response) -> bool {
         use field::*;
         let status = |frame: crate::FrameRef<'_>| frame.frame_type == FrameType::JtcStatus;
@@ -323,33 +323,33 @@ impl Status {
         true
     }
 
-    /// Start or Init: the controller does not hold the arm yet.
+    /// Returns true in Start and Init: the controller does not hold the arm yet.
     pub fn is_coming_up(&self) -> bool {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])
     }
 
-    /// A held stop (J-69): the arm is held under torque, or comes to rest, and nothing moves until the cause that its joints report is
-    /// cleared.
+    /// Returns true in a held stop (J-69): the arm is held under torque or comes to rest, and does not move until the host has cleared the
+    /// cause that the joints report.
     pub fn is_held_stop(&self) -> bool {
         self.errors == crate::error::INTERNAL_JOINTS && self.state != ControllerState::Error
     }
 
-    /// The controller is in Error, or reports an error that is more than the cause of a held stop.
+    /// Returns true if the controller is in Error, or reports an error other than the cause of a held stop.
     pub fn is_faulty(&self) -> bool {
         (self.errors != 0 || self.state == ControllerState::Error) && !self.is_held_stop()
     }
 
-    /// The arm follows its trajectory, or slows down on it.
+    /// Returns true while the arm follows its trajectory or slows down on it.
     pub fn is_executing(&self) -> bool {
         self.trajectory == TrajectoryState::Execute
     }
 
-    /// Measured positions of the joints as the frame has them, rad; 0 where one is not known.
+    /// Returns the measured positions of the joints as the frame has them, rad; 0 if a position is not known.
     pub fn positions(&self) -> [f64; JOINTS] {
         self.joints.map(|joint| f64::from(joint.position))
     }
 
-    /// The record it carries; `None` when it carries none.
+    /// Returns the record that the status carries, or `None` if it carries none.
     pub fn response(&self) -> Option<Response> {
         (!self.response.is_idle()).then_some(self.response)
     }

@@ -1,11 +1,11 @@
-//! The device's stream parser: finds frames in bytes that arrive in any pieces, and reports all other bytes (J-03, J-04).
+//! The device's stream parser: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
 //!
-//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins where no good frame begins and ends
-//! where one does, or at a gap. It makes one event as soon as the fault at its first byte is known; the rest of it is
-//! skipped without an event. An incomplete frame ends when its last byte arrives, or at a gap; after a gap the bytes
-//! behind its first one are scanned again, so that a false header costs nothing that follows it.
+//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. The run
+//! ends at the next good frame or at a gap. The parser reports one event for a run, as soon as the fault at its first byte is known, and
+//! skips the remainder without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap the parser scans the
+//! bytes after its first one again, so that a false header costs none of the frames that follow it.
 //!
-//! Terms: a *candidate* is a place with a header, a known type and a length that the type can have. A *gap* is a silence of
+//! Terms: a *candidate* is a position with a header, a known type and a length that the type can have. A *gap* is a silence of
 //! the inter-byte timeout or more after received bytes.
 //!
 //! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
@@ -27,7 +27,7 @@ pub enum LinkEvent<'a> {
     Frame(FrameRef<'a>),
     /// A bad frame, and the bytes that follow it without a gap.
     Bad(Response),
-    /// A run of bytes of which not even the first looks like a frame.
+    /// A run of bytes whose first byte does not look like a frame.
     Noise(Response),
 }
 
@@ -41,13 +41,13 @@ impl LinkEvent<'_> {
     }
 }
 
-/// Time after an extension request for which its line counts as one whose client knows the extensions, µs (J-51). Later the line is
-/// *plain*.
+/// Time after an extension request during which the line's client counts as one that knows the extensions, µs (J-51). After this time the
+/// line is *plain*.
 pub const KNOWN_US: u64 = 2_000_000;
 
 /// Most gaps among the held bytes that are stored.
 const GAPS: usize = 64;
-/// Work of one `poll`: a byte passed over costs one, a candidate whose CRC is taken `CANDIDATE`.
+/// Work of one `poll`: a skipped byte costs 1, a candidate whose CRC is checked costs `CANDIDATE`.
 const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
@@ -68,14 +68,14 @@ const CANDIDATE: usize = 128;
 pub struct Receiver<B> {
     buffer: B,
     inter_byte_timeout_us: u64,
-    /// Where in the stream the first byte of the buffer was.
+    /// Position in the stream of the first byte of the buffer.
     base: u64,
     /// Held bytes are `start..end` of the buffer.
     start: usize,
     end: usize,
     /// Time of the last byte, µs.
     last_us: u64,
-    /// The caller holds bytes that were not taken: silence now is no gap on the line.
+    /// The caller holds bytes that were not taken, so that silence does not count as a gap on the line.
     refused: bool,
     /// Those bytes follow a gap.
     gap_before_refused: bool,
@@ -86,9 +86,9 @@ pub struct Receiver<B> {
     event: Option<Found>,
     gaps: Gaps,
     registers: Registers,
-    /// Where in the stream the frame begins that is not complete yet, and when its first byte was seen, µs.
+    /// Position in the stream of the frame that is not complete yet, and the time at which its first byte was seen, µs.
     began: (u64, u64),
-    /// When the last extension request was complete, µs.
+    /// Time at which the last extension request was complete, µs.
     asked_us: Option<u64>,
     /// The frame of the event came on a plain line.
     plain: bool,
@@ -97,14 +97,14 @@ pub struct Receiver<B> {
 #[derive(Clone, Copy)]
 enum Found {
     Frame(FrameType, usize),
-    /// The fault, and the byte of the stream that it is at.
+    /// The fault, and its position in the stream.
     Run(Sort, Response, u64),
 }
 
-/// Sort of a run that is no good frame.
+/// Kind of a run.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Sort {
-    /// It begins like a frame.
+    /// The run begins like a frame.
     Bad,
     Noise,
 }
@@ -140,16 +140,16 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Bytes that are held at most.
+    /// Returns the maximum number of held bytes.
     fn capacity(&self) -> usize {
         self.buffer.as_ref().len().min(FRAME_MAX)
     }
 
-    /// Takes bytes that were received until `now_us`; returns how many were taken (fewer when the buffer is full: offer the
-    /// rest again after `release` or more `poll`s; their delay does not count as a gap).
+    /// Takes bytes that were received until `now_us` and returns how many were taken. If the buffer is full, it takes fewer: offer the
+    /// remainder again after `release` or more `poll`s. The delay of these bytes does not count as a gap.
     ///
-    /// Call it at least each millisecond or two while bytes arrive: two calls the inter-byte timeout or more apart have a gap
-    /// between them.
+    /// Call it at least once every 2 ms while bytes arrive. Two calls that are the inter-byte timeout or more apart have a gap between
+    /// them.
     pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
             return 0;
@@ -174,14 +174,14 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.registers.absorb(self.end, taken);
         self.end += taken.len();
         self.refused = taken.len() < bytes.len();
-        // A gap before bytes of which none was taken is marked already.
+        // If none of the bytes was taken, the gap before them is marked already.
         self.gap_before_refused = false;
         self.last_us = now_us;
         taken.len()
     }
 
-    /// Scans for the next event with bounded work; true when `event` has one. Call it after `push` and at least each
-    /// millisecond so that gaps are detected; false with [`busy`](Self::busy) means that calling it again goes on.
+    /// Scans for the next event with bounded work. Returns true if `event` has one. Call it after `push` and at least once per millisecond,
+    /// so that gaps are detected. If it returns false and [`busy`](Self::busy) is true, the next call continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
             // A full list of gaps ends in one at the last byte or is shortened below.
@@ -226,7 +226,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         true
     }
 
-    /// The event found, until it is released.
+    /// Returns the event that was found, until it is released.
     pub fn event(&self) -> Option<LinkEvent<'_>> {
         Some(match self.event? {
             Found::Frame(frame_type, n) => {
@@ -238,8 +238,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Position in the stream of the first byte of the event, counted from the first byte ever pushed. It orders the event
-    /// and the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
+    /// Returns the position in the stream of the first byte of the event, counted from the first byte ever pushed. This position orders the
+    /// event and the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
     pub fn event_position(&self) -> Option<u64> {
         Some(match self.event? {
             Found::Frame(..) => self.base + self.start as u64,
@@ -247,13 +247,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// The event as a controller gets it, of the line with this number.
+    /// Returns the event as a controller gets it, with the number of its line.
     pub fn received(&self, line: usize) -> Option<ReceivedEvent<'_>> {
         let (event, position) = (self.event()?, self.event_position()?);
         Some(ReceivedEvent { line, position, plain: self.plain, event })
     }
 
-    /// A frame is complete: whether its line was plain when it began, which an extension request ends.
+    /// Decides for a complete frame whether its line was plain when the frame began. An extension request makes the line known.
     fn judge(&mut self, kind: FrameType, now_us: u64) {
         let (position, seen_us) = self.began;
         let began_us = if position == self.base + self.start as u64 { seen_us } else { now_us };
@@ -264,9 +264,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Discards all held bytes and the event: bytes were lost in front of the next one, which is byte `position` of the
-    /// stream. The loss is reported as one run that was not received to its end (J-04); the next bytes continue no
-    /// frame, and up to the next frame they belong to that run.
+    /// Discards all held bytes and the event, because bytes were lost before the next one, which is byte `position` of the stream. The loss
+    /// is reported as one run that was not received to its end (J-04). The next bytes do not continue a frame. Up to the next frame they
+    /// belong to that run.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
@@ -283,7 +283,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Bytes are held that may become a frame.
+    /// Returns true if bytes are held that may become a frame.
     pub fn mid_frame(&self) -> bool {
         let frame = match self.event {
             Some(Found::Frame(_, n)) => n,
@@ -292,7 +292,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.end > self.start + frame
     }
 
-    /// The last `poll` stopped because its work is bounded: more can be scanned without new bytes.
+    /// Returns true if the last `poll` stopped because its work is bounded. The next call can then scan more without new bytes.
     pub fn busy(&self) -> bool {
         self.busy
     }
@@ -345,7 +345,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Skips the first held byte and at most `most` more up to the next header or gap; returns how many more.
+    /// Skips the first held byte and at most `most` more, up to the next header or gap. Returns how many more.
     fn pass_over(&mut self, most: usize) -> usize {
         self.start += 1;
         let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);
@@ -355,7 +355,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         passed
     }
 
-    /// CRC register before byte `at` of the buffer.
+    /// Returns the CRC register before byte `at` of the buffer.
     fn register(&self, at: usize) -> u16 {
         self.registers.at(at, self.buffer.as_ref())
     }
@@ -374,7 +374,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
     }
 }
 
-/// Places of gaps in the buffer, in order.
+/// Positions of gaps in the buffer, in order.
 struct Gaps {
     places: [u16; GAPS],
     count: usize,
@@ -394,7 +394,7 @@ impl Gaps {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Stores a gap before the byte at `place`, which is not before the others; false when there is no room for it.
+    /// Stores a gap before the byte at `place`, which must not be before the stored gaps. Returns false if the list is full.
     fn mark(&mut self, place: usize) -> bool {
         let place = place as u16;
         if self.places[..self.count].last() == Some(&place) {

@@ -1,18 +1,18 @@
-//! Stop and Pause ahead of everything: found in the bytes of a line as they arrive, before and apart from the parsing of
-//! frames (J-04).
+//! Stop and Pause before all other frames: they are found in the bytes of a line as they arrive, independently of the parsing of frames
+//! (J-04).
 //!
-//! A frame waits for the frames before it, for a false header that promises bytes which never come, or for a place in a
-//! full buffer. A Stop must wait for nothing. So the seven bytes of a Stop or a Pause are recognised wherever they stand,
-//! and the command acts in the next tick. The frame itself goes its way through the [`Receiver`](crate::Receiver) all the
-//! same and gets its response record in its turn; by its place in the stream the controller sees that it has acted
-//! already, and that an Execute was received before it and is not to be carried out any more.
+//! A frame may wait for the frames before it, for a false header that announces bytes which never come, or for space in a full buffer. A
+//! Stop must not wait. Therefore the watch recognises the seven bytes of a Stop or a Pause at any position, and the command acts in the
+//! next tick. The frame itself still passes through the [`Receiver`](crate::Receiver) and gets its response record in its turn. From its
+//! position in the stream the controller sees that the command has already acted, and that an Execute that was received before it must no
+//! longer be executed.
 //!
-//! The price: the same seven bytes inside the body of another frame also stop the arm. That errs on the safe side, and
-//! happens to one in 2⁵⁶ places of a body of chance bytes.
+//! The price: the same seven bytes inside the body of another frame also stop the arm. This error is on the safe side. In a body of random
+//! bytes it occurs at one in 2⁵⁶ positions.
 use crate::command::ExecCommand;
 use crate::fixed;
 
-/// A command that waits for nothing.
+/// A command that does not wait for other frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum UrgentCommand {
@@ -40,7 +40,7 @@ impl UrgentCommand {
     }
 }
 
-/// The urgent commands that a line brought in one tick: how many of each, and which was the last.
+/// The urgent commands that arrived on a line in one tick: the number of each, and which was the last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UrgentCommands {
     stops: u8,
@@ -49,15 +49,15 @@ pub struct UrgentCommands {
 }
 
 impl UrgentCommands {
-    /// None.
+    /// No commands.
     pub const NONE: Self = Self { stops: 0, pauses: 0, pause_is_last: false };
 
-    /// One more, behind the others.
+    /// Adds a command after the others.
     pub fn push(&mut self, command: UrgentCommand) {
         self.add(command, 1);
     }
 
-    /// So many of one sort behind the others.
+    /// Adds `count` equal commands after the others.
     pub fn add(&mut self, command: UrgentCommand, count: u8) {
         if count == 0 {
             return;
@@ -67,12 +67,12 @@ impl UrgentCommands {
         *counter = counter.saturating_add(count);
     }
 
-    /// There are none.
+    /// Returns true if the list is empty.
     pub const fn is_empty(&self) -> bool {
         self.stops == 0 && self.pauses == 0
     }
 
-    /// Each sort that came and how often, the one that came last at the end.
+    /// Returns each command that came, with its count. The command that came last is at the end.
     pub fn iter(&self) -> impl Iterator<Item = (UrgentCommand, u8)> {
         let (stops, pauses) = ((UrgentCommand::Stop, self.stops), (UrgentCommand::Pause, self.pauses));
         let order = if self.pause_is_last { [stops, pauses] } else { [pauses, stops] };
@@ -92,27 +92,27 @@ const fn window(bytes: &[u8; LENGTH]) -> u64 {
     u64::from_be_bytes([0, a, b, c, d, e, f, g])
 }
 
-/// One line.
+/// State of a line.
 #[derive(Clone, Copy, Debug)]
 struct Tail {
     /// Its last bytes.
     window: u64,
     /// Bytes received.
     received: u64,
-    /// When the last of them came.
+    /// Time of the last byte, µs.
     last_us: u64,
-    /// What came since the last [`UrgentWatch::take`].
+    /// Commands since the last [`UrgentWatch::take`].
     commands: UrgentCommands,
-    /// Where in the stream the last of these ended.
+    /// Position in the stream at which the last of these commands ended.
     hit: u64,
-    /// Bytes received when the last urgent command of any line came: what began before is older than it.
+    /// Bytes received when the last urgent command of any line came. A frame that began before is older than that command.
     overtaken: u64,
 }
 
 /// Watches the bytes of all lines to a controller for Stop and Pause.
 ///
-/// In each tick: [`scan`](Self::scan) what has arrived on every line, then [`take`](Self::take) the commands. An Execute at
-/// a place that is [`overtaken`](Self::overtaken) is not to be carried out.
+/// In each tick, [`scan`](Self::scan) the bytes that have arrived on every line, then [`take`](Self::take) the commands. An Execute at a
+/// position that is [`overtaken`](Self::overtaken) must not be executed.
 ///
 /// ```
 /// use jtc_wire::{UrgentCommand, UrgentWatch, fixed};
@@ -139,7 +139,7 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         Self { inter_byte_timeout_us: inter_byte_timeout_us as u64, lines: [tail; LINES] }
     }
 
-    /// Bytes that have arrived on a line by `now_us`: every byte once, in order. A few instructions a byte.
+    /// Scans the bytes that have arrived on a line by `now_us`: every byte once, in order. Takes a few instructions per byte.
     pub fn scan(&mut self, line: usize, now_us: u64, bytes: &[u8]) {
         let Some(tail) = self.lines.get_mut(line) else { return };
         if bytes.is_empty() {
@@ -162,13 +162,13 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         }
     }
 
-    /// The commands of each line since the last call.
+    /// Returns the commands of each line since the last call.
     pub fn take(&mut self) -> [UrgentCommands; LINES] {
         let commands = self.lines.map(|tail| tail.commands);
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // Which of two lines was first within a tick is not known: all that either has sent counts as older.
+            // The order of two lines within a tick is not known, so all bytes that either has sent count as older.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,
@@ -178,12 +178,12 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         commands
     }
 
-    /// What began at byte `position` of a line was received before the last urgent command of any line.
+    /// Returns true if a frame that began at byte `position` of a line was received before the last urgent command of any line.
     pub fn overtaken(&self, line: usize, position: u64) -> bool {
         self.lines.get(line).is_some_and(|tail| position < tail.overtaken)
     }
 
-    /// Bytes received on a line.
+    /// Returns the number of bytes received on a line.
     pub fn received(&self, line: usize) -> u64 {
         self.lines.get(line).map_or(0, |tail| tail.received)
     }
@@ -227,7 +227,7 @@ mod tests {
         }
     }
 
-    /// A call without bytes is no byte: the gap is counted from the last one received (J-03).
+    /// A call without bytes does not count as a received byte: the gap is counted from the last received byte (J-03).
     #[test]
     fn j05_an_empty_scan_does_not_join_across_a_gap() {
         let mut watch = UrgentWatch::<2>::new(6000);

@@ -1,10 +1,10 @@
-//! What is no frame, no command and no status, however right the rest of it is.
+//! Bytes that are not a valid frame, command or status, although the remainder of them is right.
 use jtc_wire::{
     ALL_NODES, Command, DataStatus, Floats, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint,
     Response, Segment, Status, crc16, fixed,
 };
 
-/// Bytes with their CRC behind them.
+/// Returns the bytes, followed by their CRC.
 fn sealed(bytes: &[u8]) -> Vec<u8> {
     [bytes, &crc16(bytes).to_be_bytes()].concat()
 }
@@ -29,7 +29,7 @@ fn j05_a_frame_needs_its_header_type_length_and_crc_at_once() {
     }
 }
 
-/// A body that no receiver hands out: the count of floats is that of a frame of its type, or it is no command.
+/// A body that no receiver returns is a command only if its number of floats is valid for its type.
 #[test]
 fn j07_floats_of_another_count_are_no_command() {
     let bytes = vec![0; 10_580];
@@ -61,7 +61,7 @@ fn j07_a_body_that_is_cut_off_is_no_command() {
     ] {
         for n in 0..needed {
             let expected = match (kind, n) {
-                // What some hosts send.
+                // Some hosts send this frame.
                 (FrameType::ClearCurrentErrors, 0) => {
                     Ok(Command::ClearCurrentErrors { jtc: true, nodes: ALL_NODES })
                 }

@@ -1,4 +1,4 @@
-//! What the encoders refuse, and how the numbers of a frame are called.
+//! Inputs that the encoders refuse, and the names of the numbers of a frame.
 use jtc_wire::{
     Command, EncodeError, FRAME_MAX, FloatName, Floats, FrameType, RawPoint, floats, pid_param, trajectory,
 };
@@ -28,8 +28,8 @@ fn only_frames_of_floats_are_made_of_floats() {
     assert_eq!(Command::PidParam(Floats::new(&bytes)).emit(&mut out), Err(error));
 }
 
-/// Of a frame that is written while its numbers come, the end is not known at once: a buffer of the length asked for holds
-/// more of it, and never more than the frame is asked for.
+/// An encoder writes a frame while the numbers come, so it does not know the final length at once. A buffer of the requested length holds
+/// more of the frame, and the requested length is never more than that of the frame.
 #[test]
 fn a_buffer_that_is_too_short_is_told_how_long_it_must_be() {
     type Encoder = fn(&mut [u8]) -> Result<usize, EncodeError>;

@@ -1,7 +1,7 @@
 //! The host's parser of statuses: what it counts, and what it does not wait for.
 use jtc_wire::{STATUS_LEN, Status, StatusReceiver};
 
-/// All bytes at once; how many statuses are found.
+/// Feeds all bytes at once and returns the number of statuses found.
 fn feed(receiver: &mut StatusReceiver, mut bytes: &[u8]) -> usize {
     core::iter::from_fn(|| receiver.next(&mut bytes)).count()
 }
@@ -32,7 +32,7 @@ fn j08_a_wrong_crc_is_counted_once() {
     assert_eq!(counters.skipped_bytes, 2 * STATUS_LEN as u64);
 }
 
-/// A line that was closed and opened again: the half of a status before belongs to nothing that comes after.
+/// A line was closed and opened again: half of a status before does not belong to the bytes after.
 #[test]
 fn j08_what_is_held_can_be_forgotten() {
     let mut receiver = StatusReceiver::new();

@@ -52,7 +52,7 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// Masks and texts of a word are one table: those of the protocol.
+/// Masks and texts of a word are in one table, that of the protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {
     let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -228,7 +228,7 @@ fn a_node_says_all_that_is_wrong_with_it() {
     );
 }
 
-/// The pieces are the capture, its good frames are found, and what is between them is one piece.
+/// The pieces add up to the capture, its good frames are found, and the bytes between two of them are one piece.
 #[test]
 fn a_capture_in_pieces() {
     let status = Status::default().emit();

@@ -1,8 +1,8 @@
-//! The arm image: one arm as one thing (J-54), as it is stored, read back and hashed.
+//! The arm image (J-54): all parameters of an arm in one block of bytes, which is stored, read back and hashed.
 use super::{NAME_LEN, Name, VALUE_LEN, Values};
 use crate::command::Floats;
 
-/// Where the parts are.
+/// Positions of the parts in the image.
 pub mod field {
     use core::ops::Range;
 
@@ -20,8 +20,8 @@ pub mod field {
     pub const PID: Range<usize> = 8..128;
     /// The body of an ArmModel frame.
     pub const MODEL: Range<usize> = 128..660;
-    /// Here the body of a FrictionPolynomial frame of six coefficients, or of a FrictionTable frame, begins; then come the
-    /// settings, each as in a SetSettings frame, then the name.
+    /// First byte of the friction: the body of a FrictionPolynomial frame of six coefficients, or of a FrictionTable frame. The settings
+    /// follow, each as in a SetSettings frame, then the name.
     pub const FRICTION: usize = 660;
     /// Bytes of the polynomials.
     pub const POLYNOMIAL_LEN: usize = 144;
@@ -29,7 +29,7 @@ pub mod field {
     pub const TABLE_LEN: usize = 10_560;
 }
 
-/// Longest image: what a slot of the board's flash is given.
+/// Longest image, for which each slot of the board's flash has space.
 pub const IMAGE_MAX: usize = 12 * 1024;
 
 /// Friction in an image.
@@ -57,7 +57,7 @@ pub struct ArmImage<'a> {
 }
 
 impl<'a> ArmImage<'a> {
-    /// `None` when the bytes are no image of this version, or longer or shorter than one.
+    /// Parses an image. Returns `None` if the bytes are not an image of this version, or if their length is wrong.
     pub fn parse(bytes: &'a [u8]) -> Option<Self> {
         let (magic, _) = bytes.split_first_chunk::<4>()?;
         if *magic != field::MAGIC || *bytes.get(field::VERSION_AT)? != field::VERSION {
@@ -87,18 +87,18 @@ impl<'a> ArmImage<'a> {
     }
 }
 
-/// Hash of an arm image without its name: of all that decides how the arm moves (J-52). FNV-1a with 64 bits (RFC 9923), fed in any
-/// pieces. It distinguishes arms that differ by accident, not by malice.
+/// Hash of an arm image without its name, and thus of all parameters that decide how the arm moves (J-52). The hash is FNV-1a with 64 bits
+/// (RFC 9923); the bytes can be fed in pieces of any length. The hash distinguishes arms that differ by accident, not by malice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hash(u64);
 
 impl Hash {
-    /// Of nothing.
+    /// Returns the hash of no bytes.
     pub const fn new() -> Self {
         Self(0xCBF2_9CE4_8422_2325)
     }
 
-    /// Of all so far and of `bytes`.
+    /// Continues the hash over `bytes`.
     pub fn update(self, bytes: &[u8]) -> Self {
         Self(
             bytes
@@ -107,12 +107,12 @@ impl Hash {
         )
     }
 
-    /// The number.
+    /// Returns the hash as a number.
     pub const fn value(self) -> u64 {
         self.0
     }
 
-    /// Of a whole image.
+    /// Returns the hash of a whole image, without its name.
     pub fn of_image(bytes: &[u8]) -> u64 {
         Self::new().update(bytes.get(..bytes.len().saturating_sub(NAME_LEN)).unwrap_or(&[])).value()
     }

@@ -1,4 +1,4 @@
-//! Who a device is, and what it runs (J-52).
+//! Identity of a device and of its firmware (J-52).
 use core::fmt;
 
 use super::reactions::{REACTIONS_LEN, Reactions};
@@ -8,7 +8,7 @@ use crate::code::codes;
 use crate::frame::FRAME_MIN;
 use crate::words::{self, Bits};
 
-/// Least bytes of an [`Info`]; later versions are longer.
+/// Minimum length of an [`Info`]; later versions are longer.
 pub const INFO_LEN: usize = 136;
 /// Bytes of an [`Info`] as this version writes it.
 pub const INFO_WRITTEN: usize = 168;
@@ -17,7 +17,7 @@ pub const SIMULATOR: &str = "simulator";
 /// Bytes of the firmware's version, and of its revision.
 const SHORT_TEXT: usize = 16;
 
-/// Where the parts are, from the first byte of the body.
+/// Positions of the parts, counted from the first byte of the body.
 mod field {
     use core::ops::Range;
 
@@ -34,7 +34,7 @@ mod field {
     pub const STORE: usize = 33;
     pub const SEQUENCE: Range<usize> = 34..38;
     pub const LOG: usize = 38;
-    // A byte is zero.
+    // Byte 39 is zero.
     pub const NAME: Range<usize> = 40..72;
     pub const FIRMWARE: Range<usize> = 72..88;
     pub const REVISION: Range<usize> = 88..104;
@@ -46,7 +46,7 @@ mod field {
     pub const REACTIONS: Range<usize> = 144..168;
 }
 
-/// What a device can do beyond version 1 of the extensions, one bit each.
+/// Capabilities of a device beyond version 1 of the extensions, one bit each.
 pub mod capability {
     /// Settings, names and reading back the arm (J-53, J-54).
     pub const SETTINGS: u32 = 1;
@@ -94,7 +94,7 @@ codes! {
     }
 }
 
-/// What stands in the flash that the device runs from, as it read it at its start (J-67).
+/// Program in the flash that the device runs from, as the device read it at its start (J-67).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Program {
     /// Bytes of the program from the first byte of the flash on.
@@ -109,7 +109,7 @@ impl fmt::Display for Program {
     }
 }
 
-/// What GetInfo returns (J-52).
+/// Answer to GetInfo (J-52).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
     /// Version of the extensions.
@@ -118,23 +118,23 @@ pub struct Info {
     pub missing: u8,
     /// Nodes that are not ready: bits of [`crate::words::NODES`].
     pub nodes_missing: u8,
-    /// Why it started last.
+    /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// How often it has started, as far as it knows.
+    /// Number of starts, as far as the device knows.
     pub boots: u32,
-    /// Time since then, ms.
+    /// Time since the last start, ms.
     pub uptime_ms: u64,
     /// Response records lost because too many waited (J-04).
     pub lost_records: u32,
-    /// Hash of all that decides how the arm moves ([`super::Hash`]).
+    /// Hash of all parameters that decide how the arm moves ([`super::Hash`]).
     pub hash: u64,
     /// Bits of [`capability`].
     pub capabilities: u32,
-    /// The UseDefault frames mean a stored arm, not the one that is built in.
+    /// Set if the UseDefault frames select the stored arm instead of the built-in one.
     pub defaults_stored: bool,
-    /// The memory of the stored arm.
+    /// State of the memory for the stored arm.
     pub store: StoreState,
-    /// Number of the stored arm: each store counts up.
+    /// Number of the stored arm; each store increments it.
     pub sequence: u32,
     /// The flight recorder.
     pub log: LogState,
@@ -142,13 +142,13 @@ pub struct Info {
     pub arm: Name,
     /// Version of the firmware.
     pub firmware: [u8; SHORT_TEXT],
-    /// Its git revision.
+    /// Git revision of the firmware.
     pub revision: [u8; SHORT_TEXT],
     /// The board.
     pub board: Name,
-    /// Its program in flash; `None` where the device does not report it.
+    /// Program in flash; `None` if the device does not report it.
     pub program: Option<Program>,
-    /// Its reactions; `None` where the device does not report them (J-69).
+    /// Reactions of the controller; `None` if the device does not report them (J-69).
     pub reactions: Option<Reactions>,
 }
 
@@ -178,7 +178,7 @@ impl Default for Info {
     }
 }
 
-/// As much of a text as fits, filled up with zeros.
+/// Returns as much of a text as fits, filled up with zeros.
 pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     let mut bytes = [0; SHORT_TEXT];
     for (to, from) in bytes.iter_mut().zip(text.bytes()) {
@@ -187,7 +187,7 @@ pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     bytes
 }
 
-/// The text, as far as it is one.
+/// Returns the text up to the first zero, or `?` if it is not valid UTF-8.
 fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
     let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(SHORT_TEXT);
     bytes.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or("?")
@@ -210,12 +210,12 @@ impl Info {
         text(&self.revision)
     }
 
-    /// Version of the firmware and, where it has one, its Git revision in brackets: as every program shows it.
+    /// Returns the version of the firmware, followed by its Git revision in brackets if it has one. Every program shows it like this.
     pub fn firmware_and_revision(&self) -> impl fmt::Display + '_ {
         FirmwareAndRevision(self)
     }
 
-    /// The body of its frame.
+    /// Returns the body of an Info frame.
     pub fn emit(&self) -> [u8; INFO_WRITTEN] {
         use field::*;
         let mut b = [0; INFO_WRITTEN];
@@ -244,12 +244,12 @@ impl Info {
         b
     }
 
-    /// From the body of its frame; what a later version adds is passed over, and a cause or a state that this version does not
-    /// know reads as not known. `None` when it is too short or a name is none.
+    /// Parses the body of an Info frame. Bytes that a later version adds are ignored. A cause or a state that this version does not know
+    /// reads as the default of its type. Returns `None` if the body is too short or a name is not valid.
     pub fn parse(body: &[u8]) -> Option<Self> {
         use field::*;
         let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
-        // Zero where the body of an earlier version ends before it (J-67).
+        // Zero if the body is of an earlier version and ends before this word (J-67).
         let word = |at: core::ops::Range<usize>| {
             body.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
         };

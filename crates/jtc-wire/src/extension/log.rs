@@ -5,11 +5,11 @@ use super::ANSWER_MAX;
 use crate::code::codes;
 use crate::frame::FRAME_MIN;
 
-/// Bytes in front of those of the log.
+/// Bytes in the body before those of the log.
 pub(crate) const LOG_HEAD_LEN: usize = 17;
 /// Most bytes of the log in a Log frame: whole words.
 pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
-/// Block in a GetLog that no log has: it returns where the log is, and not one of its bytes.
+/// Block number that no log has: a GetLog with it returns the extent of the log, but none of its bytes.
 pub const LOG_NO_BLOCK: u32 = u32::MAX;
 
 codes! {
@@ -25,27 +25,27 @@ codes! {
     }
 }
 
-/// What GetLog returns: bytes of one block of the log.
+/// Answer to GetLog: bytes of one block of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogPage<'a> {
-    /// What the recorder does.
+    /// State of the recorder.
     pub state: LogState,
-    /// Number of the block: that which was asked for, or the oldest when that is not there any more.
+    /// Number of the block: the requested one, or the oldest if the requested one no longer exists.
     pub block: u32,
-    /// Where in the block these bytes are.
+    /// Position of these bytes in the block.
     pub offset: u16,
-    /// Number behind that of the newest block.
+    /// Number after that of the newest block.
     pub end: u32,
     /// Points of the trajectory in the memory of the device.
     pub points: u16,
-    /// Their hash.
+    /// Hash of those points.
     pub points_hash: u32,
     /// The bytes; none past the end of the log.
     pub bytes: &'a [u8],
 }
 
 impl<'a> LogPage<'a> {
-    /// What is in front of the bytes.
+    /// Returns the part of the body before the bytes of the log.
     pub(crate) fn head(&self) -> [u8; LOG_HEAD_LEN] {
         let [a, b, c, d] = self.block.to_be_bytes();
         let [e, f] = self.offset.to_be_bytes();
@@ -55,7 +55,7 @@ impl<'a> LogPage<'a> {
         [self.state as u8, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p]
     }
 
-    /// From the body of a frame; `None` when it is too short, or its state is none.
+    /// Parses the body of a Log frame. Returns `None` if it is too short or its state is not known.
     pub(crate) fn parse(body: &'a [u8]) -> Option<Self> {
         let (head, bytes) = body.split_first_chunk::<LOG_HEAD_LEN>()?;
         let [state, a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = *head;

@@ -41,18 +41,18 @@ codes! {
 /// Why the arm came to a held stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopCause {
-    /// What was found.
+    /// Kind of the cause.
     pub kind: StopKind,
-    /// The joint from 1 that it was found of first; 0: of none in particular.
+    /// First joint for which the cause was found, from 1; 0 if the cause belongs to no particular joint.
     pub joint: u8,
-    /// The value that was found: N·m, rad, rad/s or rad/s², by its kind; a factor of [`StopKind::SpeedScale`].
+    /// Value that was found, in the unit of its kind: N·m, rad, rad/s or rad/s². For [`StopKind::SpeedScale`] it is a factor.
     pub value: f32,
-    /// What it is allowed to be; 0 where there is no limit.
+    /// Limit of the value; 0 if the value has no limit.
     pub limit: f32,
 }
 
 impl StopKind {
-    /// Unit of value and limit; empty where they have none.
+    /// Returns the unit of value and limit; empty if they have none.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Overload | Self::Push | Self::Unstable => "N·m",
@@ -63,7 +63,8 @@ impl StopKind {
         }
     }
 
-    /// The first of the joint errors that shows one of the path's limits; a position error and a torque are told apart elsewhere.
+    /// Returns the kind for the first joint error that stands for a limit of the path. Position errors and torques are distinguished
+    /// elsewhere.
     pub const fn of_limit(joint_error: u16) -> Self {
         if joint_error & joint_error::POSITION != 0 {
             Self::Position
@@ -124,10 +125,11 @@ impl fmt::Display for StopCause {
     }
 }
 
-/// What the controller does about what it has found, and why (J-69).
+/// Reactions of the controller to what it has found, and the cause of its last held stop (J-69).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reactions {
-    /// The last held stop, and how long ago it began, ms; `None` when there was none since the start or the last ClearOccurredErrors.
+    /// Cause of the last held stop, and the time since that stop began, ms. `None` if no held stop has occurred since the start or the last
+    /// ClearOccurredErrors.
     pub stop: Option<(StopCause, u32)>,
     /// Joints that yield or lower their loads: a bit for each.
     pub yields: u8,
@@ -143,7 +145,7 @@ pub struct Reactions {
 pub(super) const REACTIONS_LEN: usize = 24;
 
 impl Reactions {
-    /// On the wire.
+    /// Returns the bytes on the wire.
     pub(super) fn emit(&self) -> [u8; REACTIONS_LEN] {
         let (cause, ms) = self.stop.unwrap_or_default();
         let kind = if self.stop.is_some() { cause.kind as u8 } else { 0 };
@@ -157,7 +159,7 @@ impl Reactions {
         b
     }
 
-    /// From the wire; a kind that this version does not know is none.
+    /// Parses the reactions from the wire. If this version does not know the kind, `stop` is `None`.
     pub(super) fn parse(b: &[u8; REACTIONS_LEN]) -> Self {
         let word = |at: usize| {
             let bytes = b.get(at..).and_then(|bytes| bytes.first_chunk());

@@ -32,7 +32,7 @@ fn j52_an_info_comes_back_as_it_was_sent() {
     let frame = FrameRef::new_checked(&out[..n]).unwrap();
     assert_eq!(Answer::parse(frame), Some(Answer::Info(info())));
     assert_eq!((info().firmware(), info().revision()), ("0.1.0", "4334c10b6b9b1d2d"));
-    // What a later version adds is passed over; one that is too short is none.
+    // Bytes that a later version adds are ignored. A body that is too short is not valid.
     let body = [&info().emit()[..], &[1, 2, 3]].concat();
     assert_eq!(Info::parse(&body), Some(info()));
     assert_eq!(Info::parse(&body[..INFO_LEN - 1]), None);
@@ -47,7 +47,7 @@ fn j67_an_info_of_before_has_no_program() {
     assert_eq!(Info::parse(&body), Some(info));
     let before = Info { program: None, ..info };
     assert_eq!(Info::parse(&before.emit()), Some(before));
-    // A device of before sends 136 bytes. What ends within the new ones is no program either.
+    // An older device sends 136 bytes. A body that ends within the new bytes also has no program.
     for end in INFO_LEN..144 {
         assert_eq!(Info::parse(&body[..end]), Some(before), "{end}");
     }

@@ -1,9 +1,9 @@
-//! A second stream parser: slow, with the whole stream at hand, made to be seen to be right.
+//! A second stream parser, slow and with the whole stream at hand, so that a reader can see that it is right.
 use std::vec::Vec;
 
 use crate::{FrameRef, FrameStatus, Response};
 
-/// What was found.
+/// An event of the stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// Bytes of a good frame.
@@ -12,12 +12,12 @@ pub enum Event {
     Bad(Response),
 }
 
-/// Events of a stream; `regions` are its parts between gaps, `capacity` the longest frame that can be held.
+/// Returns the events of a stream; `regions` are its parts between gaps, `capacity` the longest frame that can be held.
 pub fn events(regions: &[Vec<u8>], capacity: usize) -> Vec<Event> {
     placed_events(regions, capacity).into_iter().map(|(_, event)| event).collect()
 }
 
-/// The same, each with the place of its first byte in the stream.
+/// Like `events`, with the position in the stream of the first byte of each event.
 pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, Event)> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -28,7 +28,7 @@ pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, E
     all
 }
 
-/// Where in the stream each Stop and each Pause ends, wherever it stands.
+/// Returns the positions in the stream at which a Stop or a Pause ends, also inside other frames.
 pub(super) fn urgent_ends(regions: &[Vec<u8>]) -> Vec<u64> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -61,7 +61,7 @@ fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
     found
 }
 
-/// Length of the good frame at the front.
+/// Returns the length of the good frame at the front.
 fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
     let frame = FrameRef::new_checked(bytes.get(..n)?)?;
@@ -69,7 +69,7 @@ fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     (!of_device && n <= capacity).then_some(n)
 }
 
-/// What is wrong with bytes that begin no good frame and end in a gap.
+/// Returns the record of bytes that do not begin with a good frame and end at a gap.
 fn judge(bytes: &[u8], capacity: usize) -> Response {
     let record = |kind, status, length: usize| Response::bad(kind, status, length as u16);
     if bytes[0] != 0x9B {

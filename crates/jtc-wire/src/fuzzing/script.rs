@@ -12,7 +12,7 @@ enum Step {
     Bytes(Vec<u8>),
     /// µs without a byte.
     Silence(u64),
-    /// From now on each event is kept for so many pushes.
+    /// From now on each event is kept for this number of pushes.
     Hold(u8),
     /// From now on bytes come in pieces of this length.
     Pieces(usize),
@@ -109,11 +109,11 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// A receiver and what came out of it.
+/// A receiver and the events that it has found.
 struct Driver {
     receiver: Receiver<Vec<u8>>,
     now: u64,
-    /// When the last byte came.
+    /// Time of the last byte, µs.
     last: u64,
     hold: u8,
     /// Pushes until the present event is released.
@@ -124,7 +124,7 @@ struct Driver {
     watch: UrgentWatch<1>,
     /// Time of the watch, which sees bytes as they arrive, however slow the reader is.
     arrived_us: u64,
-    /// Where Stops and Pauses ended.
+    /// Positions at which Stops and Pauses ended.
     urgent: Vec<u64>,
     urgent_count: usize,
     bytes: usize,
@@ -169,7 +169,7 @@ impl Driver {
         }
     }
 
-    /// In the pieces of the reader the watch must see what it would see in the whole.
+    /// Feeds the watch in the pieces of the reader. The watch must find the same commands as in the whole stream.
     fn watch(&mut self, bytes: &[u8]) {
         self.arrived_us +=
             if self.now - self.last >= INTER_BYTE_TIMEOUT_US { INTER_BYTE_TIMEOUT_US } else { 0 };
@@ -181,7 +181,7 @@ impl Driver {
             let ends: Vec<u64> = (before + 1..=before + piece.len() as u64)
                 .filter(|end| self.watch.overtaken(0, end - 1))
                 .collect();
-            // The last one is what is overtaken; the others only count.
+            // Only the last command sets the overtaken position; the others only count.
             self.urgent.extend(ends.last().filter(|_| count > 0));
             self.urgent_count += count;
         }
@@ -215,12 +215,12 @@ impl Driver {
     }
 }
 
-/// The bytes of such a script, cut where it has gaps, for those who have a line and a receiver of their own.
+/// Returns the bytes of such a script, cut at its gaps, for tests that have their own line and receiver.
 pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
     let mut reader = Reader(data);
     reader.byte();
     let mut regions = vec![Vec::new()];
-    // From the last byte on.
+    // Silence since the last byte, µs.
     let mut silence = 200;
     while !reader.0.is_empty() && regions.iter().map(Vec::len).sum::<usize>() < 150_000 {
         match reader.step() {
@@ -239,7 +239,8 @@ pub fn stream_regions(data: &[u8]) -> Vec<Vec<u8>> {
     regions
 }
 
-/// First byte: size of the buffer. Then steps. The receiver must find what the reference finds in the whole stream.
+/// Runs a script: the first byte selects the size of the buffer, then steps follow. The receiver must find the events that the reference
+/// finds in the whole stream.
 pub fn stream_parser(data: &[u8]) {
     const CAPACITY: [usize; 5] = [64, 256, 1500, 11_000, crate::FRAME_MAX];
     let mut reader = Reader(data);

@@ -5,7 +5,7 @@ use std::vec::Vec;
 use super::sealed;
 use crate::{Answer, FrameRef, FrameType, Status, StatusReceiver};
 
-/// The statuses of a whole stream, each at the first place where one begins, and the bytes between them.
+/// Returns the statuses of a whole stream, each at the first position at which one begins, and the number of bytes between them.
 fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     let (mut found, mut skipped, mut at) = (Vec::new(), 0, 0);
     while at < stream.len() {
@@ -32,7 +32,7 @@ fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     (found, skipped)
 }
 
-/// First byte: length of the pieces. Then steps: statuses from some bytes, broken ones, noise.
+/// Runs a script: the first byte is the length of the pieces, then steps follow: statuses made of some bytes, broken statuses, noise.
 pub fn status_stream(data: &[u8]) {
     let Some((piece, mut rest)) = data.split_first() else { return };
     let mut stream = Vec::new();
@@ -58,7 +58,7 @@ pub fn status_stream(data: &[u8]) {
             _ => stream.extend(bytes),
         }
     }
-    // So that a candidate at the end is decided.
+    // These bytes let the receiver decide a candidate at the end.
     stream.extend([0; 256]);
 
     let mut receiver = StatusReceiver::new();
@@ -75,7 +75,7 @@ pub fn status_stream(data: &[u8]) {
         assert!(piece.is_empty());
     }
     let (expected, skipped) = reference(&stream);
-    // Bytes, because a float that is no number equals nothing.
+    // Compares bytes, because a NaN does not equal itself.
     let bytes = |all: &[Status]| all.iter().map(|s| (s.emit(), s.gripper.is_some())).collect::<Vec<_>>();
     assert_eq!(bytes(&found), bytes(&expected));
     assert_eq!(receiver.counters().frames, expected.len() as u64);

@@ -22,7 +22,7 @@ impl Registers {
         Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
     }
 
-    /// Goes on over `bytes`, which are at `end..` of the buffer.
+    /// Continues over `bytes`, which are at `end..` of the buffer.
     pub fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let next = self.phase + self.count * GRID;
@@ -46,7 +46,7 @@ impl Registers {
         }
     }
 
-    /// The bytes before `by` go.
+    /// Drops the bytes before `by`.
     pub fn shift(&mut self, by: usize, buffer: &[u8]) {
         self.base = self.at(by, buffer);
         if by >= self.phase {

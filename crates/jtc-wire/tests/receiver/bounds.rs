@@ -44,7 +44,7 @@ fn a_frame_as_long_as_the_buffer_fits() {
     }
 }
 
-/// Each byte is copied once, when it arrives, unless the buffer has no room behind it.
+/// Each byte is copied once, when it arrives, unless the buffer has no space after the held bytes.
 #[test]
 fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);
@@ -66,7 +66,7 @@ fn j07_held_bytes_stay_where_they_are_while_there_is_room() {
     assert_ne!(place(&receiver), before);
 }
 
-/// A call of `poll` passes over at most 2,048 bytes, so that a tick is not held up (J-07).
+/// A call of `poll` skips at most 2,048 bytes, so that it does not delay a tick (J-07).
 #[test]
 fn j07_noise_is_passed_over_in_bounded_steps() {
     let mut receiver = receiver();

@@ -1,4 +1,4 @@
-//! Events that wait to be released, and what comes meanwhile.
+//! Events that wait for their release, and bytes that arrive meanwhile.
 use jtc_wire::{Command, FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, Response};
 
 use super::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
@@ -7,7 +7,7 @@ use super::{INTER_BYTE_TIMEOUT_US, ON, receiver, segment};
 fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     let mut receiver = receiver();
     let mut now = 0;
-    // More frames, each behind a gap, than gaps can be remembered: some are refused, none is lost.
+    // More frames, each after a gap, than the receiver can store gaps: some are refused, none is lost.
     let (mut sent, mut received) = (0, 0);
     while received < 500 {
         if sent < 500 && receiver.push(now, &ON) == ON.len() {
@@ -24,8 +24,8 @@ fn j04_an_event_stays_until_it_is_released_and_bytes_queue_behind_it() {
     assert!(!receiver.poll(now + 10_000));
 }
 
-/// Halves of frames, each behind a gap: none may be joined to another, not even those that had to be offered twice because
-/// there were too many gaps to remember.
+/// Halves of frames, each after a gap. None may be joined to another, not even those that were offered twice because the list of gaps was
+/// full.
 #[test]
 fn j05_gaps_are_never_forgotten() {
     for first in 0..2 {
@@ -68,7 +68,7 @@ fn j04_silence_behind_a_held_event_is_one_gap() {
     assert_eq!(receiver.push(1_000_000, &ON), 6);
 }
 
-/// A reader slower than a gap: the rest of a piece is offered late, the frame is whole all the same.
+/// A reader is slower than a gap: the remainder of a piece is offered late, but the frame is still complete.
 #[test]
 fn j03_a_slow_reader_is_no_gap() {
     let mut receiver = receiver();
@@ -139,8 +139,8 @@ fn a_short_buffer() {
     panic!("the frame was not found");
 }
 
-/// Bytes were lost in front of the rest of a frame: that has one record (J-04), the rest is no frame, and the next frame is
-/// found at its true place.
+/// Bytes were lost before the remainder of a frame. The loss has one record (J-04), the remainder does not count as a frame, and the next
+/// frame is found at its true position.
 #[test]
 fn j04_lost_bytes_have_one_record_and_are_not_joined_across() {
     let mut receiver = receiver();

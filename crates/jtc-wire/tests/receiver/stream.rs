@@ -27,7 +27,7 @@ impl Line {
         Line { receiver: receiver(), now: 1_000_000 }
     }
 
-    /// All bytes at once, and the events of them.
+    /// Sends all bytes at once and returns their events.
     fn send(&mut self, bytes: &[u8]) -> Vec<Received> {
         self.now += 100;
         assert_eq!(self.receiver.push(self.now, bytes), bytes.len());
@@ -87,7 +87,7 @@ fn j03_several_frames_in_one_piece() {
 #[test]
 fn j02_the_longest_frame() {
     let mut line = Line::new();
-    // In front of it something that leaves no room at the buffer's end.
+    // A frame before the longest one leaves too little space at the end of the buffer.
     assert_eq!(line.send(&ON), [GOOD_ON]);
     let frame = segment(1666);
     assert_eq!(line.send(&frame), [Good(FrameType::Trajectory, 59_990)]);
@@ -168,7 +168,7 @@ fn j05_gap() {
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
 
-/// The bytes after a gap may come before anyone looked.
+/// The bytes after a gap may come before the next call of `poll`.
 #[test]
 fn j05_gap_seen_with_the_next_bytes() {
     for (us, expected) in
@@ -194,7 +194,7 @@ fn j07_glitches() {
 #[test]
 fn j03_a_false_header_costs_no_frame() {
     let mut line = Line::new();
-    // It announces 59,990 bytes and swallows what follows until a gap.
+    // The header announces 59,990 bytes and takes the bytes that follow, until a gap.
     assert_eq!(line.send(&[HEADER, 0x04, 0xEA, 0x56]), []);
     assert_eq!(line.send(&ON), []);
     assert_eq!(line.send(&fixed::STOP), []);
@@ -212,7 +212,7 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// A cut frame, and the whole one behind it without a gap.
+/// A frame with a lost byte, followed by the whole frame without a gap.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);
@@ -250,10 +250,10 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line is plain 2 s after an extension request, counted to the first byte of a frame, however long that is.
+/// A line is plain 2 s after an extension request, counted to the first byte of a frame of any length.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
-    // Whether the line was plain for each frame that is complete.
+    // Returns for each complete frame whether the line was plain.
     let plain = |line: &mut Line, bytes: &[u8]| -> Vec<bool> {
         assert_eq!(line.receiver.push(line.now, bytes), bytes.len());
         let mut all = Vec::new();
@@ -305,7 +305,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         line.now += 10_000;
         assert_eq!(plain(&mut line, &fixed::STOP), [!shows], "{bytes:x?}");
     }
-    // Behind noise, and behind other frames in the same piece.
+    // After noise, and after other frames in the same piece.
     let mut line = Line::new();
     let bytes =
         [&[7, 7, 0x9B][..], &fixed::STOP, &fixed::GET_INFO, &fixed::STOP, &segment(500), &ON].concat();

@@ -1,10 +1,10 @@
-//! What nodes send: [`Answer`].
+//! Frames that nodes send: [`Answer`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE, from_i16, from_i32, to_i16, to_i32};
 use crate::{GRIPPER, NODES, NodeState, id};
 
-/// Places in the payloads of answers to Move.
+/// Positions in the payloads of answers to Move.
 mod field {
     /// i32.
     pub const POSITION: usize = 0;
@@ -34,7 +34,7 @@ pub struct JointReport {
     pub position: f64,
     /// rad/s.
     pub velocity: f64,
-    /// N·m; its sign is the command's (J-16).
+    /// N·m; its sign is that of the command (J-16).
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: u8,
@@ -69,7 +69,7 @@ pub struct GripperReport {
     pub warnings: u8,
 }
 
-/// What nodes answer; `parse` for the controller, `emit` for nodes.
+/// Answer of a node. The controller uses `parse`, nodes use `emit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// 0x200+n.
@@ -98,7 +98,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// Node that answered, 0..6.
+    /// Returns the node that answered, 0..6.
     pub const fn node(&self) -> u8 {
         match self {
             Self::Joint { node, .. } | Self::State { node, .. } | Self::Mode { node, .. } => *node,
@@ -106,7 +106,7 @@ impl Answer {
         }
     }
 
-    /// Controller side. Inlined, so that a report is not stored by bytes and copied by words, which a PC waits for.
+    /// Parses an answer, on the controller. Inlined, so that a report is not stored by bytes and copied by words, which stalls a PC.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
@@ -133,9 +133,9 @@ impl Answer {
         }
     }
 
-    /// Node side; joint reports with a motor temperature have 20 bytes, else 16; values saturate.
+    /// Returns the frame of the answer, on a node. Joint reports have 20 bytes if they have a motor temperature, else 16. Values saturate.
     ///
-    /// A node number that does not exist is sent as 15, which the controller does not listen to.
+    /// A node number that does not exist is sent as 15, which the controller ignores.
     pub fn emit(&self, scale: Scale) -> Frame {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),
@@ -172,7 +172,7 @@ fn joint(frame: &Frame, scale: Scale) -> JointReport {
 }
 
 fn emit_joint(node: u8, report: &JointReport, scale: Scale) -> Frame {
-    // Number 6 is the gripper: a joint that claims it must not be taken for one.
+    // Number 6 is the gripper: a joint that claims this number must not be taken for the gripper.
     let node = if usize::from(node) == GRIPPER { u8::MAX } else { node };
     let id = id::answer(id::MOVE, node);
     let mut frame = match report.motor_temperature {

@@ -89,7 +89,7 @@ bit_words! {
     }
 }
 
-/// Texts of the set bits, separated by commas; `-` when there is none, `bit N` for a bit without a text.
+/// Texts of the set bits, separated by commas; `-` if no bit is set, `bit N` for a bit without a text.
 ///
 /// ```
 /// use jtc_bus::{Bits, warning};
@@ -100,7 +100,7 @@ bit_words! {
 pub struct Bits<'a>(pub u32, pub &'a [&'a str]);
 
 impl<'a> Bits<'a> {
-    /// Number and text of each set bit; the text is empty when the list has none.
+    /// Returns the number and the text of each set bit; the text is empty if the list has none.
     pub fn iter(&self) -> impl Iterator<Item = (u32, &'a str)> + use<'a> {
         let (word, names) = (self.0, self.1);
         (0..u32::BITS)

@@ -5,7 +5,7 @@ use core::fmt::{Display, Formatter, Result};
 use crate::{Answer, Bits, Frame, GRIPPER, GripperReport, Joint, JointReport, Request, Scale, Target};
 use crate::{config, error, id, motor_control, warning};
 
-/// Any frame of the bus, decoded; one that is not understood is shown with the reason and its bytes.
+/// A decoded frame of the bus. A frame that is not understood is shown with the reason and its bytes.
 ///
 /// ```
 /// use jtc_bus::{Decoded, Request, Scale};
@@ -34,7 +34,7 @@ impl Display for Decoded<'_> {
 }
 
 impl Display for Frame {
-    /// As [`Decoded`] with the usual scale.
+    /// Shows the frame like [`Decoded`] with the default scale.
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         Decoded { frame: self, scale: Scale::default() }.fmt(f)
     }
@@ -130,7 +130,7 @@ impl Display for Answer {
     }
 }
 
-/// Names what is set; nothing when nothing is.
+/// Writes the names of the set bits; writes nothing if no bit is set.
 fn report_bits(f: &mut Formatter<'_>, title: &str, bits: u8, names: &[&str]) -> Result {
     if bits == 0 {
         return Ok(());

@@ -1,4 +1,4 @@
-//! How long a frame occupies the bus.
+//! Time for which a frame occupies the bus.
 
 use crate::frame::Frame;
 use crate::timing::{DATA_BIT_RATE, NOMINAL_BIT_RATE};
@@ -10,15 +10,14 @@ const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// The delimiter after the checksum. Its two parts are sent at different rates, as are those of the bit where
-/// the rate goes up; both change over at the same share of the bit: one counts as nominal, one as data bit.
+/// The delimiter after the checksum. The bit rate changes within this bit, and within the bit at which the rate rises. Both change at the
+/// same share of the bit, so one of them counts as a nominal bit and the other as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
-/// Nanoseconds from the start of the frame until the next may start (intermission included), with rates as in
+/// Returns the nanoseconds from the start of the frame until the next may start (intermission included), with the rates of
 /// [`timing`](crate::timing).
 ///
-/// This is no estimate: the stuff bits are those of this very payload. Not included are repetitions and error
-/// frames.
+/// The result is exact: it has the stuff bits of this payload. Repetitions and error frames are not included.
 pub fn duration_ns(frame: &Frame) -> u32 {
     let mut stuffer = Stuffer::default();
     // Start, identifier, RRS, IDE, FDF, reserved, BRS.
@@ -33,13 +32,13 @@ pub fn duration_ns(frame: &Frame) -> u32 {
         stuffer.push(u32::from(*byte), 8);
     }
     let crc_bits = STUFF_COUNT_BITS + if frame.data().len() <= 16 { 17 } else { 21 };
-    // A fixed stuff bit stands before the stuff count and after every four bits from there on.
+    // A fixed stuff bit is sent before the stuff count and after every four bits that follow.
     let fixed_stuff_bits = 1 + crc_bits / 4;
     let data = stuffer.bits - before + crc_bits + fixed_stuff_bits + CRC_DELIMITER_BITS;
     nominal * NOMINAL_NS + data * DATA_NS
 }
 
-/// Counts bits as sent: after five equal ones comes one of the other kind.
+/// Counts bits as sent: five equal bits are followed by a bit of the other kind.
 #[derive(Default)]
 struct Stuffer {
     bits: u32,
@@ -50,7 +49,7 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // The stuff bit is due before the next bit; behind the last of all the fixed one takes its place.
+            // The stuff bit is due before the next bit. After the last bit of the payload the fixed stuff bit takes its place.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);
@@ -81,7 +80,7 @@ mod tests {
     #[test]
     fn j10_stuff_bits_are_those_of_the_payload() {
         // Start and id: 12 zeros with RRS and IDE make 14, two stuff bits. FDF 1, reserved 0, BRS 1. ESI 0,
-        // length 1010, then 128 zeros behind the 0 of the length: 129 zeros, 25 stuff bits.
+        // length 1010, then 128 zeros after the 0 of the length: 129 zeros, 25 stuff bits.
         let frame = Frame::new(0x000, &[0; 16]).unwrap();
         assert_eq!(duration_ns(&frame), (29 + 2) * 1_000 + (1 + 4 + 128 + 21 + 6 + 1 + 25) * 200);
     }

@@ -1,4 +1,4 @@
-//! A frame of the bus and why one is not understood.
+//! A frame of the bus, and the reasons why a frame is not understood.
 
 use crate::id;
 
@@ -36,8 +36,7 @@ impl Format {
 }
 
 impl Frame {
-    /// `None` when `data` has a length that no frame of this bus can have (0..8, 12, 16, 20, 24) or `id` has
-    /// more than 11 bits.
+    /// Creates a frame. Returns `None` if `data` does not have a length of this bus (0..8, 12, 16, 20, 24) or `id` has more than 11 bits.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF || dlc_of(data.len()).is_none() {
             return None;
@@ -51,7 +50,7 @@ impl Frame {
         Some(frame)
     }
 
-    /// A frame received on a bus that others may use, too.
+    /// Creates a frame from one that was received on a bus which other protocols may share.
     ///
     /// # Errors
     ///
@@ -65,7 +64,7 @@ impl Frame {
         Self::new(short, data).ok_or(wrong)
     }
 
-    /// `len` must be one of CAN FD; only for the encoders of this crate.
+    /// Creates a frame of zeros, for the encoders of this crate. `LEN` must be a length of CAN FD.
     pub(crate) fn zeroed<const LEN: usize>(id: u16) -> Self {
         const { assert!(LEN <= MAX_LEN && dlc_of(LEN).is_some()) }
         Self { id: id & 0x7FF, len: LEN as u8, data: [0; MAX_LEN] }
@@ -78,7 +77,7 @@ impl Frame {
         }
     }
 
-    /// Bytes at a place; beyond the payload they are 0, as in a node's receive buffer.
+    /// Returns the bytes at a position; beyond the payload they are 0, as in a node's receive buffer.
     #[inline]
     pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
@@ -93,13 +92,13 @@ impl Frame {
         self.get::<1>(at)[0]
     }
 
-    /// The payload.
+    /// Returns the payload.
     #[inline]
     pub fn data(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// The payload as little-endian words, zeros behind its end.
+    /// Returns the payload as little-endian words, with zeros after its end.
     #[inline]
     pub fn words(&self) -> [u32; MAX_LEN / 4] {
         let mut words = [0; MAX_LEN / 4];
@@ -109,25 +108,25 @@ impl Frame {
         words
     }
 
-    /// Bytes of the payload.
+    /// Returns the number of bytes of the payload.
     #[inline]
     #[allow(clippy::len_without_is_empty, reason = "a frame is no collection")]
     pub fn len(&self) -> u8 {
         self.len
     }
 
-    /// The length code of the frame, 0..12.
+    /// Returns the length code of the frame, 0..12.
     pub fn dlc(&self) -> u8 {
         dlc_of(usize::from(self.len)).unwrap_or(0)
     }
 
-    /// The node number in the id, 0..15.
+    /// Returns the node number in the id, 0..15.
     pub fn node(&self) -> u8 {
         id::node(self.id)
     }
 
-    /// A frame from a length code as a CAN controller reports it; `None` when the code stands for more than
-    /// 24 bytes or for more than `data` has.
+    /// Creates a frame from a length code as a CAN controller reports it. Returns `None` if the code stands for more than 24 bytes, or for
+    /// more than `data` has.
     pub fn from_dlc(id: u16, dlc: u8, data: &[u8]) -> Option<Self> {
         Self::new(id, data.get(..len_of(dlc)?)?)
     }
@@ -141,7 +140,7 @@ impl Frame {
     }
 }
 
-/// Length code of a payload; `None` for a length that this bus has not.
+/// Returns the length code of a payload, or `None` for a length that this bus does not have.
 const fn dlc_of(len: usize) -> Option<u8> {
     match len {
         0..=8 => Some(len as u8),
@@ -153,7 +152,7 @@ const fn dlc_of(len: usize) -> Option<u8> {
     }
 }
 
-/// Payload length of a length code; `None` above 24 bytes.
+/// Returns the payload length of a length code, or `None` above 24 bytes.
 const fn len_of(dlc: u8) -> Option<usize> {
     match dlc {
         0..=8 => Some(dlc as usize),
@@ -165,7 +164,7 @@ const fn len_of(dlc: u8) -> Option<usize> {
     }
 }
 
-/// Why a frame was not understood; it is counted and ignored (J-15).
+/// Reason why a frame was not understood. Such a frame is counted and ignored (J-15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// No frame of this protocol has this id.

@@ -26,22 +26,23 @@ pub const FSM_ANSWER: u16 = answer(CHANGE_FSM, 0);
 /// Answers to ChangeMode of node 0; the others follow.
 pub const MODE_ANSWER: u16 = answer(CHANGE_MODE, 0);
 
-/// Id of the answer of `node` (0..6) to a request.
+/// Returns the id of the answer of `node` (0..6) to a request.
 pub const fn answer(request: u16, node: u8) -> u16 {
     request | on_wire(node) | RESPONSE
 }
 
-/// The request without its node: `R U cccc 0000`.
+/// Returns the request without its node: `R U cccc 0000`.
 pub const fn command(id: u16) -> u16 {
     id & !0x00F
 }
 
-/// The node number, 0..15.
+/// Returns the node number, 0..15.
 pub const fn node(id: u16) -> u8 {
     (id & 0x00F) as u8
 }
 
-/// Node bits for a node number; one that does not exist becomes 15, which no node has, never that of another node.
+/// Returns the node bits for a node number. A number that does not exist becomes 15, which no node has, and never the number of another
+/// node.
 pub(crate) const fn on_wire(node: u8) -> u16 {
     if (node as usize) < crate::NODES { node as u16 } else { 0x00F }
 }

@@ -1,10 +1,10 @@
-//! Which joint is meant: people count from 1, the bus from 0.
+//! Numbers of the joints: people count from 1, the bus from 0.
 use core::fmt;
 
 use crate::JOINTS;
 
-/// A joint of the arm. Texts, JSON values and files count joints from 1, the one at the base first; on the bus the same
-/// joint is the node with the number below, and arrays have it at that index. It prints as `joint 3`.
+/// A joint of the arm. Texts, JSON values and files count joints from 1, starting at the base. On the bus and in arrays the number is lower
+/// by one: joint 1 is node 0 and index 0. A joint prints as `joint 3`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Joint(u8);
 
@@ -12,22 +12,22 @@ impl Joint {
     /// All joints, base to wrist.
     pub const ALL: [Self; JOINTS] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
 
-    /// The joint with this number, 1..6; `None` for another number.
+    /// Returns the joint with this number, 1..6, or `None` for another number.
     pub fn from_number(number: usize) -> Option<Self> {
         number.checked_sub(1).and_then(Self::from_index)
     }
 
-    /// The joint at this index of an array, which is its node number, 0..5; `None` for another index.
+    /// Returns the joint at this index of an array, which is its node number, 0..5, or `None` for another index.
     pub fn from_index(index: usize) -> Option<Self> {
         Self::ALL.get(index).copied()
     }
 
-    /// Its number for people, 1..6.
+    /// Returns the number for people, 1..6.
     pub const fn number(self) -> u8 {
         self.0 + 1
     }
 
-    /// Its index in arrays, and its node number, 0..5.
+    /// Returns the index in arrays, which is also the node number, 0..5.
     pub const fn index(self) -> usize {
         self.0 as usize
     }
@@ -39,7 +39,7 @@ impl fmt::Display for Joint {
     }
 }
 
-/// As its number, 1..6.
+/// Serializes the joint as its number, 1..6.
 #[cfg(feature = "serde")]
 impl serde::Serialize for Joint {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

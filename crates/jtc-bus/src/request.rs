@@ -1,10 +1,10 @@
-//! What the controller sends: [`Request`].
+//! Frames that the controller sends: [`Request`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{TORQUE_FULL_SCALE, to_i16};
 use crate::{GRIPPER, JOINTS, NODES, NodeState, id};
 
-/// Places in the payloads of requests.
+/// Positions in the payloads of requests.
 mod field {
     /// Move: two bytes per joint from here.
     pub const TORQUE: usize = 0;
@@ -19,12 +19,12 @@ mod field {
     pub const MODE_LEN: usize = 16;
 }
 
-/// A state that can be requested of a node. There are no others (J-16): some drives take any other byte, such as
-/// their own state echoed, as a command to move.
+/// A state that the controller can request from a node. The controller sends no other bytes (J-16), because some drives take any other
+/// byte, such as an echo of their own state, as a command to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Target {
-    /// Stay as you are.
+    /// Keep the present state.
     #[default]
     NoChange = 0,
     /// Init; from Fault this acknowledges the faults.
@@ -36,10 +36,10 @@ pub enum Target {
 }
 
 impl Target {
-    /// The target of a byte on the wire.
+    /// Returns the target of a byte on the wire.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // Start is no target: its byte requests no change.
+            // Start cannot be requested: its byte requests no change.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -49,7 +49,7 @@ impl Target {
     }
 }
 
-/// What the controller sends; `emit` for the controller, `parse` for nodes.
+/// Request of the controller. The controller uses `emit`, nodes use `parse`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// 0x000: torque per joint (N·m, saturated when encoded, J-13; NaN is encoded as 0) and the pump.
@@ -80,12 +80,12 @@ pub enum Request {
 }
 
 impl Request {
-    /// All torques zero, pump as given: the first frame after an error (J-12).
+    /// Returns a Move with zero torques and the given state of the pump: the first frame after an error (J-12).
     pub const fn zero_torque(pump: bool) -> Self {
         Self::Move { torque: [0.0; JOINTS], pump }
     }
 
-    /// The frame on the bus.
+    /// Returns the frame on the bus.
     pub fn emit(&self) -> Frame {
         match self {
             Self::Move { torque, pump } => {
@@ -114,13 +114,13 @@ impl Request {
         }
     }
 
-    /// Node side (also used by bus monitors).
+    /// Parses a request, on a node or in a bus monitor.
     pub fn parse(frame: &Frame) -> Result<Request, FrameError> {
         match frame.id {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    // In the order in which drives compute it; no tick of the controller parses requests.
+                    // Computed in the same order as in the drives. The tick of the controller does not parse requests.
                     let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
                     f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });
@@ -152,7 +152,7 @@ impl Request {
         }
     }
 
-    /// Nodes answer this request; resets are not answered.
+    /// Returns true if nodes answer this request. Resets are not answered.
     pub const fn is_answered(&self) -> bool {
         !matches!(self, Self::ResetAll | Self::Reset(_))
     }

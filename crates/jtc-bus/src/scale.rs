@@ -14,7 +14,7 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Drives of today.
+    /// Current drives.
     pub const CURRENT: Self = Self { velocity: 2.0 };
     /// Older drives.
     #[expect(clippy::approx_constant, reason = "the drives' number, which is not 2π")]
@@ -27,19 +27,19 @@ impl Default for Scale {
     }
 }
 
-/// Nearest 16-bit value, within ±32767; NaN is 0.
+/// Returns the nearest 16-bit value, within ±32767; NaN is 0.
 #[inline]
 pub(crate) fn to_i16(value: f64, full_scale: f64) -> [u8; 2] {
     (nearest(value, full_scale, f64::from(i16::MAX)) as i16).to_be_bytes()
 }
 
-/// Nearest 32-bit value, within ±2147483647; NaN is 0.
+/// Returns the nearest 32-bit value, within ±2147483647; NaN is 0.
 pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// The quotient is taken first: it is the same for every answer of a tick, and a division takes the board as long as seven
-/// products.
+/// The quotient is computed first, because it is the same for every answer of a tick. On the board a division takes as long as seven
+/// multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
@@ -50,8 +50,8 @@ pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }
 
-/// `value` in units of the last bit, moved by half a unit so that the cast (which truncates and makes NaN 0)
-/// rounds. A nonsensical full scale (0, NaN) gives a saturated value or 0, never one of the other sign.
+/// Returns `value` in units of the last bit, moved by half a unit so that the cast (which truncates and makes NaN 0) rounds. An invalid
+/// full scale (0, NaN) gives a saturated value or 0, never a value of the other sign.
 fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
     let raw = value * (max / full_scale.abs());
     (raw + 0.5_f64.copysign(raw)).clamp(-max, max)

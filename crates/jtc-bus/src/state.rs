@@ -1,7 +1,7 @@
 //! States that nodes report.
 use core::fmt;
 
-/// State of a node, one byte: generations of drives know different ones.
+/// State of a node, one byte. Generations of drives have different states.
 ///
 /// ```
 /// use jtc_bus::NodeState;
@@ -35,27 +35,28 @@ impl NodeState {
     /// Fault.
     pub const FAULT: Self = Self(255);
 
-    /// The state of this byte.
+    /// Returns the state of this byte.
     pub const fn new(code: u8) -> Self {
         Self(code)
     }
 
-    /// The byte on the bus.
+    /// Returns the byte on the bus.
     pub const fn code(self) -> u8 {
         self.0
     }
 
-    /// Name as manuals have it, and as a status shows it.
+    /// Returns the name as in manuals and in a status.
     pub const fn name(self) -> &'static str {
         self.texts().0
     }
 
-    /// What the node does, for a log of the bus.
+    /// Returns a description of the node's activity, for a log of the bus.
     pub const fn description(self) -> &'static str {
         self.texts().1
     }
 
-    /// Generations of drives disagree about 14, 15 and 16: these mean only that the node is between two states.
+    /// Returns name and description. Generations of drives disagree about 14, 15 and 16, so these mean only that the node is between two
+    /// states.
     const fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::START => ("Start", "start"),
@@ -76,17 +77,17 @@ impl NodeState {
         }
     }
 
-    /// In Start, in Init, or between them.
+    /// Returns true in Start, in Init and between them.
     pub const fn is_starting(self) -> bool {
         matches!(self, Self::START | Self::INIT | Self::START_TO_INIT)
     }
 
-    /// Between two of its states (10..16).
+    /// Returns true between two states of the node (10..16).
     pub const fn is_transition(self) -> bool {
         matches!(self.0, 10..=16)
     }
 
-    /// In fault, or on its way there.
+    /// Returns true in Fault and in the fault reaction.
     pub const fn is_fault(self) -> bool {
         matches!(self, Self::FAULT_REACTION | Self::FAULT)
     }

@@ -5,7 +5,7 @@
 /// Kernel clock of the CAN controller, Hz.
 pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
 
-/// How a bit is made from the kernel clock.
+/// Division of a bit into periods of the kernel clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
     /// Kernel clock periods in a time quantum.
@@ -19,22 +19,22 @@ pub struct BitTiming {
 }
 
 impl BitTiming {
-    /// Time quanta in a bit: the synchronisation quantum and both segments.
+    /// Returns the time quanta in a bit: the synchronisation quantum and both segments.
     pub const fn quanta(&self) -> u32 {
         1 + self.segment1 as u32 + self.segment2 as u32
     }
 
-    /// bit/s at a kernel clock in Hz.
+    /// Returns the bit rate at a kernel clock in Hz, bit/s.
     pub const fn bit_rate(&self, clock_hz: u32) -> u32 {
         clock_hz / (self.prescaler as u32 * self.quanta())
     }
 
-    /// Quanta up to the sample point.
+    /// Returns the quanta up to the sample point.
     pub const fn sample_point(&self) -> u32 {
         1 + self.segment1 as u32
     }
 
-    /// The timing for a bit rate with 17 quanta, sample point 13/17.
+    /// Returns the timing for a bit rate with 17 quanta, sample point 13/17.
     const fn at(bit_rate: u32) -> Self {
         let prescaler = KERNEL_CLOCK_HZ / (17 * bit_rate);
         assert!(prescaler * 17 * bit_rate == KERNEL_CLOCK_HZ, "the clock is no multiple of this bit rate");
@@ -52,7 +52,7 @@ pub const NOMINAL: BitTiming = BitTiming::at(NOMINAL_BIT_RATE);
 /// Timing in the data phase.
 pub const DATA: BitTiming = BitTiming::at(DATA_BIT_RATE);
 /// Transmitter delay compensation: distance from the measured loop delay to the secondary sample point, in
-/// kernel clock periods. It puts that point where every receiver has its sample point.
+/// kernel clock periods. With this offset the secondary sample point is at the sample point of every receiver.
 pub const TDC_OFFSET: u8 = {
     // The hardware compensates with prescalers 1 and 2 only.
     assert!(DATA.prescaler <= 2);

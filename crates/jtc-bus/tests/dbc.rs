@@ -13,19 +13,18 @@ use proptest::prelude::*;
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../joint-bus.dbc")).expect("the file is a DBC"));
 
-/// Bits of a signal, highest first. Big-endian signals begin at their highest bit and go on with bit 7 of the
-/// next byte.
+/// Bits of a signal, highest first. Big-endian signals begin at their highest bit and continue with bit 7 of the next byte.
 fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
     assert_eq!(signal.byte_order, ByteOrder::BigEndian);
     let (byte, bit) = (signal.start_bit as usize / 8, signal.start_bit as usize % 8);
     (byte * 8 + 7 - bit..).take(signal.size as usize).map(|place| place / 8 * 8 + 7 - place % 8)
 }
 
-/// Signals of a frame by the file, in its units.
+/// Decodes the signals of a frame with the file, in the units of the file.
 fn decoded(frame: &Frame) -> BTreeMap<String, f64> {
     let id = MessageId::Standard(frame.id);
     let message = DBC.messages.iter().find(|message| message.id == id).expect("the file has this frame");
-    // The long form of a report may come without its end.
+    // The short form of a report ends before the last signals.
     let held = |signal: &&Signal| (signal.start_bit / 8) < frame.data().len() as u64;
     message.signals.iter().filter(held).map(|signal| (signal.name.clone(), value(signal, frame))).collect()
 }
@@ -41,7 +40,7 @@ fn value(signal: &Signal, frame: &Frame) -> f64 {
     raw as f64 * signal.factor + signal.offset
 }
 
-/// A byte of flags under the names of the file.
+/// Inserts a byte of flags under the names of the file.
 fn flags(into: &mut BTreeMap<String, f64>, prefix: &str, suffix: &str, byte: u8, names: &[(&str, u8)]) {
     for (name, mask) in names {
         let set = f64::from(u8::from(byte & mask != 0));
@@ -188,7 +187,7 @@ fn j11_the_file_has_the_frames_of_this_bus_and_no_others() {
 #[test]
 fn j10_every_frame_is_can_fd() {
     for message in &DBC.messages {
-        // 14: standard CAN FD.
+        // Value 14 is standard CAN FD.
         let is_fd = DBC.attribute_values_message.iter().any(|attribute| {
             attribute.message_id == message.id
                 && attribute.name == "VFrameFormat"

@@ -86,7 +86,7 @@ fn j11_joint_answer_of_16_and_20_bytes() {
             assert_eq!(answer, Ok(Answer::Joint { node, report: long }));
         }
         assert_eq!(Answer::Joint { node, report: long }.emit(SCALE), frame(id, &bytes[..20]));
-        // Bytes 16 and up belong to the long form alone.
+        // Only the long form has bytes 16 and up.
         let mut short = frame(id, &bytes[..16]);
         assert_eq!(Answer::Joint { node, report }.emit(SCALE), short);
         short.id += 1;
@@ -254,7 +254,7 @@ fn what_a_gripper_says_reads_as_words() {
     assert_eq!(Bits(0, &error::NAMES).to_string(), "-");
 }
 
-/// Torque numbers as a drive reads them.
+/// Returns the torques as a drive reads them.
 fn drives_torque(frame: &Frame) -> [i16; JOINTS] {
     core::array::from_fn(|joint| i16::from_be_bytes([frame.data()[2 * joint], frame.data()[2 * joint + 1]]))
 }

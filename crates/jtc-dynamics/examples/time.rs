@@ -1,8 +1,7 @@
-//! Prints what a call costs: lines of a name and nanoseconds, the least of many batches of calls.
+//! Prints the cost of each call: lines of a name and nanoseconds, the minimum over many batches of calls.
 //!
-//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see
-//! `lines/mod.rs`). `references/dynamics/anchors.py --ours` makes such a file and times other implementations
-//! beside this one.
+//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see `lines/mod.rs`).
+//! `references/dynamics/anchors.py --ours` makes such a file, and times this and other implementations.
 mod lines;
 
 use std::hint::black_box;
@@ -25,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let d = dynamics.ok_or("there is no model in the file")?;
-    // `$call` on every state; each result has to be made, none can be kept from one call to the next.
+    // Runs `$call` on every state. `black_box` makes sure that every result is computed.
     macro_rules! time {
         ($name:literal, |$state:ident| $call:expr) => {
             let least = least_ns(BATCHES, || {

@@ -6,10 +6,10 @@
 //!   Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's position and Rz(a) to the frame before, so that Rx(α)·Rz(q + offset) is
 //!   left: two plane rotations. The origin of a frame is the point of its joint axis from which the vector to the next origin is
 //!   perpendicular to the axis.
-//! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of
-//!   serial robots, 1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the
-//!   second moment along the axis) moves in the same way whether it rotates with the link or not. It is regrouped to the link
-//!   before, from the wrist to the base. Each link keeps seven parameters, and none of them is a mass.
+//! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
+//!   1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the second moment along the axis)
+//!   moves in the same way whether it rotates with the link or not. This part is regrouped to the link before, from the wrist to the base.
+//!   Each link keeps seven parameters, and none of them is a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, Origin, symmetric};
 use crate::payload::Payload;
@@ -18,35 +18,35 @@ use crate::rotation::{
 };
 use crate::trig::{angle, sin_cos};
 
-/// An angle of a joint origin that is this near to a multiple of a right angle is that multiple, rad: π/2 is written with six
-/// digits, and sent as f32.
+/// Maximum distance, rad, at which an angle of a joint origin is taken as the nearest multiple of a right angle. Models write π/2 with six
+/// digits, and the wire carries it as f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
-/// Sine or cosine of the angle between two axes that is taken for 0: what rounding leaves of right angles that were multiplied.
+/// Sine or cosine of the angle between two axes that is taken as 0. Rounding leaves such values when right angles are multiplied.
 const ALIGNED: f64 = 1e-12;
 
-/// How the axis of a joint is to that of the joint before.
+/// Direction of a joint's axis relative to that of the joint before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axes {
     /// Parallel, in the same or in the opposite direction: sin α = 0.
     Parallel,
     /// At a right angle: α = π/2, as α is never negative here.
     Perpendicular,
-    /// Nothing that would save a multiplication.
+    /// Any other direction, which saves no multiplication.
     Any,
 }
 
-/// The axes of the joints of an arm. The recursion is compiled for those that most arms have, without what they multiply by 0
-/// and 1, and for any.
+/// Directions of the joint axes of an arm. The recursion is compiled for the shapes that most arms have, without their multiplications by 0
+/// and 1, and for any shape.
 pub(crate) trait Shape {
-    /// That of the first joint has no meaning: gravity is given behind it.
+    /// Directions of the axes. The first one has no meaning, because gravity is given after the first joint's Rx(α).
     const AXES: [Axes; JOINTS];
 }
 
 /// Any arm.
 pub(crate) struct AnyShape;
-/// Three parallel axes, then two at right angles: what a wrist without a common point has.
+/// Three parallel axes, then two at right angles: an arm whose wrist axes have no common point.
 pub(crate) struct ThreeParallel;
-/// Two parallel axes, then three at right angles: what a spherical wrist has.
+/// Two parallel axes, then three at right angles: an arm with a spherical wrist.
 pub(crate) struct TwoParallel;
 
 impl Shape for AnyShape {
@@ -75,7 +75,7 @@ impl Shape for TwoParallel {
     ];
 }
 
-/// Which shape the recursion is compiled for an arm has.
+/// Shape of an arm, among those for which the recursion is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KnownShape {
     /// [`AnyShape`].
@@ -105,12 +105,12 @@ pub(crate) struct JointTransform {
     /// sin α, which is not negative, and cos α.
     pub sin: f64,
     pub cos: f64,
-    /// What is known of them.
+    /// Direction of the axis, as the shape of the arm has it.
     pub axes: Axes,
     /// Added to the joint's position, rad.
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1. Where the axes are parallel, its y is 0
-    /// too, by choice of the x axis of frame k−1.
+    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1. If the axes are parallel, its y is 0, too, by
+    /// choice of the x axis of frame k−1.
     pub p: [f64; 2],
 }
 
@@ -148,20 +148,20 @@ struct Inertia {
 impl Inertia {
     const NONE: Self = Self { mass: 0.0, h: [0.0; 3], j: [[0.0; 3]; 3] };
 
-    /// Of a link, in its frame.
+    /// Returns the inertia of a link, in the link's frame.
     fn of_link(link: &Link) -> Self {
         let about_com = Self { mass: link.mass, h: [0.0; 3], j: symmetric(&link.inertia) };
         let Origin { xyz, rpy } = &link.origin;
         about_com.placed(&from_rpy(rpy), xyz)
     }
 
-    /// Of a payload, in the frame of the last link, in which the flange is at `flange`.
+    /// Returns the inertia of a payload, in the frame of the last link. `flange` is the flange in that frame.
     fn of_payload(payload: &Payload, flange: &Placement) -> Self {
         let about_com = Self { mass: payload.mass, h: [0.0; 3], j: symmetric(&payload.inertia) };
         about_com.placed(&about_z(0.0, 1.0), &payload.com).placed(&flange.rotation, &flange.xyz)
     }
 
-    /// The same in a frame in which the present one has the origin `p` (m) and the rotation `r`.
+    /// Returns the inertia in a frame in which the present frame has the origin `p` (m) and the rotation `r`.
     fn placed(&self, r: &Mat3, p: &[f64; 3]) -> Self {
         let h = apply(r, &self.h);
         let mut j = congruent(r, &self.j);
@@ -187,10 +187,10 @@ impl Inertia {
         }
     }
 
-    /// The base inertial parameters, and the part that is symmetric about z.
+    /// Returns the base inertial parameters, and the part that is symmetric about z.
     fn split(&self) -> (BaseInertialParameters, Self) {
         let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = self.j;
-        // Integral of z²: what x² + z² and y² + z² share.
+        // Integral of z², which x² + z² and y² + z² share.
         let z2 = 0.5 * (xx + yy - zz);
         let [hx, hy, hz] = self.h;
         let rest = BaseInertialParameters { hx, hy, xx: yy - z2, yy: xx - z2, xy: -xy, xz: -xz, yz: -yz };
@@ -217,7 +217,7 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// The transform of a joint, with what is known of its axes when the recursion is compiled.
+    /// Returns the transform of a joint, with the direction of its axis as a constant of the shape.
     #[inline(always)]
     pub fn transform<S: Shape>(&self, k: usize) -> JointTransform {
         JointTransform { axes: S::AXES[k], ..self.transforms[k] }
@@ -234,8 +234,8 @@ impl Chain {
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
-            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). Of parallel axes any a is good, and the
-            // best is the one along the vector from one to the other.
+            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The best one
+            // is along the vector from one axis to the other.
             let parallel = c[0][2].abs().max(c[1][2].abs()) < ALIGNED;
             let [x, y, _] = placements[k].xyz;
             let (cos_a, sin_a) = if parallel { unit(x, y) } else { unit(-c[1][2], c[0][2]) };
@@ -278,7 +278,7 @@ impl Chain {
     }
 }
 
-/// Rotation of a joint origin, with exact right angles.
+/// Returns the rotation of a joint origin, with exact right angles.
 fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(|angle| {
         let (sin, cos) = sin_cos(angle);
@@ -292,8 +292,8 @@ fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     }))
 }
 
-/// Base inertial parameters: the inertia of the links in the frames of the chain, the part symmetric about each joint axis
-/// regrouped to the link before (Gautier and Khalil 1990).
+/// Returns the base inertial parameters: the inertia of the links in the frames of the chain. The part that is symmetric about a joint axis
+/// is regrouped to the link before (Gautier and Khalil 1990).
 fn regroup(
     bodies: &[Inertia; JOINTS],
     transforms: &[JointTransform; JOINTS],

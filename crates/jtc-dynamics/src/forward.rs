@@ -25,8 +25,7 @@ struct Composite {
     yz: f64,
 }
 
-/// The plane part of a symmetric matrix rotated by (s, c): its two diagonal entries and the product between
-/// them.
+/// Rotates the plane part of a symmetric matrix by (s, c). Returns its two diagonal entries and the product between them.
 #[inline(always)]
 fn rotate_plane(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;
@@ -40,7 +39,7 @@ impl Composite {
         Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: b.yy, zz: 0.0, xy: b.xy, xz: b.xz, yz: b.yz }
     }
 
-    /// The composite of frame k in frame k−1.
+    /// Returns the composite of frame k in frame k−1.
     #[inline(always)]
     fn inwards(&self, t: &JointTransform, (s, c): (f64, f64)) -> Self {
         let (xx, yy, xy) = rotate_plane(s, c, self.xx, self.yy, self.xy);
@@ -66,14 +65,14 @@ impl Composite {
         self.yz += b.yz;
     }
 
-    /// The wrench of a unit acceleration about the frame's z axis.
+    /// Returns the wrench of a unit acceleration about the frame's z axis.
     #[inline(always)]
     fn column(&self) -> Wrench {
         [[-self.h[1], -self.xz], [self.h[0], -self.yz], [0.0, self.xx + self.yy]]
     }
 }
 
-/// Lower triangle of the mass matrix; the upper one stays zero.
+/// Returns the lower triangle of the mass matrix. The upper one stays zero.
 #[inline(always)]
 fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     let mut m = [[0.0; JOINTS]; JOINTS];
@@ -111,7 +110,7 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
     m
 }
 
-/// Smallest pivot, relative to its diagonal entry, that is not taken for rounding.
+/// Smallest pivot, relative to its diagonal entry, that does not count as a rounding error.
 const PIVOT_MIN: f64 = 1.0e-14;
 
 /// Solves M·x = b for a symmetric positive definite M given by its lower triangle. A joint whose pivot is
@@ -152,13 +151,13 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     x
 }
 
-/// Inertia that each joint feels, kg·m²: one over the diagonal of the inverse mass matrix with rotors.
+/// Returns the inertia that each joint feels, kg·m²: the reciprocal of the diagonal of the inverse mass matrix with rotors.
 pub(crate) fn felt_inertia(chain: &Chain, q: &JointVec, rotor: &JointVec) -> JointVec {
     let m = with_rotors(chain, q, rotor);
     core::array::from_fn(|k| felt(m, k))
 }
 
-/// The same of one joint.
+/// Like [`felt_inertia`], for one joint.
 pub(crate) fn felt_inertia_of(chain: &Chain, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
     felt(with_rotors(chain, q, rotor), joint)
 }

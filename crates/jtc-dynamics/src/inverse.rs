@@ -30,7 +30,7 @@ impl JointSinesCosines {
         for k in 0..JOINTS {
             angle[k] += chain.transforms[k].offset;
         }
-        // One loop over all six joints, which a compiler for a processor with SIMD vectorises.
+        // A compiler for a processor with SIMD vectorises this loop over all six joints.
         let (mut sin, mut cos) = (angle, angle);
         for k in 0..JOINTS {
             (sin[k], cos[k]) = sin_cos(angle[k]);
@@ -77,10 +77,10 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
     [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]
 }
 
-/// Two vectors side by side: they are rotated together.
+/// Two vectors that are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
-/// One component of both vectors.
+/// A component of both vectors.
 type Pair = [f64; 2];
 
 #[inline(always)]
@@ -211,8 +211,8 @@ pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -
     v
 }
 
-/// The wrench of each link alone, under the motion `qd`, `qdd`. Of the first only the moment about its axis
-/// is computed: the base carries the rest.
+/// Returns the wrench of each link alone, under the motion `qd`, `qdd`. For the first link only the moment about its axis is computed: the
+/// base carries the remainder.
 #[inline(always)]
 fn wrenches<S: Shape>(
     chain: &Chain,
@@ -251,7 +251,7 @@ fn sum(a: &Wrench, b: &Wrench) -> Wrench {
     from_fn(|i| [a[i][0] + b[i][0], a[i][1] + b[i][1]])
 }
 
-/// Joint torques, N·m, by the recursion that was compiled for the shape of the arm.
+/// Returns the joint torques, N·m, by the recursion that was compiled for the shape of the arm.
 #[inline(always)]
 pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
     match chain.shape {
@@ -261,13 +261,13 @@ pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec
     }
 }
 
-/// The same of an arm that has this shape. Functions of their own, so that the machine code of each can be looked at.
+/// Like [`inverse`], for an arm of this shape. Each shape has its own function, so that its machine code can be examined.
 #[inline(never)]
 fn inverse_of<S: Shape>(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
     recursion::<S>(chain, &JointSinesCosines::new(chain, q), qd, qdd)
 }
 
-/// Outwards and inwards along the chain.
+/// Runs the recursion outwards and inwards along the chain.
 #[inline(always)]
 pub(crate) fn recursion<S: Shape>(
     chain: &Chain,
@@ -287,19 +287,19 @@ pub(crate) fn recursion<S: Shape>(
     torque
 }
 
-/// Joint torques at rest, N·m: without mass in the base inertial parameters there are no forces, only moments.
+/// Returns the joint torques at rest, N·m. The base inertial parameters have no mass, so that they need only moments and no forces.
 #[inline(always)]
 pub(crate) fn gravity_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
     static_torque(chain, trig, |k| [chain.base_parameters[k].hx, chain.base_parameters[k].hy])
 }
 
-/// Joint torques that hold 1 kg at the flange, N·m.
+/// Returns the joint torques that hold 1 kg at the flange, N·m.
 #[inline(always)]
 pub(crate) fn flange_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
     static_torque(chain, trig, |k| chain.flange[k])
 }
 
-/// Joint torques at rest of bodies with these first moments (kg·m).
+/// Returns the joint torques at rest of bodies with these first moments (kg·m).
 #[inline(always)]
 fn static_torque(
     chain: &Chain,

@@ -1,4 +1,4 @@
-//! Forward kinematics: where the joint frames and the flange are.
+//! Forward kinematics: poses of the joint frames and of the flange.
 
 use crate::chain::Chain;
 use crate::model::JointVec;

@@ -22,7 +22,7 @@ pub use model::{ArmModel, Field, JOINTS, JointVec, Link, ModelError, Origin};
 pub use payload::{LinkInertias, Payload, PayloadError};
 pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
-/// An arm prepared for kinematics and dynamics: what does not depend on the joint positions is precomputed.
+/// An arm prepared for kinematics and dynamics: values that do not depend on the joint positions are precomputed.
 ///
 /// No function fails or panics. Results for a NaN, an infinite argument or a position beyond [`SIN_COS_MAX`] are
 /// meaningless, mostly NaN.
@@ -34,63 +34,64 @@ pub struct Dynamics {
 impl Dynamics {
     /// Prepares `model`; `gravity`: acceleration of gravity in the base frame, m/s², (0, 0, −9.81) for an arm that stands upright.
     ///
-    /// The model must have passed [`ArmModel::check`]: the results of one that has not are meaningless.
+    /// The model must have passed [`ArmModel::check`], else the results are meaningless.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         Self::with_payload(model, gravity, &Payload::default())
     }
 
-    /// The same arm with a `payload` at its flange, as if that were a part of the last link (J-60). The payload must have passed
-    /// [`Payload::check`]. [`Dynamics::flange_torque`] remains that of 1 kg alone.
+    /// Like [`Dynamics::new`], with a `payload` at the flange, as if the payload were a part of the last link (J-60). The payload must have
+    /// passed [`Payload::check`]. [`Dynamics::flange_torque`] remains the torque of 1 kg alone.
     pub fn with_payload(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
         Self { chain: chain::Chain::new(model, gravity, payload) }
     }
 
-    /// Masses and inertias of the arm and its payload.
+    /// Returns the masses and inertias of the arm and its payload.
     pub fn inertias(&self) -> LinkInertias {
         LinkInertias(self.chain.base_parameters)
     }
 
-    /// Computes with these masses and inertias from now on. They have to be those of an arm with the same joints.
+    /// Sets the masses and inertias for all later calls. `inertias` must be of an arm with the same joints.
     #[inline(always)]
     pub fn set_inertias(&mut self, inertias: &LinkInertias) {
         self.chain.base_parameters = inertias.0;
     }
 
-    /// Joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without
+    /// Returns the joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without
     /// friction and rotors; recursive Newton-Euler.
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
         inverse::inverse(&self.chain, q, qd, qdd)
     }
 
-    /// Joint torques (N·m) that hold the arm at rest at the positions `q` (rad).
+    /// Returns the joint torques (N·m) that hold the arm at rest at the positions `q` (rad).
     pub fn gravity_torque(&self, q: &JointVec) -> JointVec {
         inverse::gravity_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the arm
+    /// Returns the joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the arm
     /// itself: gravity through the transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
         inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Joint-space mass matrix (kg·m²) at the positions `q` (rad), symmetric, without rotors; composite-rigid-body algorithm.
+    /// Returns the joint-space mass matrix (kg·m²) at the positions `q` (rad), symmetric, without rotors; composite-rigid-body algorithm.
     pub fn mass_matrix(&self, q: &JointVec) -> [[f64; JOINTS]; JOINTS] {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Inertia (kg·m²) that each joint feels at the positions `q` (rad) while all others are free to move: the least that a torque of
-    /// this joint alone accelerates. `rotor` as for [`Dynamics::forward`]. Infinite for a joint without any inertia.
+    /// Returns the inertia (kg·m²) that each joint feels at the positions `q` (rad) while all other joints are free to move: the least that
+    /// a torque of this joint alone accelerates. `rotor` is as in [`Dynamics::forward`]. The value is infinite for a joint without any
+    /// inertia.
     pub fn felt_inertia(&self, q: &JointVec, rotor: &JointVec) -> JointVec {
         forward::felt_inertia(&self.chain, q, rotor)
     }
 
-    /// The same of one joint, counted from 0.
+    /// Like [`Dynamics::felt_inertia`], for one joint, counted from 0.
     #[inline(never)]
     pub fn felt_inertia_of(&self, q: &JointVec, rotor: &JointVec, joint: usize) -> f64 {
         forward::felt_inertia_of(&self.chain, q, rotor, joint)
     }
 
-    /// Joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m); `rotor`, the
+    /// Returns the joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m); `rotor`, the
     /// inertias of the rotors about their joint axes (kg·m²), is added to the diagonal of the mass matrix.
     ///
     /// A joint without any inertia (its row of the mass matrix is lost in rounding) gets the acceleration 0.
@@ -98,14 +99,14 @@ impl Dynamics {
         forward::forward(&self.chain, q, qd, tau, rotor)
     }
 
-    /// Speed of the origin of the flange (m/s) at positions `q` (rad) and velocities `qd` (rad/s).
+    /// Returns the speed of the origin of the flange (m/s) at positions `q` (rad) and velocities `qd` (rad/s).
     #[inline(never)]
     pub fn flange_speed(&self, q: &JointVec, qd: &JointVec) -> f64 {
         kinematics::flange_speed(&self.chain, q, qd)
     }
 
-    /// Poses in the base frame (m) of the joint frames, base to wrist, and of the flange, at the positions `q` (rad). Joint frames
-    /// are those of the model, after the rotation of the joint.
+    /// Returns the poses in the base frame (m) of the joint frames, base to wrist, and of the flange, at the positions `q` (rad). Joint
+    /// frames are those of the model, after the rotation of the joint.
     pub fn forward_kinematics(&self, q: &JointVec) -> [Pose; 7] {
         kinematics::forward_kinematics(&self.chain, q)
     }

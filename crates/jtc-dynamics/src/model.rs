@@ -7,7 +7,7 @@ use crate::rotation::{Mat3, principal_moments};
 /// Number of actuated joints, all revolute.
 pub const JOINTS: usize = 6;
 
-/// One value per joint, base to wrist; the unit is that of the quantity.
+/// Values of the joints, base to wrist; the unit is that of the quantity.
 pub type JointVec = [f64; JOINTS];
 
 /// A frame placed in its parent as URDF does: translate by `xyz` (m), then rotate by
@@ -16,7 +16,7 @@ pub type JointVec = [f64; JOINTS];
 pub struct Origin {
     /// Translation in the parent frame, m.
     pub xyz: [f64; 3],
-    /// Roll, pitch, yaw, rad. Those of a joint within 2 µrad of a multiple of π/2 are taken as that multiple.
+    /// Roll, pitch, yaw, rad. An angle of a joint within 2 µrad of a multiple of π/2 is taken as that multiple.
     pub rpy: [f64; 3],
 }
 
@@ -65,7 +65,7 @@ pub enum Field {
 pub enum ModelError {
     /// A number is NaN or infinite.
     NotFinite {
-        /// Joint or link (of which `field` is), 0..7.
+        /// Index of the joint or link that has `field`, 0..7.
         index: usize,
         /// The number.
         field: Field,
@@ -74,7 +74,7 @@ pub enum ModelError {
     },
     /// An angle is too large to have a meaning.
     AngleTooLarge {
-        /// Joint or link (of which `field` is), 0..7.
+        /// Index of the joint or link that has `field`, 0..7.
         index: usize,
         /// The number.
         field: Field,
@@ -90,7 +90,7 @@ pub enum ModelError {
         /// Mass, kg.
         mass: f64,
     },
-    /// One of the links 1..=5 has no mass.
+    /// A link of 1..=5 has no mass.
     MassZero {
         /// Link, 1..=5.
         link: usize,
@@ -102,7 +102,7 @@ pub enum ModelError {
         /// The smallest principal moment, kg·m²; the limit is 0.
         moment: f64,
     },
-    /// A principal moment of a link with mass is larger than the two others together, which is impossible.
+    /// A principal moment of a link with mass is larger than the sum of the two others, which is impossible.
     InertiaTriangle {
         /// Link, 0..7.
         link: usize,
@@ -168,7 +168,7 @@ impl fmt::Display for ModelError {
 impl core::error::Error for ModelError {}
 
 impl ModelError {
-    /// Index of the joint origin or the link that it is about, 0..7.
+    /// Returns the index of the joint origin or link with the error, 0..7.
     pub const fn index(&self) -> usize {
         match *self {
             Self::NotFinite { index, .. } | Self::AngleTooLarge { index, .. } => index,
@@ -179,7 +179,7 @@ impl ModelError {
         }
     }
 
-    /// Whether it is about a joint origin, else about a link.
+    /// Returns true if the error is in a joint origin, false if it is in a link.
     pub const fn is_of_joint(&self) -> bool {
         match self {
             Self::NotFinite { field, .. } | Self::AngleTooLarge { field, .. } => {
@@ -196,12 +196,12 @@ const ANGLE_MAX: f64 = 1.0e6;
 const INERTIA_TOLERANCE: f64 = 1.0e-6;
 
 impl ArmModel {
-    /// Physical checks of rule J-06: all numbers finite, no negative mass, links 1 to 5 have a mass, and the
-    /// inertia of every link with mass is that of a possible body (up to the rounding of f32).
+    /// Checks that the model is physical (J-06). All numbers must be finite, no mass may be negative, and links 1 to 5 must have a mass.
+    /// The inertia of every link with mass must be that of a possible body, up to the rounding of f32.
     ///
     /// # Errors
     ///
-    /// The first number that fails, joints before links: see [`ModelError`].
+    /// Returns the first number that fails, joints before links: see [`ModelError`].
     pub fn check(&self) -> Result<(), ModelError> {
         for (index, joint) in self.joints.iter().enumerate() {
             finite(index, &joint.xyz, Field::JointXyz)?;
@@ -237,13 +237,13 @@ impl Link {
     }
 }
 
-/// Principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in rising order, and by how much they may miss their limits.
+/// Returns the principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in rising order, and the tolerance of their limits.
 pub(crate) fn principal_moments_of(inertia: &[f64; 6]) -> ([f64; 3], f64) {
     let moments = principal_moments(&symmetric(inertia));
     (moments, INERTIA_TOLERANCE * moments[2].abs().max(moments[0].abs()))
 }
 
-/// The matrix of Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
+/// Returns the matrix of Ixx, Ixy, Ixz, Iyy, Iyz, Izz.
 pub(crate) fn symmetric(&[xx, xy, xz, yy, yz, zz]: &[f64; 6]) -> Mat3 {
     [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
 }

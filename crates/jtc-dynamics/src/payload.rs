@@ -8,7 +8,7 @@ use crate::model::{JOINTS, principal_moments_of};
 /// A rigid body fixed to the flange.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Payload {
-    /// Mass, kg; 0: there is none.
+    /// Mass, kg; 0 means no payload.
     pub mass: f64,
     /// Centre of mass in the flange frame, m.
     pub com: [f64; 3],
@@ -16,7 +16,7 @@ pub struct Payload {
     pub inertia: [f64; 6],
 }
 
-/// Why a payload is no body.
+/// Reason why a payload is not a possible body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PayloadError {
@@ -27,14 +27,14 @@ pub enum PayloadError {
         /// Mass, kg.
         mass: f64,
     },
-    /// It has an inertia, and no mass.
+    /// The payload has an inertia but no mass.
     MassZero,
     /// The smallest principal moment of inertia is negative.
     InertiaNegative {
         /// That moment, kg·m².
         moment: f64,
     },
-    /// The largest principal moment of inertia is more than the two others together.
+    /// The largest principal moment of inertia is more than the sum of the two others.
     InertiaTriangle {
         /// That moment, kg·m².
         moment: f64,
@@ -68,14 +68,14 @@ impl fmt::Display for PayloadError {
 impl core::error::Error for PayloadError {}
 
 impl Payload {
-    /// None.
+    /// No payload.
     pub const NONE: Self = Self { mass: 0.0, com: [0.0; 3], inertia: [0.0; 6] };
 
-    /// Whether it is a body that there can be (J-60): what [`crate::ArmModel::check`] asks of a link.
+    /// Checks that the payload is a possible body (J-60), with the requirements of [`crate::ArmModel::check`] for a link.
     ///
     /// # Errors
     ///
-    /// The first thing that is wrong.
+    /// Returns the first requirement that is not met.
     pub fn check(&self) -> Result<(), PayloadError> {
         let numbers = core::iter::once(&self.mass).chain(&self.com).chain(&self.inertia);
         if numbers.into_iter().any(|number| !number.is_finite()) {
@@ -97,25 +97,25 @@ impl Payload {
         Ok(())
     }
 
-    /// There is one.
+    /// Returns true if the payload has a mass.
     pub fn is_there(&self) -> bool {
         self.mass > 0.0
     }
 }
 
-/// All of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the
-/// payload. They are linear in the masses, first and second moments of the bodies, so that an arm between two others with the
-/// same joints is the sum of shares of both, and as physical as they are.
+/// The part of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the payload.
+/// The parameters are linear in the masses, first and second moments of the bodies. Therefore an interpolation between two arms with the
+/// same joints is as physical as both.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 
 impl LinkInertias {
-    /// Their numbers, in an order of their own: kept, they make the same again with [`from_numbers`](Self::from_numbers).
+    /// Returns the parameters as numbers, to store them. [`from_numbers`](Self::from_numbers) restores the same inertias.
     pub fn numbers(&self) -> [[f64; 7]; JOINTS] {
         self.0.map(|BaseInertialParameters { hx, hy, xx, yy, xy, xz, yz }| [hx, hy, xx, yy, xy, xz, yz])
     }
 
-    /// Of the numbers of others.
+    /// Restores the inertias from the result of [`numbers`](Self::numbers).
     pub fn from_numbers(numbers: &[[f64; 7]; JOINTS]) -> Self {
         Self(numbers.map(|[hx, hy, xx, yy, xy, xz, yz]| BaseInertialParameters {
             hx,
@@ -128,7 +128,7 @@ impl LinkInertias {
         }))
     }
 
-    /// `share` of the way from these to `other`: 0 are these, 1 the other.
+    /// Interpolates linearly to `other`: `share` 0 gives `self`, 1 gives `other`.
     #[inline(always)]
     pub fn toward(&self, other: &Self, share: f64) -> Self {
         let mut between = *self;

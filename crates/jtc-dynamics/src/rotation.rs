@@ -1,5 +1,4 @@
-//! Rotation matrices, and the principal moments of a symmetric one: what set-up and kinematics need of 3×3
-//! algebra.
+//! Rotation matrices, and the principal moments of a symmetric matrix: the 3×3 algebra of set-up and kinematics.
 
 use crate::trig::{sin_cos, sqrt};
 
@@ -11,7 +10,7 @@ pub(crate) fn from_rpy(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(sin_cos))
 }
 
-/// The same of sines and cosines.
+/// Like [`from_rpy`], from sines and cosines.
 pub(crate) fn from_sines_cosines(&[(sr, cr), (sp, cp), (sy, cy)]: &[(f64, f64); 3]) -> Mat3 {
     [
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -51,7 +50,7 @@ pub(crate) fn about_x(s: f64, c: f64) -> Mat3 {
     [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]
 }
 
-/// `(x, y)` made a unit vector; `(1, 0)` if there is no direction.
+/// Returns `(x, y)` as a unit vector, or `(1, 0)` if the vector has no direction.
 pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     let largest = x.abs().max(y.abs());
     if largest == 0.0 || !largest.is_finite() {
@@ -62,7 +61,8 @@ pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     (x / length, y / length)
 }
 
-/// Eigenvalues of a symmetric matrix of finite numbers in rising order, by Jacobi's rotations (8 sweeps: far past convergence).
+/// Returns the eigenvalues of a symmetric matrix of finite numbers in rising order, by Jacobi's rotations. The 8 sweeps go far past
+/// convergence.
 pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     let [[mut xx, mut xy, mut xz], [_, mut yy, mut yz], [_, _, mut zz]] = *m;
     let scale = [xx, xy, xz, yy, yz, zz].iter().fold(0.0f64, |a, v| a.max(v.abs()));
@@ -81,15 +81,15 @@ pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     [low.min(zz) * scale, low.max(high.min(zz)) * scale, high.max(zz) * scale]
 }
 
-/// One rotation in the plane of `a` and `b` that makes their product `ab` vanish; `ac` and `bc` turn with it.
+/// Rotates in the plane of `a` and `b`, so that their product `ab` vanishes. `ac` and `bc` turn with the plane.
 fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, f64) {
     let half = 0.5 * (b - a);
     let root = sqrt(half * half + ab * ab);
     if root == 0.0 {
-        // Round, up to what a square root can see: any turn would do.
+        // The moments are equal within the range of the square root, so that any rotation would do.
         return (a, b, 0.0, ac, bc);
     }
-    // The smaller of the two rotations that do it.
+    // The smaller of the two possible rotations.
     let t = ab / (half + root.copysign(half));
     let c = 1.0 / sqrt(1.0 + t * t);
     let s = t * c;

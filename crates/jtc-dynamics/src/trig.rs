@@ -1,11 +1,11 @@
 //! Sine, cosine and square root of f64 without the standard library; sine and cosine without branches on the argument.
 //!
-//! Sine and cosine are those of the nearest of 128 directions, from a table, turned by what is left: at most π/128, for which
-//! short polynomials do.
+//! A table has sine and cosine of 128 directions. The values of the nearest direction are rotated by the remaining angle, which is at most
+//! π/128, so that short polynomials are sufficient.
 
 /// Directions of the table in a turn, a power of two.
 const DIRECTIONS: usize = 128;
-/// One over the angle between two directions, 1/rad.
+/// Reciprocal of the angle between two directions, 1/rad.
 const PER_RAD: f64 = 20.371832715762604;
 /// The angle between two directions, π/64, in two parts. The first has 28 significant bits, so that its product with a number of
 /// steps below 2^25 is exact.
@@ -67,7 +67,7 @@ const fn table() -> [[f64; 2]; DIRECTIONS] {
     table
 }
 
-/// The sine of a direction from that of the first quarter which it mirrors.
+/// Returns the sine of a direction, from the direction of the first quarter that mirrors it.
 const fn direction_sin(k: usize) -> f64 {
     let (half, quarter) = (DIRECTIONS / 2, DIRECTIONS / 4);
     let in_half = k % half;
@@ -78,16 +78,15 @@ const fn direction_sin(k: usize) -> f64 {
 /// Largest argument that [`sin_cos`] takes, rad; beyond it the result is NaN.
 pub const SIN_COS_MAX: f64 = 1.0e9;
 
-/// Sine and cosine of `x` (rad).
+/// Returns sine and cosine of `x` (rad).
 ///
-/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6 and grows to half the spacing of
-/// numbers around `x` beyond. Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes
-/// the same instructions, whatever `x` is.
+/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6 and grows to half the spacing of numbers around `x` beyond. Above
+/// [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions for any `x`.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;
     let [sin, cos] = TABLE[rounded.to_bits() as usize % DIRECTIONS];
-    // NaN where the reduction has no digits left, and for infinities.
+    // NaN for infinities, and if the reduction has no digits left.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = (x - k * STEP[0]) - k * STEP[1];
     let z = r * r;
@@ -97,8 +96,8 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (sin + (cos * s + sin * c), cos + (cos * c - sin * s))
 }
 
-/// Square root of a finite `x` ≥ 0 by Newton's method, within 2^-52 of its value; 0 for a NaN and for anything below the
-/// normal numbers, negative ones among them. It takes five divisions.
+/// Returns the square root of a finite `x` ≥ 0 by Newton's method, within 2^-52 of its value. Returns 0 for a NaN and for any number below
+/// the normal numbers, including negative numbers. The function takes five divisions.
 pub fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;
@@ -111,7 +110,7 @@ pub fn sqrt(x: f64) -> f64 {
     y
 }
 
-/// The angle in (−π, π] of a direction given by its sine and cosine. For set-up, not for the tick.
+/// Returns the angle in (−π, π] of a direction given by its sine and cosine. For set-up, not for the tick.
 pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     use core::f64::consts::{FRAC_PI_2, PI};
     let mut angle = if cos >= sin.abs() {
@@ -121,7 +120,7 @@ pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     } else {
         FRAC_PI_2.copysign(sin)
     };
-    // Each step takes the error e (at first below π/4) to e − sin e.
+    // Each step reduces the error e (at first below π/4) to e − sin e.
     for _ in 0..6 {
         let (s, c) = sin_cos(angle);
         angle += sin * c - cos * s;

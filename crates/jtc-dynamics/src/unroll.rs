@@ -1,7 +1,7 @@
 //! Unrolled loops: with constant indices the compiler keeps the recursion in registers and drops unused
 //! parts.
 
-/// Repeats the block once for each of the numbers, with the name as a constant of that value.
+/// Repeats the block for each of the numbers, with the name as a constant of that value.
 macro_rules! unroll {
     ($k:ident in [$($n:literal),+] $body:block) => {
         $({

@@ -38,7 +38,7 @@ fn apply(a: &Mat3, v: [f64; 3]) -> [f64; 3] {
     a.map(|row| dot(row, v))
 }
 
-/// Rx, Ry or Rz, written out.
+/// Returns Rx, Ry or Rz, computed element by element.
 fn about(axis: usize, angle: f64) -> Mat3 {
     let (s, c) = angle.sin_cos();
     match axis {
@@ -52,13 +52,13 @@ fn rotation(o: &Origin) -> Mat3 {
     product(&about(2, o.rpy[2]), &product(&about(1, o.rpy[1]), &about(0, o.rpy[0])))
 }
 
-/// An angle of a joint origin within 2 µrad of a multiple of a right angle is that multiple.
+/// Returns an angle of a joint origin; within 2 µrad of a multiple of a right angle it is that multiple.
 fn squared(angle: f64) -> f64 {
     let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }
 }
 
-/// Frames of the links by the rule as it stands: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
+/// Returns the frames of the links, directly by the rule: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
 fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     let mut at = (about(0, 0.0), [0.0; 3]);
     let mut all = Vec::new();
@@ -72,8 +72,7 @@ fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     all
 }
 
-/// Mass matrix and gravity torque from the energies alone: Jacobians of the centres of mass in the base
-/// frame.
+/// Computes mass matrix and gravity torque from the energies alone, with Jacobians of the centres of mass in the base frame.
 fn by_energy(model: &ArmModel, gravity: [f64; 3], q: &JointVec) -> ([JointVec; JOINTS], JointVec) {
     let frames = frames(model, q);
     let (mut mass, mut torque) = ([NONE; JOINTS], NONE);
@@ -98,7 +97,7 @@ fn by_energy(model: &ArmModel, gravity: [f64; 3], q: &JointVec) -> ([JointVec; J
     (mass, torque)
 }
 
-/// By Cholesky's factors.
+/// Checks with a Cholesky factorisation.
 fn positive_definite(m: &[JointVec; JOINTS]) -> bool {
     let mut l = [NONE; JOINTS];
     for i in 0..JOINTS {
@@ -232,8 +231,8 @@ proptest! {
     }
 }
 
-/// Values of the existing device's arm, worked out by another program: there gravity points the other way
-/// (the arm hangs) and joint 3 sits 10 mm higher.
+/// Values of the existing device's arm, computed by another program. There gravity points the other way (the arm hangs) and joint 3 is 10
+/// mm higher.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -268,7 +267,7 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
-/// Against that of all joints, and against positions a moment apart.
+/// Compares with the inertia of all joints, and with the distance between positions at two close times.
 #[test]
 fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     let mut random = random_from(11);
@@ -295,13 +294,13 @@ fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     }
 }
 
-/// A joint that is parallel to none, and meets none.
+/// Returns a joint whose axis is not parallel to any other and does not meet any other.
 fn skew(k: usize) -> Origin {
     let k = k as f64;
     Origin { xyz: [0.1 + 0.02 * k, 0.2 - 0.03 * k, 0.1 * k], rpy: [0.3 + 0.2 * k, -0.4, 0.5 * k] }
 }
 
-/// Numbers from 0 to 1 out of a seed.
+/// Returns random numbers from 0 to 1, from a seed.
 fn random_from(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
@@ -318,7 +317,7 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
 }
 
-/// How π/2 and π are written with six digits, and how they come out of f32, is what is meant; what is further off is not.
+/// π/2 and π with six digits or rounded to f32 count as the exact angles. Angles that differ by more do not.
 #[test]
 fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
     let poses = |rpy: [f64; 3]| {

@@ -1,10 +1,10 @@
-//! What makes an arm model physical (J-06).
+//! Checks that an arm model is physical (J-06).
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Field, ModelError};
 use proptest::prelude::*;
 
-/// The number at place `i` of the 133 of a model, in the order of the ArmModel frame.
+/// Returns number `i` of the 133 of a model, in the order of the ArmModel frame.
 fn number(model: &mut ArmModel, i: usize) -> &mut f64 {
     if i < 42 {
         let joint = &mut model.joints[i / 6];
@@ -123,7 +123,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
 }
 
-/// The error names the largest angle, which is allowed itself.
+/// The error names the largest allowed angle.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();
@@ -139,8 +139,8 @@ fn j06_an_angle_at_the_limit_is_accepted() {
     }
 }
 
-/// A body at the limit stays one when its numbers are rounded to f32, as the frame carries them; a hundred times as far off
-/// it is none. That does not depend on how heavy it is.
+/// A body at the limit stays valid when its numbers are rounded to f32, as the frame carries them. With a hundred times that deviation the
+/// body is not valid. Both are true for light and heavy bodies.
 #[test]
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);

@@ -1,4 +1,4 @@
-//! A payload at the flange (J-60): against the same body written as a link, against energies, and what there cannot be.
+//! A payload at the flange (J-60): comparisons with the same body as a link and with energies, and impossible bodies.
 use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
@@ -8,13 +8,13 @@ use proptest::prelude::*;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -9.81];
 
-/// Bodies of some points of mass, which any rigid body is.
+/// Bodies made of point masses, which can represent any rigid body.
 fn payload() -> impl Strategy<Value = Payload> {
     let point = (0.01..2.0f64, prop::array::uniform3(-0.3..0.3f64));
     prop::collection::vec(point, 1..6).prop_map(|points| of_points(&points))
 }
 
-/// Mass, centre of mass and inertia about it, straight from their definitions.
+/// Returns mass, centre of mass and inertia about it, from their definitions.
 fn of_points(points: &[(f64, [f64; 3])]) -> Payload {
     let mass: f64 = points.iter().map(|(m, _)| m).sum();
     let com = std::array::from_fn(|i| points.iter().map(|(m, p)| m * p[i]).sum::<f64>() / mass);
@@ -34,13 +34,13 @@ fn close(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-11 * scale)
 }
 
-/// A point of the flange frame in the base frame, by forward kinematics.
+/// Returns a point of the flange frame in the base frame, by forward kinematics.
 fn point(dynamics: &Dynamics, q: &JointVec, p: [f64; 3]) -> [f64; 3] {
     let flange = dynamics.forward_kinematics(q)[6];
     std::array::from_fn(|i| flange.position[i] + (0..3).map(|k| flange.rotation[i][k] * p[k]).sum::<f64>())
 }
 
-/// The same arm whose last link is the payload alone, written as a link by hand; the other links have no mass.
+/// Returns an arm with the same joints whose last link is the payload alone. The other links have no mass.
 fn alone(model: &ArmModel, payload: &Payload) -> ArmModel {
     let square = |angle: f64| {
         let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
@@ -137,7 +137,7 @@ fn j60_no_payload_is_the_arm_itself_to_the_bit() {
     assert_eq!(plain.inverse(&q, &qd, &qdd), without.inverse(&q, &qd, &qdd));
 }
 
-/// As a link would be (J-06).
+/// A payload has the same requirements as a link (J-06).
 #[test]
 fn j60_what_is_no_body_is_refused() {
     let good = Payload { mass: 2.0, com: [0.0, 0.0, 0.1], inertia: [0.02, 0.0, 0.0, 0.02, 0.0, 0.01] };

@@ -1,5 +1,5 @@
 //! Arms and states as lines of text: `model` and 136 numbers (7 joint origins xyz rpy; 7 links: origin, ixx
-//! ixy ixz iyy iyz izz, mass; gravity), with ten more where there is a payload (mass, centre of mass, ixx ixy ixz iyy
+//! ixy ixz iyy iyz izz, mass; gravity), with ten more if the arm has a payload (mass, centre of mass, ixx ixy ixz iyy
 //! iyz izz in the flange frame), `state` and 30 numbers (q, qd, qdd, torque, rotor inertia of six
 //! joints).
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin, Payload};

@@ -1,4 +1,4 @@
-//! What the recursion leaves out for arms of known shape.
+//! Operations that the recursion omits for arms of known shape.
 extern crate std;
 use core::f64::consts::{FRAC_PI_2, PI};
 
@@ -8,7 +8,7 @@ use super::*;
 use crate::model::{ArmModel, Link, Origin};
 use crate::payload::Payload;
 
-/// An arm whose axes are a shape's, whatever rolls and yaws lead there, with joints that are also on one axis.
+/// Arms with the axes of a shape, from any rolls and yaws. Some joints share an axis.
 fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     let right = || prop::sample::select(std::vec![FRAC_PI_2, -FRAC_PI_2, 1.570796, -1.5707974]);
     let straight = || prop::sample::select(std::vec![0.0, PI, -PI, 3.141592, 1e-6]);
@@ -31,7 +31,7 @@ fn arm(axes: [Axes; JOINTS]) -> impl Strategy<Value = ArmModel> {
     })
 }
 
-/// Known zeros and ones are left out, and nothing else is done differently: the values are the same.
+/// Checks that a shape's recursion gives the same values as the general one. Only multiplications by known zeros and ones are omitted.
 fn same<S: Shape>(model: &ArmModel, shape: KnownShape, q: &JointVec, qd: &JointVec, qdd: &JointVec) {
     let chain = Chain::new(model, [0.3, -0.2, -9.81], &Payload::default());
     assert_eq!(chain.shape, shape);

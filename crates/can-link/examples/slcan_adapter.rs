@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
     });
-    // `line` is held so that the terminal stays when a host goes.
+    // `line` is held so that the terminal stays when a host disconnects.
     println!("ready: {}", line.name().unwrap_or_default());
     let mut adapter = SlcanAdapter::new();
     loop {
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 }
 
-/// Pseudo-terminals are a thing of Unix.
+/// Only Unix has pseudo-terminals.
 #[cfg(not(unix))]
 fn main() {
     eprintln!("slcan_adapter needs pseudo-terminals, which this system does not have");

@@ -1,7 +1,7 @@
 //! A socketcand server with three buses, for clients of any make: `cargo run --example socketcand_server -- 127.0.0.1:29536`.
 //!
 //! - `can0`: every frame is answered with its own payload under the next identifier;
-//! - `can1`: nobody but the clients;
+//! - `can1`: only the clients;
 //! - `busy`: a frame with a running number, 7F0, all the time.
 
 use std::time::Duration;

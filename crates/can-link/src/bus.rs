@@ -12,7 +12,7 @@ pub trait CanBus {
     /// example because no other member acknowledges.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
-    /// The next frame of another member; `None` when none came within `timeout`. Zero does not wait.
+    /// Returns the next frame of another member, or `None` if none came within `timeout`. Zero does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
     /// Returns the state of this member's controller, as far as it is known from the frames received so far.

@@ -47,7 +47,7 @@ struct Received {
     _timestamp: Option<IgnoredAny>,
 }
 
-/// The datagram of a frame, stamped with the time of day.
+/// Returns the datagram of a frame, stamped with the time of day.
 pub(crate) fn encode(frame: &CanFrame) -> Vec<u8> {
     #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -85,7 +85,7 @@ pub(crate) fn decode(datagram: &[u8]) -> Option<CanFrame> {
         return None;
     }
     if map.is_fd {
-        // python-can sends any length up to 64; on a wire it would be the next that CAN FD has.
+        // python-can sends any length up to 64. On a wire the length would be the next one that CAN FD has.
         return Some(CanFrame::fd_padded(id, data).ok()?.with_brs(map.bitrate_switch));
     }
     CanFrame::classic(id, data).ok().filter(|_| !map.bitrate_switch)
@@ -110,7 +110,7 @@ mod tests {
         let frame = decode(BY_PYTHON_CAN).unwrap();
         let bytes: Vec<u8> = (0..12).collect();
         assert_eq!(frame, CanFrame::fd(Id::standard(0x205).unwrap(), &bytes).unwrap());
-        // The time of day apart (8 bytes from 12), the bytes are the same.
+        // The bytes are the same except for the time of day (8 bytes from byte 12).
         let again = encode(&frame);
         assert_eq!(again[..12], BY_PYTHON_CAN[..12]);
         assert_eq!(again[20..], BY_PYTHON_CAN[20..]);

@@ -29,7 +29,7 @@ pub enum OpenError {
         what: &'static str,
         /// Requested rate, bit/s.
         rate: u32,
-        /// All that there are, bit/s.
+        /// All possible rates, bit/s.
         possible: String,
     },
     /// The bus cannot be reached.

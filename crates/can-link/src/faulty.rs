@@ -12,11 +12,11 @@ use crate::{CanBus, CanError, CanFrame, ControllerState};
 pub struct FaultConfig {
     /// Probability that a frame is lost.
     pub loss: f64,
-    /// Probability that one bit of the payload is turned over.
+    /// Probability that one bit of the payload is inverted.
     pub corruption: f64,
-    /// Probability that a frame comes twice.
+    /// Probability that a frame arrives twice.
     pub duplication: f64,
-    /// Probability that a frame is held back while others go past it.
+    /// Probability that a frame is held back while others overtake it.
     pub reordering: f64,
     /// Time for which such a frame is held back, s.
     pub reordering_hold_s: f64,
@@ -38,18 +38,18 @@ pub struct FaultSchedule {
     pub receive: FaultConfig,
 }
 
-/// Number of times that each fault happened.
+/// Counters of the faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultStats {
-    /// Frames that came in.
+    /// Frames that arrived.
     pub frames: u64,
-    /// Lost ones.
+    /// Lost frames.
     pub lost: u64,
-    /// Corrupted ones.
+    /// Corrupted frames.
     pub corrupted: u64,
-    /// Doubled ones.
+    /// Duplicated frames.
     pub doubled: u64,
-    /// Held back ones.
+    /// Frames held back.
     pub reordered: u64,
 }
 
@@ -75,7 +75,8 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
-    /// Always draws the same number of random values in the same order: one setting does not change the others' faults.
+    /// Adds a frame. Always draws the same number of random values in the same order, so that one setting does not change the faults of the
+    /// others.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -142,7 +143,7 @@ impl Line {
 /// let bus = Faulty::new(VirtualBus::join("lossy"), schedule);
 /// ```
 ///
-/// Frames in transit to others leave while this member sends or receives.
+/// Frames in transit to other members leave while this member sends or receives.
 pub struct Faulty<B> {
     bus: B,
     out: Line,
@@ -151,13 +152,13 @@ pub struct Faulty<B> {
 }
 
 impl<B: CanBus> Faulty<B> {
-    /// Delays by the clock on the wall.
+    /// Creates the bus with real-time delays.
     pub fn new(bus: B, schedule: FaultSchedule) -> Self {
         let start = Instant::now();
         Self::with_clock(bus, schedule, move || start.elapsed())
     }
 
-    /// Delays by a clock of your own, which must not run backwards: virtual time makes them repeatable.
+    /// Creates the bus with delays by the caller's clock, which must not run backwards. Virtual time makes the delays repeatable.
     pub fn with_clock(
         bus: B,
         schedule: FaultSchedule,
@@ -201,7 +202,7 @@ impl<B: CanBus> CanBus for Faulty<B> {
         loop {
             let now = (self.clock)();
             self.send_due(now)?;
-            // All that has arrived takes its place in the order before the first is handed out.
+            // All frames that have arrived are put in order before the first is returned.
             while let Some(frame) = self.bus.receive(Duration::ZERO)? {
                 self.received.put(now, frame);
             }
@@ -241,7 +242,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// A bench with a clock that only moves by hand, in ms.
+    /// A bench with a clock that only the test advances, in ms.
     struct Bench {
         faulty: Faulty<VirtualBus>,
         peer: VirtualBus,
@@ -293,7 +294,7 @@ mod tests {
         let stats = bench.faulty.received_stats();
         assert_eq!(stats.frames, 4000);
         assert_eq!(received.len() as u64, 4000 - stats.lost + stats.doubled);
-        // Six standard deviations and more.
+        // The tolerance is at least six standard deviations.
         for (count, share) in [(stats.lost, 0.1), (stats.corrupted, 0.18), (stats.doubled, 0.27)] {
             assert!((count as f64 / 4000.0 - share).abs() < 0.05, "{stats:?}");
         }

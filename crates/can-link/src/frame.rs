@@ -50,13 +50,13 @@ enum Kind {
     Fd { brs: bool },
 }
 
-/// A classic, remote or CAN FD frame. Its length is one that its kind can have: every frame can be sent.
+/// A classic, remote or CAN FD frame. The length is always valid for the kind of frame, so that every frame can be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: Id,
     kind: Kind,
     len: u8,
-    /// Zero beyond `len`, so that equality is that of the frames.
+    /// Zero beyond `len`, so that equal frames have equal bytes.
     data: [u8; Self::MAX_LEN],
 }
 
@@ -64,7 +64,7 @@ impl CanFrame {
     /// Most bytes of a CAN FD frame.
     pub const MAX_LEN: usize = 64;
 
-    /// A classic frame of at most 8 bytes.
+    /// Creates a classic frame of at most 8 bytes.
     pub fn classic(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
         if data.len() > 8 {
             return Err(InvalidFrame::ClassicLength { id, len: data.len() });
@@ -72,7 +72,7 @@ impl CanFrame {
         Ok(Self::made(id, Kind::Classic, data))
     }
 
-    /// A CAN FD frame with bit rate switch; 0..8, 12, 16, 20, 24, 32, 48 or 64 bytes.
+    /// Creates a CAN FD frame with bit rate switch and 0..8, 12, 16, 20, 24, 32, 48 or 64 bytes.
     pub fn fd(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
         if Self::fd_len(data.len()) != Some(data.len()) {
             return Err(InvalidFrame::FdLength { id, len: data.len() });
@@ -80,13 +80,13 @@ impl CanFrame {
         Ok(Self::made(id, Kind::Fd { brs: true }, data))
     }
 
-    /// A CAN FD frame with bit rate switch; payloads between two lengths get zeros up to the next.
+    /// Creates a CAN FD frame with bit rate switch. Pads the payload with zeros up to the next valid length.
     pub fn fd_padded(id: Id, data: &[u8]) -> Result<Self, InvalidFrame> {
         let len = Self::fd_len(data.len()).ok_or(InvalidFrame::FdLength { id, len: data.len() })?;
         Ok(Self { len: len as u8, ..Self::made(id, Kind::Fd { brs: true }, data) })
     }
 
-    /// A remote frame that asks for `len` bytes, 0..8.
+    /// Creates a remote frame that requests `len` bytes, 0..8.
     pub fn remote(id: Id, len: usize) -> Result<Self, InvalidFrame> {
         if len > 8 {
             return Err(InvalidFrame::ClassicLength { id, len });
@@ -102,7 +102,7 @@ impl CanFrame {
         self
     }
 
-    /// The shortest CAN FD length that holds `len` bytes; `None` above 64.
+    /// Returns the shortest CAN FD length that holds `len` bytes, or `None` above 64.
     pub const fn fd_len(len: usize) -> Option<usize> {
         match len {
             0..=8 => Some(len),
@@ -120,42 +120,42 @@ impl CanFrame {
         Self { id, kind, len: bytes.len() as u8, data }
     }
 
-    /// Identifier with its width.
+    /// Returns the identifier with its width.
     pub const fn id(&self) -> Id {
         self.id
     }
 
-    /// 29-bit identifier.
+    /// Returns true if the identifier has 29 bits.
     pub const fn is_extended(&self) -> bool {
         self.id.extended
     }
 
-    /// CAN FD.
+    /// Returns true for a CAN FD frame.
     pub const fn is_fd(&self) -> bool {
         matches!(self.kind, Kind::Fd { .. })
     }
 
-    /// The data phase has its own bit rate.
+    /// Returns true if the data phase has its own bit rate.
     pub const fn is_brs(&self) -> bool {
         matches!(self.kind, Kind::Fd { brs: true })
     }
 
-    /// Remote frame: no payload.
+    /// Returns true for a remote frame, which has no payload.
     pub const fn is_remote(&self) -> bool {
         matches!(self.kind, Kind::Remote)
     }
 
-    /// Bytes of the payload; of a remote frame the bytes that it asks for.
+    /// Returns the number of bytes of the payload, or those that a remote frame requests.
     pub const fn len(&self) -> usize {
         self.len as usize
     }
 
-    /// No bytes.
+    /// Returns true if the length is 0.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// The payload; of a remote frame nothing.
+    /// Returns the payload; empty for a remote frame.
     pub fn data(&self) -> &[u8] {
         if self.is_remote() { &[] } else { &self.data[..self.len()] }
     }
@@ -216,7 +216,7 @@ pub enum InvalidFrame {
     },
 }
 
-/// Any frame at all, for tests.
+/// Any frame, for tests.
 #[cfg(test)]
 pub(crate) fn any_frame() -> impl proptest::strategy::Strategy<Value = CanFrame> {
     use proptest::prelude::*;

@@ -7,8 +7,8 @@ use crate::socketcand::splitter::{LONGEST, Splitter};
 use crate::socketcand::text::{Reply, Request, push_frame, push_send};
 use crate::{CanFrame, SlcanAdapter};
 
-/// A stream of the socketcand protocol in any pieces: the messages are those of the whole stream; memory is bounded; a frame
-/// that was parsed is parsed again when it is written.
+/// Parses a stream of the socketcand protocol in pieces of any length. The messages must be those of the whole stream, and the memory must
+/// be bounded. A parsed frame that is written must parse to the same frame.
 pub fn socketcand_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let mut splitter = Splitter::new();
@@ -40,7 +40,7 @@ fn inner(text: &str) -> &str {
     text.strip_prefix('<').and_then(|text| text.strip_suffix('>')).expect("a message in its brackets")
 }
 
-/// Slow and plain: from the last `<` before each `>`.
+/// Finds the messages in a slow and simple way: from the last `<` before each `>`.
 fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     let mut found = Vec::new();
     let mut rest = stream;
@@ -57,8 +57,8 @@ fn messages_of_the_whole(stream: &[u8]) -> Vec<String> {
     found
 }
 
-/// A stream of SLCAN lines in any pieces: the result is the same as in one piece, for the reader of lines and for the
-/// adapter; a frame that was parsed is parsed again when it is written.
+/// Parses a stream of SLCAN lines in pieces of any length. The result must be the same as in one piece, for the reader of lines and for the
+/// adapter. A parsed frame that is written must parse to the same frame.
 pub fn slcan_stream(data: &[u8]) {
     let (cuts, stream) = parts(data);
     let lines = |pieces: &mut dyn Iterator<Item = &[u8]>| {
@@ -98,7 +98,7 @@ pub fn slcan_stream(data: &[u8]) {
     assert_eq!(adapter(&mut pieces(cuts, stream)), adapter(&mut std::iter::once(stream)));
 }
 
-/// The first bytes define how the rest is cut.
+/// Splits off the first bytes, which define how the remainder is cut.
 fn parts(data: &[u8]) -> (&[u8], &[u8]) {
     data.split_at(data.len().min(4))
 }

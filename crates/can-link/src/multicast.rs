@@ -12,7 +12,7 @@ use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 /// Bytes that may wait in the system for this member: some 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
-/// Longest wait for room in the system when sending.
+/// Longest wait for space in the system's queue when sending.
 const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
@@ -53,7 +53,7 @@ impl MulticastBus {
         move |source| CanError::Io { url, step, source }
     }
 
-    /// Makes the listener wait that long; nothing to do most of the time.
+    /// Sets the timeout of the listener if it changes, which is rare.
     fn set_timeout(&mut self, timeout: Option<Duration>) -> io::Result<()> {
         if timeout == self.timeout {
             return Ok(());
@@ -68,7 +68,7 @@ impl MulticastBus {
         Ok(())
     }
 
-    /// The next datagram of another sender.
+    /// Receives the next datagram of another sender.
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.listener.recv_from(buffer) {
@@ -93,11 +93,11 @@ fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
     result.map_err(|error| (what, error))
 }
 
-/// The listener and the sender; IPv4 groups on an interface of choice, IPv6 groups on the default one.
+/// Opens the listener and the sender. IPv4 groups use the given interface, IPv6 groups the default one.
 fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<(UdpSocket, UdpSocket)> {
     let listener = step("opening a socket", udp(group))?;
     step("sharing the port", share_port(&listener))?;
-    // More is better but not needed.
+    // A larger buffer is better but not needed.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
     // Bound to the group, the listener receives nothing of other groups; Windows only binds to own addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
@@ -171,7 +171,7 @@ impl CanBus for MulticastBus {
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let mut buffer = [0; MAX_DATAGRAM];
         let deadline = Instant::now().checked_add(timeout);
-        // A datagram that has already arrived costs no change of the socket's settings.
+        // For a datagram that has already arrived, the settings of the socket need not change.
         let mut wait = None;
         loop {
             self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;
@@ -192,7 +192,7 @@ impl CanBus for MulticastBus {
     }
 }
 
-/// Room will come: the queue of the interface or of the socket is full.
+/// Returns true if the queue of the interface or of the socket is full, which is temporary.
 fn is_queue_full(error: &io::Error) -> bool {
     // ENOBUFS has no kind of its own; 105 is Linux, 55 the BSDs and macOS, 10055 Windows.
     let code = if cfg!(windows) {
@@ -211,7 +211,7 @@ mod tests {
     use super::*;
     use crate::Id;
 
-    /// Frames with a timeout that only a broken transport reaches.
+    /// Receives a frame with a timeout that only a broken transport reaches.
     fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }
@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);
     }
 
-    // Each test has ports of its own, different from run to run, so that runs side by side do not meet.
+    // Each test has its own ports, which differ from run to run, so that parallel runs do not meet.
     fn port(number: u16) -> u16 {
         20_000 + (std::process::id() % 10_000) as u16 * 4 + number
     }

@@ -5,10 +5,10 @@ use std::fmt;
 /// The error state of a CAN controller (ISO 11898-1, fault confinement).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ErrorState {
-    /// The adapter does not report it.
+    /// The adapter does not report the state.
     #[default]
     Unknown,
-    /// Error active: all is well.
+    /// Error active: no error counter has reached 96.
     Active,
     /// An error counter has reached 96.
     Warning,
@@ -19,7 +19,7 @@ pub enum ErrorState {
 }
 
 impl ErrorState {
-    /// The state that belongs to error counters.
+    /// Returns the state that belongs to these error counters.
     pub const fn of_counters(tec: u16, rec: u16) -> Self {
         let worst = if tec > rec { tec } else { rec };
         match (tec, worst) {
@@ -55,12 +55,12 @@ pub struct ControllerState {
 }
 
 impl ControllerState {
-    /// A state without counters.
+    /// Creates a state without counters.
     pub const fn without_counters(errors: ErrorState) -> Self {
         Self { errors, tec: None, rec: None }
     }
 
-    /// The state of these counters.
+    /// Creates the state of these counters.
     pub const fn of_counters(tec: u16, rec: u16) -> Self {
         Self { errors: ErrorState::of_counters(tec, rec), tec: Some(tec), rec: Some(rec) }
     }

@@ -1,4 +1,4 @@
-//! CAN URLs: which bus, in one word of a command line.
+//! CAN URLs, which name a bus in one word of a command line.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -41,13 +41,13 @@ pub enum CanUrl {
         /// The server's bus.
         channel: String,
     },
-    /// `multicast:ADDR:PORT`, IPv6 addresses in brackets; `?ttl=N` lets it leave this host.
+    /// `multicast:ADDR:PORT`, IPv6 addresses in brackets; `?ttl=N` lets frames leave this host.
     Multicast {
         /// Multicast group.
         group: IpAddr,
         /// UDP port.
         port: u16,
-        /// Routers it may pass, plus one; 0 stays on this host.
+        /// Maximum number of routers on the path, plus one; 0 stays on this host.
         ttl: u8,
     },
     /// `virtual:NAME`.
@@ -58,7 +58,7 @@ pub enum CanUrl {
 }
 
 impl CanUrl {
-    /// The part before the first colon.
+    /// Returns the part before the first colon.
     pub const fn scheme(&self) -> &'static str {
         match self {
             Self::SocketCan { .. } => "socketcan",
@@ -73,7 +73,7 @@ impl CanUrl {
 /// Reasons why a text is not a valid CAN URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UrlError {
-    /// No scheme, or none of ours.
+    /// No scheme, or an unknown one.
     #[error(
         "`{url}` is no CAN URL; there are socketcan:can0, slcan:/dev/ttyACM0@1000000, \
          socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"
@@ -146,7 +146,7 @@ fn slcan(rest: &str) -> Result<CanUrl, &'static str> {
     Ok(CanUrl::Slcan { device: device.to_owned(), rate, data_rate, baud })
 }
 
-/// Host or bracketed IPv6 address, and its port if there is one.
+/// Splits a host or bracketed IPv6 address from its port, if it has one.
 fn host_and_port(text: &str, default: u16) -> Result<(&str, u16), &'static str> {
     let port = |text: &str| match text.parse() {
         Ok(0) | Err(_) => Err("the port is none of 1..65535"),

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 
-/// Frames that wait for a member at most.
+/// Maximum number of frames that wait for a member.
 const QUEUE: usize = 4096;
 
 /// Default time for which a sender waits for a member whose queue is full.
@@ -31,7 +31,7 @@ pub struct VirtualHub {
 struct Shared {
     timeout: Duration,
     state: Mutex<State>,
-    /// Something was put into or taken from a queue.
+    /// Notified if an entry was put into or taken from a queue.
     changed: Condvar,
 }
 
@@ -58,11 +58,11 @@ pub(crate) enum Received {
 
 struct Member {
     waiting: VecDeque<Received>,
-    /// Frames that wait at most.
+    /// Maximum number of frames that wait.
     limit: usize,
-    /// No sender waits for the member: it let a sender wait in vain and has taken nothing since, or is a guest.
+    /// No sender waits for the member, because a sender waited in vain and the member has taken no entry since, or because it is a guest.
     stalled: bool,
-    /// No sender ever waits for it.
+    /// No sender ever waits for the member.
     guest: bool,
     /// The member receives nothing at present.
     deaf: bool,
@@ -109,14 +109,13 @@ impl Shared {
 }
 
 impl VirtualHub {
-    /// A bus without members.
+    /// Creates a bus without members.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames is
-    /// full. A member that takes nothing for that long misses frames from then on until it takes one: it must not stop
-    /// the bus for the others.
+    /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames is full. A member
+    /// that takes nothing for that long misses frames from then on until it takes one: a slow member must not stop the bus for the others.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
@@ -126,7 +125,7 @@ impl VirtualHub {
         self.add(Member::ORDINARY)
     }
 
-    /// Adds a member for which no sender ever waits: beyond `limit` frames it misses frames. It is deaf at first.
+    /// Adds a member for which no sender ever waits. The member misses frames beyond `limit`, and is deaf at first.
     pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
         self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
     }
@@ -193,7 +192,7 @@ impl VirtualBus {
         VirtualHub { shared }.join()
     }
 
-    /// Frames this member missed because it did not take them.
+    /// Returns the number of frames that this member missed because it did not take them.
     pub fn missed(&self) -> u64 {
         self.shared().state().members.get(&self.number()).map_or(0, |member| member.missed)
     }
@@ -202,7 +201,7 @@ impl VirtualBus {
         &self.membership.shared
     }
 
-    /// Identifies it among the members of its hub.
+    /// Returns the number of this member in its hub.
     pub(crate) fn number(&self) -> u64 {
         self.membership.number
     }
@@ -222,7 +221,7 @@ impl VirtualBus {
         }
     }
 
-    /// Leaves the bus; all handles learn it.
+    /// Leaves the bus with all handles.
     pub(crate) fn leave(&self) {
         self.shared().state().members.remove(&self.number());
         self.shared().changed.notify_all();
@@ -255,7 +254,7 @@ impl CanBus for VirtualBus {
         let shared = self.shared();
         let give_up = Instant::now().checked_add(shared.timeout);
         let mut state = shared.state();
-        // Waiting for the slowest before anyone gets the frame keeps one order for all.
+        // Waits for the slowest member before any member gets the frame, so that all members see the same order.
         loop {
             let blocks = |(number, member): (&u64, &Member)| {
                 *number != self.number() && member.full() && !member.stalled && !member.deaf
@@ -277,7 +276,7 @@ impl CanBus for VirtualBus {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        // A timeout beyond the clock's range is as good as none.
+        // A timeout beyond the clock's range counts as no timeout.
         let deadline = Instant::now().checked_add(timeout);
         let shared = self.shared();
         let mut state = shared.state();
@@ -289,7 +288,7 @@ impl CanBus for VirtualBus {
                 shared.changed.notify_all();
                 match received {
                     Received::Frame(frame) => return Ok(Some(frame)),
-                    // Only guests of a server have one, and it writes these out itself.
+                    // Only guests of a server receive states, and the server reads them with `take_some`.
                     Received::State(_) => continue,
                 }
             }

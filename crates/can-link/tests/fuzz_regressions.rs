@@ -1,4 +1,4 @@
-//! The bodies of the fuzz targets over the inputs that are kept, and over some at random.
+//! Runs the bodies of the fuzz targets over the kept inputs, and over some random ones.
 
 use can_link::fuzzing::{slcan_stream, socketcand_stream};
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("socketcand_stream", socketcand_stream), ("slcan_stream", slcan_stream)]);
 }
 
-/// Words of the protocols, which bars part, and noise, mixed.
+/// Words of the protocols, separated by bars in `words`, mixed with noise.
 fn words(words: &'static str) -> impl Strategy<Value = Vec<u8>> {
     let word = prop_oneof![
         8 => prop::sample::select(words.split('|').collect::<Vec<_>>()).prop_map(|word| word.as_bytes().to_vec()),

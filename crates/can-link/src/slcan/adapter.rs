@@ -11,7 +11,7 @@ const OUTPUT: usize = 256 * 1024;
 /// Frames of the bus taken in one turn.
 const MOST: usize = 64;
 
-/// A simulated SLCAN adapter: no port, no thread, bytes in and bytes out.
+/// A simulated SLCAN adapter without a port and a thread: it takes bytes and returns bytes.
 ///
 /// ```
 /// use can_link::SlcanAdapter;
@@ -36,17 +36,17 @@ pub struct SlcanAdapter {
 }
 
 impl SlcanAdapter {
-    /// A closed adapter without a rate.
+    /// Creates a closed adapter without a rate.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Bytes from the host. `send` gets its frames and returns whether the bus has room; without room the host is refused with
-    /// a bell, as by an adapter whose queue is full.
+    /// Takes bytes from the host. `send` gets the host's frames and returns true if the bus has taken them. If not, the adapter refuses the
+    /// frame with a bell, as an adapter whose queue is full.
     pub fn input(&mut self, mut bytes: &[u8], mut send: impl FnMut(&CanFrame) -> bool) {
         let mut lines = self.lines.take().unwrap_or_else(Lines::new);
         while let Some(piece) = lines.next(&mut bytes) {
-            // The bell is the adapter's own.
+            // Only the adapter sends a bell.
             if let Piece::Line(line) = piece {
                 self.execute(line, &mut send);
             }
@@ -54,7 +54,7 @@ impl SlcanAdapter {
         self.lines = Some(lines);
     }
 
-    /// A frame was on the bus.
+    /// Reports a frame of the bus to the host.
     pub fn received(&mut self, frame: &CanFrame) {
         if !self.open {
             return;
@@ -81,17 +81,17 @@ impl SlcanAdapter {
         std::mem::take(&mut self.output)
     }
 
-    /// The host has opened its channel.
+    /// Returns true if the host has opened its channel.
     pub fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Bit rate and data bit rate that the host has set, bit/s.
+    /// Returns the bit rate and data bit rate that the host has set, bit/s.
     pub fn rates(&self) -> (Option<u32>, Option<u32>) {
         (self.rate, self.data_rate)
     }
 
-    /// Frames of the bus that were lost because the host did not read.
+    /// Returns the number of frames of the bus that were lost because the host did not read.
     pub fn lost(&self) -> u64 {
         self.lost
     }

@@ -46,8 +46,8 @@ struct Outstanding {
 
 /// Bus of an SLCAN adapter.
 ///
-/// Adapters that confirm frames get the next one after the confirmation, and a refused one again: their queue is full. Some
-/// adapters never answer; to those frames are written as fast as the line takes them.
+/// An adapter that confirms frames gets the next frame after the confirmation. A refused frame is sent again, because the queue of the
+/// adapter is full. To adapters that never answer, frames are written as fast as the line takes them.
 pub struct SlcanBus {
     url: String,
     port: Port,
@@ -63,7 +63,7 @@ pub struct SlcanBus {
     /// The adapter answers `F`; unknown until it was asked.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// A line of no other kind was received.
+    /// A line was received that is of no other known kind, such as the version.
     got_text: bool,
     closed: bool,
 }
@@ -144,7 +144,7 @@ impl SlcanBus {
                     return Ok(());
                 }
             }
-            // The adapter does not know the question, but it is present.
+            // The adapter does not know the question, but is present.
             if somebody {
                 return Ok(());
             }
@@ -244,7 +244,7 @@ impl SlcanBus {
                 Ok(0) if Instant::now() >= give_up => {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
-                // The adapter may be waiting for us.
+                // The adapter may be waiting for this host to read.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
@@ -292,7 +292,7 @@ impl SlcanBus {
         Ok(self.outstanding.is_none())
     }
 
-    /// Until the last frame is confirmed.
+    /// Waits until the last frame is confirmed.
     fn wait_for_confirmation(&mut self) -> Result<(), CanError> {
         while !self.settle(Instant::now())? {
             if self.receive_queue.len() < RECEIVE_QUEUE {
@@ -341,7 +341,7 @@ impl CanBus for SlcanBus {
         }
     }
 
-    /// Asks the adapter, if it answers such questions.
+    /// Asks the adapter if it supports the command `F`.
     fn state(&mut self) -> ControllerState {
         if self.has_flags == Some(false) || !self.answers || self.wait_for_confirmation().is_err() {
             return self.state;
@@ -350,7 +350,7 @@ impl CanBus for SlcanBus {
         if self.write(b"F\r").is_ok() {
             let end = Instant::now() + ANSWER;
             self.last_answer = None;
-            // A bell is a no.
+            // A bell means that the adapter refuses.
             while !self.got_flags && self.last_answer.is_none() && Instant::now() < end {
                 if self.take_in(SLICE).is_err() {
                     break;

@@ -8,7 +8,7 @@ use crate::{CanFrame, ControllerState, ErrorState, Id};
 const LONGEST: usize = 256;
 /// Ends a line.
 pub(crate) const CR: u8 = b'\r';
-/// Stands alone: refused.
+/// Means "refused"; not part of a line.
 pub(crate) const BELL: u8 = 7;
 /// Digits of a time stamp that some adapters append.
 const TIME_STAMP: usize = 4;
@@ -23,9 +23,9 @@ pub(crate) enum Piece<'a> {
 /// Finds lines in a stream that may be cut anywhere, in bounded memory.
 pub(crate) struct Lines {
     line: Vec<u8>,
-    /// The line in `line` was handed out.
+    /// The line in `line` was returned.
     complete: bool,
-    /// The rest of the line is passed over.
+    /// The remainder of the line is skipped.
     too_long: bool,
 }
 
@@ -51,14 +51,14 @@ impl Lines {
                 CR if self.too_long || !self.line.is_ascii() => {
                     self.line.clear();
                     self.too_long = false;
-                    // The line must not pass for the empty line that means yes.
+                    // The line must not be taken for the empty line that means "accepted".
                     return Some(Piece::Line("?"));
                 }
                 CR => {
                     self.complete = true;
                     return str::from_utf8(&self.line).ok().map(Piece::Line);
                 }
-                // Some adapters end lines with both.
+                // Some adapters end lines with CR and LF.
                 b'\n' => {}
                 _ if self.line.len() == LONGEST => self.too_long = true,
                 _ => self.line.push(byte),
@@ -120,7 +120,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
 const WARNING: u8 = 1 << 2;
 const PASSIVE: u8 = 1 << 5;
 
-/// The state in the answer to `F`: `F` and two digits.
+/// Parses the state in the answer to `F`: `F` and two digits.
 pub(crate) fn parse_flags(line: &str) -> Option<ControllerState> {
     let digits = line.strip_prefix('F').filter(|digits| digits.len() == 2 && digits.is_ascii())?;
     let flags = u8::from_str_radix(digits, 16).ok()?;
@@ -132,7 +132,7 @@ pub(crate) fn parse_flags(line: &str) -> Option<ControllerState> {
     Some(ControllerState::without_counters(errors))
 }
 
-/// The answer to `F`. The protocol has no flag for bus-off, which is reported as error passive.
+/// Returns the flags of the answer to `F`. The protocol has no flag for bus-off, which is reported as error passive.
 pub(crate) fn flags(state: ControllerState) -> u8 {
     match state.errors {
         ErrorState::Unknown | ErrorState::Active => 0,
@@ -141,8 +141,8 @@ pub(crate) fn flags(state: ControllerState) -> u8 {
     }
 }
 
-/// A change of state that newer adapters report by themselves, as Linux understands it: `s`, a letter, and the receive and the
-/// transmit error counter with three decimal digits each.
+/// Parses a change of state that newer adapters report without a request, in the form that Linux understands: `s`, a letter, and the
+/// receive and the transmit error counter with three decimal digits each.
 pub(crate) fn parse_state(line: &str) -> Option<ControllerState> {
     let rest = line.strip_prefix('s').filter(|rest| rest.len() == 7 && rest.is_ascii())?;
     let errors = match rest.chars().next()? {

@@ -1,6 +1,6 @@
 //! Options of an adapter, and the rates that have codes in the protocol.
 
-/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is LAWICEL's; some firmware of CANable adapters takes it for 750,000.
+/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is LAWICEL's; some firmware of CANable adapters interprets it as 750,000.
 pub(crate) const BIT_RATES: [u32; 9] =
     [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
@@ -17,7 +17,7 @@ pub struct SlcanOptions {
     pub rate: Option<u32>,
     /// Bit rate of the data phase of CAN FD, bit/s; none leaves the adapter's own.
     pub data_rate: Option<u32>,
-    /// Rate of the serial line, bit/s; USB adapters do not care.
+    /// Rate of the serial line, bit/s; USB adapters ignore it.
     pub baud: u32,
 }
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Longest time for a connection over TCP.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Shortest timeout: less would not wait at all.
+/// Shortest timeout; a shorter one would not wait at all.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 pub(super) enum Port {
@@ -15,7 +15,7 @@ pub(super) enum Port {
 }
 
 impl Port {
-    /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`. `baud` is that of the serial line.
+    /// Opens `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`. `baud` is the rate of the serial line.
     pub(super) fn open(device: &str, baud: u32) -> io::Result<Self> {
         let Some(address) = device.strip_prefix("tcp:") else {
             let port = serialport::new(device, baud).timeout(SHORTEST).open().map_err(io::Error::from)?;
@@ -55,7 +55,7 @@ impl Port {
         }
     }
 
-    /// Bytes that were taken within `timeout`.
+    /// Writes bytes; returns how many were taken within `timeout`.
     pub(super) fn write(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
         let written = match self {
             Self::Serial(port) => {

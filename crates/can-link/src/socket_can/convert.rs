@@ -1,4 +1,4 @@
-//! Frames to and from the kernel's, and the state from its error frames.
+//! Conversion of frames to and from those of the kernel, and of its error frames to a state.
 
 use socketcan::errors::ControllerProblems;
 use socketcan::id::FdFlags;
@@ -84,7 +84,7 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight bits cannot express bus-off: a controller that has left stays so until it reports otherwise.
+            // Eight bits cannot express bus-off: a controller that has left the bus stays in bus-off until it reports another state.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }

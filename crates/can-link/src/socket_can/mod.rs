@@ -131,7 +131,8 @@ impl CanBus for SocketCanBus {
         }
     }
 
-    /// From the error frames that [`receive`](CanBus::receive) has seen; none come when all is well from the start.
+    /// Returns the state from the error frames that [`receive`](CanBus::receive) has seen. Without an error since the start the kernel
+    /// sends no error frames.
     fn state(&mut self) -> ControllerState {
         self.state
     }
@@ -150,7 +151,7 @@ fn is_no_data(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// On any machine: a kernel without CAN and one without this interface both end in words with the next command.
+    /// Runs on any machine: a kernel without CAN and one without this interface both give an error that names the next command.
     #[test]
     fn what_cannot_be_opened_names_the_cause_and_what_to_do() {
         let error = SocketCanBus::open("nocan17").err().expect("no such interface").to_string();

@@ -1,16 +1,16 @@
-//! Waiting for room in the kernel's transmit queue.
+//! Waiting for space in the kernel's transmit queue.
 
 use std::io;
 use std::time::Duration;
 
-/// The queue is full: the kernel gives this number and does not wait.
+/// Error number of the kernel if the queue is full. The kernel does not wait.
 const ENOBUFS: i32 = 105;
-/// Pause between two tries: a frame on a fast bus.
+/// Pause between two attempts: the time of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Time without room in the queue after which the bus counts as dead.
+/// Time without space in the queue after which the bus counts as dead.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Writes, and tries again while the queue is full. After 10 s without room it returns an error with the likely causes.
+/// Writes, and tries again while the queue is full. Returns an error with the likely causes after 10 s without space.
 pub(super) fn retry_while_full(
     mut write: impl FnMut() -> io::Result<()>,
     mut pause: impl FnMut(Duration),
@@ -50,7 +50,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // The last answer stays.
+            // The last answer is repeated.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };

@@ -15,7 +15,7 @@ use crate::{
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Longest time for which sending waits for a server that takes no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Wait for room to send after which received bytes are read, because the server may be waiting for that.
+/// Wait for space to send after which received bytes are read, because the server may be waiting for that.
 const SEND_SLICE: Duration = Duration::from_millis(20);
 /// Longest time at the end for the server to take the last frames.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
@@ -129,7 +129,7 @@ impl SocketcandBus {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // At most what one read gave.
+            // At most the bytes of one read.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();
@@ -161,7 +161,7 @@ impl SocketcandBus {
         Ok(())
     }
 
-    /// A connection that was cut has ended like any other.
+    /// Converts an error. A connection that was cut counts as ended.
     fn broken(&mut self, step: &'static str, source: io::Error) -> CanError {
         use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset};
         self.closed = true;
@@ -262,7 +262,7 @@ impl CanBus for SocketcandBus {
         }
     }
 
-    /// The protocol reports only bus-off and the way back.
+    /// Returns the state. The protocol reports only bus-off and the return to the bus.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
     }

@@ -25,7 +25,7 @@ pub enum ClientEvent {
 /// Event at a [`SocketcandGateway`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FromClient {
-    /// Index of the channel among the names given.
+    /// Index of the channel in the configured names.
     pub channel: usize,
     /// Client.
     pub client: ClientId,
@@ -33,8 +33,8 @@ pub struct FromClient {
     pub event: ClientEvent,
 }
 
-/// A [`SocketcandServer`] whose clients' frames go to the host alone. The host decides when each is on the bus, and then
-/// [delivers](Self::deliver) it: bus order, arbitration and faults are its own.
+/// A [`SocketcandServer`] whose clients' frames go to the host alone. The host decides when each frame is on the bus, and then
+/// [delivers](Self::deliver) it. Bus order, arbitration and faults are up to the host.
 pub struct SocketcandGateway {
     // Dropped first: threads that wait for the host then end.
     events: Receiver<FromClient>,
@@ -61,13 +61,13 @@ impl SocketcandGateway {
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
     }
 
-    /// The next thing a client did, in order; `None` when nothing happened within `timeout`.
+    /// Returns the next event of the clients in order, or `None` if none occurred within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
-        // The other end is held by the server, which lives as long as this: the only error is that time is up.
+        // The server holds the other end and lives as long as this gateway, so the only possible error is the timeout.
         self.events.recv_timeout(timeout).ok()
     }
 
-    /// A frame was on the bus: all clients of the channel receive it, except one (that sent it). Never waits.
+    /// Delivers a frame of the bus to all clients of the channel, except one (its sender). Never waits.
     pub fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
         self.server.deliver(channel, frame, except);
     }
@@ -78,9 +78,9 @@ impl SocketcandGateway {
         self.server.deliver_to(client, frame);
     }
 
-    /// Reports to a client that its own controller has left the bus ([`ErrorState::BusOff`]) or is back
-    /// ([`ErrorState::Active`]), as an error frame between the frames before and after. The protocol's error frames carry no
-    /// data: other states have no form there and are not reported. Never waits.
+    /// Reports to a client that its own controller has left the bus ([`ErrorState::BusOff`]) or is back ([`ErrorState::Active`]), as an
+    /// error frame between the frames before and after. The protocol's error frames carry no data, so that it cannot express other states.
+    /// These are not reported. Never waits.
     pub fn report_state(&self, client: ClientId, state: ErrorState) {
         self.server.report_state(client, state);
     }
@@ -90,7 +90,7 @@ impl SocketcandGateway {
         self.server.local_addr()
     }
 
-    /// The CAN URL of a channel for clients on this host.
+    /// Returns the CAN URL of a channel for clients on this host.
     pub fn url(&self, channel: &str) -> String {
         self.server.url(channel)
     }

@@ -1,8 +1,7 @@
 //! CAN over TCP as the socketcand project defines it and python-can's `socketcand` interface and SavvyCAN speak it:
 //! a [client](SocketcandBus) and a [server](SocketcandServer).
 //!
-//! The protocol carries classic data frames only: it has no form for remote frames, and none that is generally understood
-//! for CAN FD.
+//! The protocol carries classic data frames only: it has no form for remote frames, and no generally understood form for CAN FD.
 
 mod client;
 mod gateway;

@@ -1,4 +1,4 @@
-//! The server: listens, counts, ends.
+//! The server, which listens for clients and counts their frames.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -40,7 +40,7 @@ pub struct ServerStats {
 /// A server of the socketcand protocol, as python-can's `socketcand` interface and SavvyCAN know it.
 ///
 /// A client's frames reach all others and do not come back to it. A client that does not read misses frames beyond some
-/// 65,000, and is disconnected after 30 s; it never blocks the bus. Dropping the server ends all connections.
+/// 65,000, and is disconnected after 30 s; such a client never blocks the bus. Dropping the server ends all connections.
 ///
 /// ```
 /// use std::time::Duration;
@@ -89,7 +89,7 @@ impl SocketcandServer {
         self.address
     }
 
-    /// The CAN URL of a channel for clients on this host.
+    /// Returns the CAN URL of a channel for clients on this host.
     pub fn url(&self, channel: &str) -> String {
         let (host, port) = (reachable(self.address).ip().to_string(), self.address.port());
         CanUrl::Socketcand { host, port, channel: channel.to_owned() }.to_string()
@@ -144,7 +144,7 @@ impl SocketcandServer {
 impl Drop for SocketcandServer {
     fn drop(&mut self) {
         self.inner.closing.store(true, Ordering::SeqCst);
-        // The acceptor waits in the system: a connection wakes it.
+        // The acceptor waits in a system call. A connection wakes it.
         let woken = TcpStream::connect_timeout(&reachable(self.address), END_TIMEOUT).is_ok();
         if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
             let _ = acceptor.join();
@@ -157,7 +157,7 @@ impl Drop for SocketcandServer {
     }
 }
 
-/// The address under which this host reaches a listener.
+/// Returns the address under which this host reaches a listener.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address.ip() {
@@ -181,13 +181,13 @@ fn accept(listener: &TcpListener, inner: &Arc<Inner>) {
                     inner.turned_away.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            // A client that went at once, or no room for another connection: others go on.
+            // The client has already disconnected, or the system has no space for another connection. Other clients are not affected.
             Err(_) => std::thread::sleep(Duration::from_millis(5)),
         }
     }
 }
 
-/// A thread for a client.
+/// Starts a thread for a client.
 fn start(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) -> io::Result<()> {
     let kept = stream.try_clone()?;
     let mut clients = inner.clients();

@@ -12,7 +12,7 @@ use super::text::{Request, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 
-/// No frame leaves so soon after the answer to `rawmode`: python-can compares all that one read gives with that answer.
+/// Time after the answer to `rawmode` in which no frame is sent. python-can compares all bytes of one read with that answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
 /// Frames that wait for a client: some seconds of a full bus.
 const WAITING: usize = 65_536;
@@ -42,7 +42,7 @@ impl Out {
     }
 }
 
-/// Serves a client until it goes.
+/// Serves a client until it disconnects.
 pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
     let mut session = Session { inner, client, opened: None, writer: None };
     // An error of a client's connection ends this client only.
@@ -60,11 +60,11 @@ struct Session<'a> {
 
 impl Session<'_> {
     fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
-        // Each answer must be a segment of its own, at once.
+        // Each answer must be sent at once, in its own segment.
         stream.set_nodelay(true)?;
-        // A client whose computer was switched off is noticed.
+        // Detects a client whose computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // Only a request: the system may have limits of its own.
+        // This is only a request: the system may have its own limits.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
@@ -98,13 +98,13 @@ impl Session<'_> {
         self.inner.not_understood.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// False ends the connection.
+    /// Executes a request. Returns false to end the connection.
     fn execute(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
         match (request, &mut self.opened) {
             (Request::Echo, _) => reply(out, "< echo >")?,
             (Request::Open(name), None) => return self.open(name, out),
             (Request::RawMode, Some((_, member))) => {
-                // From here on the client receives the frames on the bus, which wait.
+                // From here on the client receives the frames of the bus, which wait in its queue.
                 let member = member.second_handle();
                 let mut output = out.lock();
                 member.set_deaf(false);
@@ -177,7 +177,7 @@ fn reply(out: &Out, text: &str) -> io::Result<()> {
     out.lock().stream.write_all(text.as_bytes())
 }
 
-/// The thread that writes frames; it ends when the member leaves the bus or the client takes no more.
+/// Writes frames, in its own thread, until the member leaves the bus or the client takes no more.
 fn write_frames(
     inner: &Arc<Inner>,
     member: VirtualBus,
@@ -191,7 +191,7 @@ fn write_frames(
             let (carried, not_carried) = write_batch(&received, &mut text);
             count(&inner.not_carried, not_carried);
             if write_text(&out, &text).is_err() {
-                // The reading thread ends with the socket.
+                // The reading thread ends when the socket is closed.
                 let _ = out.lock().stream.shutdown(Shutdown::Both);
                 return;
             }

@@ -56,7 +56,7 @@ pub(super) struct Inner {
     pub(super) not_understood: AtomicU64,
 }
 
-/// A connection, for those who end it or deliver to it.
+/// A connection, for threads that end it or deliver frames to it.
 pub(super) struct Client {
     pub(super) stream: TcpStream,
     /// Channel and membership of its hub.

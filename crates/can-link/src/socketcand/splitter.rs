@@ -1,4 +1,4 @@
-//! Messages of a TCP stream, wherever it is cut.
+//! Messages of a TCP stream that may be cut anywhere.
 
 /// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
 pub(crate) const LONGEST: usize = 512;
@@ -8,7 +8,7 @@ pub(crate) struct Splitter {
     /// Bytes after the last `<`.
     message: Vec<u8>,
     inside: bool,
-    /// The message in `message` was handed out.
+    /// The message in `message` was returned.
     complete: bool,
     noise: u64,
 }
@@ -23,7 +23,7 @@ impl Splitter {
         self.noise
     }
 
-    /// Bytes that it holds at most.
+    /// Returns the maximum number of bytes that the splitter holds.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn capacity(&self) -> usize {
         self.message.capacity()
@@ -39,7 +39,7 @@ impl Splitter {
             *bytes = rest;
             match byte {
                 b'<' => {
-                    // A message within a message: the first one lost its end.
+                    // A message begins within a message, so the end of the first one was lost.
                     self.noise += u64::from(self.inside);
                     self.inside = true;
                     self.message.clear();

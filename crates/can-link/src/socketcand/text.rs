@@ -115,7 +115,7 @@ fn id(word: &str) -> Option<Id> {
     if word.len() <= 3 { Id::standard(value).ok() } else { Id::extended(value).ok() }
 }
 
-/// Bytes as hex: one word for all, or a word for each, which may then lack its leading zero.
+/// Parses bytes in hex: one word for all, or a word for each. A word for one byte may lack its leading zero.
 fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<Vec<u8>> {
     let mut found = Vec::new();
     for word in words {
@@ -142,15 +142,15 @@ fn is_time(word: &str) -> bool {
     word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.') && word.parse::<f64>().is_ok()
 }
 
-/// A frame in the protocol; only classic data frames have a form there.
+/// Returns true if the protocol has a form for the frame. Only classic data frames have one.
 pub(crate) fn has_form(frame: &CanFrame) -> bool {
     !frame.is_fd() && !frame.is_remote()
 }
 
 /// Appends `< frame … >` with the time since 1970.
 ///
-/// The bytes stand without blanks between them, because python-can reads the first word only; without bytes two blanks
-/// follow each other, because python-can does not find the empty word otherwise.
+/// The bytes have no blanks between them, because python-can reads only the first word. Without bytes there are two blanks in a row,
+/// because python-can would not find the empty word otherwise.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     let (s, us) = (time.as_secs(), time.subsec_micros());
     let written = write!(text, "< frame {} {s}.{us:06} ", frame.id()).and_then(|()| {
@@ -160,8 +160,8 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     written.expect("a String takes everything");
 }
 
-/// Appends `< error CLASS TIME >` for a controller that has left the bus or is back; other states would need the data of an
-/// error frame, which the protocol does not carry.
+/// Appends `< error CLASS TIME >` for a controller that has left the bus or is back. Other states would need the data of an error frame,
+/// which the protocol does not carry.
 pub(crate) fn push_state(text: &mut String, state: ErrorState, time: Duration) {
     let class = match state {
         ErrorState::BusOff => CLASS_BUS_OFF,

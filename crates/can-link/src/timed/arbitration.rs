@@ -1,4 +1,4 @@
-//! Arbitration: which members go on sending when several start at once (ISO 11898-1).
+//! Arbitration: selects the members that continue to send if several start at once (ISO 11898-1).
 
 use super::confinement::Counters;
 use super::event::MemberId;
@@ -21,19 +21,19 @@ pub(super) struct Arbitration {
     pub(super) frame: CanFrame,
     /// Number of bits from start to CRC; up to the error if the frame is destroyed.
     pub(super) bits: u32,
-    /// All who sent the winning identifier, when their frames differ.
+    /// All members that sent the winning identifier, if their frames differ.
     pub(super) collision: Vec<MemberId>,
     /// Members of a collision whose send failed.
     pub(super) failed: Vec<MemberId>,
 }
 
 impl Arbitration {
-    /// The member has sent more than its arbitration.
+    /// Returns true if the member has sent more than its arbitration.
     pub(super) fn involves(&self, member: MemberId) -> bool {
         self.senders.contains(&member) || self.failed.contains(&member)
     }
 
-    /// `None` without starters.
+    /// Arbitrates between the starters. Returns `None` without starters.
     pub(super) fn of(starters: &[Starter]) -> Option<Self> {
         let best = starters.iter().map(|starter| arbitration(&starter.frame)).min()?;
         let mut sending: Vec<(Starter, WireBits)> = starters
@@ -72,7 +72,7 @@ impl Arbitration {
     }
 }
 
-/// The first bit in which the frames differ.
+/// Returns the first bit in which the frames differ.
 fn first_difference(sending: &[(Starter, WireBits)]) -> Option<usize> {
     let (_, first) = sending.first()?;
     let differs =

@@ -31,7 +31,8 @@ impl Counters {
         self.tec = self.tec.saturating_add(8);
     }
 
-    /// Counts a missing acknowledgement. A passive sender does not count further: a member that is alone never leaves the bus for it.
+    /// Counts a missing acknowledgement. A passive sender does not count further, so that a member that is alone never leaves the bus
+    /// because of missing acknowledgements.
     pub(crate) fn not_acknowledged(&mut self) {
         if !self.passive() {
             self.send_failed();
@@ -47,13 +48,13 @@ impl Counters {
     }
 }
 
-/// Sequences of 11 recessive bits that a member in bus-off still has to wait for.
+/// Number of sequences of 11 recessive bits for which a member in bus-off must still wait.
 ///
 /// These sequences come one after the other on an idle bus, and once at the end of each frame: the delimiter of its
 /// acknowledgement or of its error frame, the end, and the intermission. On a busy bus a member is back after 128 frames at the earliest.
 pub(crate) struct Recovery {
     pub left: u32,
-    /// Recessive since then, ns; `None` while a frame is on the wire.
+    /// Time since which the wire is recessive, ns; `None` while a frame is on the wire.
     pub recessive_from: Option<u64>,
 }
 

@@ -2,8 +2,8 @@
 
 use crate::{CanFrame, ControllerState};
 
-/// A member of a [`TimedBus`](crate::TimedBus), of use with that bus alone: another one may panic. The numbers count up and
-/// are never used twice.
+/// A member of a [`TimedBus`](crate::TimedBus). Only valid for that bus: another bus may panic. The numbers increase and are never used
+/// twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
@@ -33,14 +33,14 @@ pub enum BusEvent {
         /// The frame.
         frame: CanFrame,
     },
-    /// A member's frame is dropped: its sender sends once only, or is bus-off.
+    /// A member's frame is dropped: its sender sends each frame only once, or is bus-off.
     Failed {
         /// Sender.
         member: MemberId,
         /// The frame.
         frame: CanFrame,
     },
-    /// Something went wrong with a frame. Its senders try again unless they send once only.
+    /// A frame has failed. Its senders try again, unless they send each frame only once.
     Error {
         /// Error.
         error: BusError,
@@ -72,13 +72,13 @@ pub enum BusError {
 /// Reasons why a frame cannot be queued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum QueueError {
-    /// This bus is a classic one.
+    /// The frame is a CAN FD frame, but the bus is classic.
     #[error("CAN FD frames are none of a bus in virtual time, which is classic")]
     NotClassic,
     /// The member's controller has left the bus until it recovers.
     #[error("the member is bus-off; its controller must recover first")]
     BusOff,
-    /// The member's queue has no room.
+    /// The member's queue is full.
     #[error("{0} frames of this member wait already; is the bus overloaded, or does nobody acknowledge?")]
     Full(usize),
     /// The member has left.
@@ -91,11 +91,11 @@ pub enum QueueError {
 pub struct BusStats {
     /// Virtual time, ns.
     pub now_ns: u64,
-    /// Time in which the bus was taken, intermissions and error frames included, ns.
+    /// Time for which the bus was busy, intermissions and error frames included, ns.
     pub busy_ns: u64,
     /// Frames that were acknowledged.
     pub frames: u64,
-    /// Frames that several members sent in one, bit for bit alike (counted in `frames` as one).
+    /// Identical frames that several members sent at the same time (counted in `frames` as one).
     pub shared: u64,
     /// Collisions.
     pub collisions: u64,
@@ -106,7 +106,7 @@ pub struct BusStats {
 }
 
 impl BusStats {
-    /// Share of the time since `earlier` in which the bus was taken, 0 to 1.
+    /// Returns the share of the time since `earlier` in which the bus was busy, 0 to 1.
     pub fn load_since(&self, earlier: &Self) -> f64 {
         let time = self.now_ns.saturating_sub(earlier.now_ns);
         let busy = self.busy_ns.saturating_sub(earlier.busy_ns);

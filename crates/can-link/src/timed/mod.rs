@@ -17,15 +17,14 @@ pub use event::{BusError, BusEvent, BusStats, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
 use wire::{ERROR_FRAME, INTERMISSION, RECESSIVE_RUN, RECOVERIES, TO_ACKNOWLEDGE};
 
-/// Frames of a member that wait at most.
+/// Maximum number of frames of a member that wait.
 const QUEUE: usize = 65_536;
 
 /// A classic CAN bus in virtual time.
 ///
-/// Frames take as long as they do on a wire of the bit rate, stuffing counted bit by bit. Among the first frames of all
-/// queues the identifier arbitrates as on the wire. Members acknowledge, count errors, become passive and leave the bus as
-/// ISO 11898-1 has it; two members that send one identifier with different data at once collide. Equal calls and equal seeds
-/// give equal events.
+/// Frames take as long as on a wire of this bit rate, with stuffing counted bit by bit. The identifiers of the first frames of all queues
+/// arbitrate as on the wire. Members acknowledge, count errors, become passive and leave the bus as ISO 11898-1 has it; two members that
+/// send one identifier with different data at once collide. Equal calls and equal seeds give equal events.
 ///
 /// ```
 /// use can_link::{CanFrame, BusEvent, Id, TimedBus};
@@ -62,7 +61,7 @@ struct Member {
     /// Faults on the way to the queue and from the bus.
     lines: Option<Box<(Line, Line)>>,
     counters: Counters,
-    /// A passive member lets others go first.
+    /// A passive member lets others start first.
     may_start: u64,
     /// Recovery from bus-off.
     recovery: Option<Recovery>,
@@ -95,11 +94,11 @@ fn ns(time: Duration) -> Option<u64> {
     u64::try_from(time.as_nanos()).ok()
 }
 
-/// Nearly 300 years, ns; virtual time goes no further.
+/// End of virtual time: nearly 300 years, ns.
 const END_OF_TIME: u64 = u64::MAX / 2;
 
 impl TimedBus {
-    /// A bus without members at time 0; `bitrate` in bit/s, 0 counts as 1. The seed is that of the disturbances.
+    /// Creates a bus without members at time 0. `bitrate` is in bit/s; 0 counts as 1. `seed` is the seed of the disturbances.
     pub fn new(bitrate: u32, seed: u64) -> Self {
         Self {
             bitrate: bitrate.max(1),
@@ -115,13 +114,13 @@ impl TimedBus {
         }
     }
 
-    /// Lets controllers begin to recover as soon as they are bus-off, or not, as `restart-ms` of Linux and the automatic recovery
-    /// of many controllers do. Frames queued in between wait. Otherwise [`recover`](Self::recover) begins the recovery.
+    /// Sets if controllers begin to recover as soon as they are bus-off, like `restart-ms` of Linux and the automatic recovery of many
+    /// controllers. Frames queued in between wait. Otherwise [`recover`](Self::recover) begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
         self.recovers_by_itself = recovers;
     }
 
-    /// Adds a member. It acknowledges, receives frames that end from now on, and tries again when sending fails.
+    /// Adds a member. The member acknowledges, receives frames that end from now on, and tries again if sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -146,7 +145,7 @@ impl TimedBus {
         member.left = true;
     }
 
-    /// Forgets the queued frames of the member and its error counters, as a reset does: the member is on the bus again. A frame on
+    /// Clears the queued frames of the member and its error counters, as a reset does. The member is on the bus again. A frame on
     /// the wire ends unchanged, but is not sent again.
     pub fn clear(&mut self, member: MemberId) {
         let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.arbitration.involves(member));
@@ -157,7 +156,7 @@ impl TimedBus {
         self.restart(number);
     }
 
-    /// Counters of a member as after power-up.
+    /// Resets the counters of a member as after power-up.
     fn restart(&mut self, number: MemberId) {
         let member = &mut self.members[number.0];
         member.recovery = None;
@@ -168,17 +167,17 @@ impl TimedBus {
         }
     }
 
-    /// A member that gives up a frame after one failure instead of trying again.
+    /// Sets if a member drops a frame after one failure instead of trying again.
     pub fn set_one_shot(&mut self, member: MemberId, one_shot: bool) {
         self.members[member.0].one_shot = one_shot;
     }
 
-    /// Lets a member acknowledge received frames, or not.
+    /// Sets if a member acknowledges received frames.
     pub fn set_acknowledges(&mut self, member: MemberId, acknowledges: bool) {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Sets the faults between a member and the bus, as of a gateway: the bus itself does not notice them.
+    /// Sets the faults between a member and the bus, like those of a gateway. The bus itself does not notice them.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -192,12 +191,12 @@ impl TimedBus {
         lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
     }
 
-    /// Share of the frames in which a bit is disturbed on the wire, 0 to 1: they are destroyed by an error frame.
+    /// Sets the share of the frames in which a bit is disturbed on the wire, 0 to 1. An error frame destroys these frames.
     pub fn set_disturbance(&mut self, share: f64) {
         self.disturbance = share;
     }
 
-    /// Puts a frame at the end of a member's queue.
+    /// Adds a frame at the end of a member's queue.
     pub fn queue(&mut self, member: MemberId, frame: CanFrame) -> Result<(), QueueError> {
         let now = time(self.now);
         let member = &mut self.members[member.0];
@@ -221,7 +220,7 @@ impl TimedBus {
         Ok(())
     }
 
-    /// Frames of the member that wait, the one on the wire included.
+    /// Returns the number of frames of the member that wait, including the one on the wire.
     pub fn pending(&self, member: MemberId) -> usize {
         self.members[member.0].queue.len()
     }
@@ -231,8 +230,8 @@ impl TimedBus {
         self.members[member.0].counters.state()
     }
 
-    /// Starts the recovery of a member that is bus-off: it is back when it has seen 11 recessive bits 128 times (ISO 11898-1), which
-    /// takes 1408 bit times on an idle bus.
+    /// Starts the recovery of a member that is bus-off. The member is back when it has seen 11 recessive bits 128 times (ISO 11898-1),
+    /// which takes 1408 bit times on an idle bus.
     pub fn recover(&mut self, member: MemberId) {
         let recessive_from = self.transfer.is_none().then_some(self.now);
         let member = &mut self.members[member.0];
@@ -241,7 +240,7 @@ impl TimedBus {
         }
     }
 
-    /// Virtual time, ns.
+    /// Returns the virtual time, ns.
     pub fn now_ns(&self) -> u64 {
         self.now
     }
@@ -268,8 +267,8 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Advances to the next event, or to `at_ns` if none comes before. Call it until it returns none: while it returns
-    /// events, the present time is the time of the event, and frames that are queued then compete from that time on.
+    /// Advances to the next event, or to `at_ns` if none comes before. Call it until it returns `None`. While it returns events, the
+    /// present time is the time of the event, and frames that are queued then compete from that time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -328,7 +327,7 @@ impl TimedBus {
                 self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
-        // Events of this moment come first: who reacts to them takes part in the next arbitration.
+        // Events of this time come first: members that react to them take part in the next arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
         }

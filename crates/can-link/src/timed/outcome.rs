@@ -54,7 +54,7 @@ impl TimedBus {
             if senders.contains(&number) || !self.members[number.0].on_bus() {
                 continue;
             }
-            // A member that dropped out of a collision goes on as a listener, as on the wire.
+            // A member that dropped out of a collision continues as a listener, as on the wire.
             self.count(number, Counters::received);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),
@@ -96,7 +96,7 @@ impl TimedBus {
         }
     }
 
-    /// Moves a member's counters; a new error state is an event.
+    /// Changes a member's counters. A new error state causes an event.
     fn count(&mut self, number: MemberId, how: fn(&mut Counters)) {
         let member = &mut self.members[number.0];
         if !member.on_bus() {

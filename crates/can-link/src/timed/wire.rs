@@ -12,7 +12,7 @@ const TAIL: u32 = 1 + 1 + 1 + 7;
 pub(crate) const TO_ACKNOWLEDGE: u32 = 2;
 /// Between frames.
 pub(crate) const INTERMISSION: u32 = 3;
-/// An error flag, the echo of the others, and the delimiter: an error frame at its longest.
+/// An error flag, the echo of the others, and the delimiter: the longest error frame.
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
 /// Wait of an error passive member after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
@@ -24,7 +24,7 @@ pub(crate) const RECOVERIES: u32 = 128;
 /// Most bits from the start of a frame to the end of its CRC, stuffing included (29-bit identifier, 8 bytes: 118 and 29).
 const MOST: usize = 147;
 
-/// The bits from start of frame to CRC, stuffed.
+/// The bits from start of frame to CRC, with stuff bits.
 #[derive(Clone, Copy)]
 pub(crate) struct WireBits {
     bits: [bool; MOST],
@@ -32,7 +32,7 @@ pub(crate) struct WireBits {
 }
 
 impl WireBits {
-    /// `None` for CAN FD.
+    /// Returns the bits of a frame, or `None` for CAN FD.
     pub(crate) fn of(frame: &CanFrame) -> Option<Self> {
         if frame.is_fd() {
             return None;
@@ -100,9 +100,10 @@ fn crc15(crc: u16, bit: bool) -> u16 {
     (crc << 1 ^ if out { 0x4599 } else { 0 }) & 0x7FFF
 }
 
-/// The frame that wins arbitration has the lowest of these; equal ones do not arbitrate.
+/// Returns the arbitration key. The frame with the lowest key wins; equal keys do not arbitrate.
 ///
-/// Base identifier; then the remote bit of an 11-bit frame, at the place of the recessive substitute bit of a 29-bit one.
+/// The key begins with the base identifier. Then comes the remote bit of an 11-bit frame, at the position of the recessive substitute bit
+/// of a 29-bit frame.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     let (value, remote) = (frame.id().value(), u32::from(frame.is_remote()));
     if frame.is_extended() {
@@ -112,9 +113,9 @@ pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     }
 }
 
-/// The exact length of a classic frame on the wire, stuffing and the three bits of intermission included; `None` for CAN FD.
+/// Returns the exact length of a classic frame on the wire, stuffing and the three bits of intermission included, or `None` for CAN FD.
 ///
-/// The bits of a second are the bit rate, so a bus is full when the lengths of a second's frames add up to it.
+/// A bus is full if the lengths of the frames of one second add up to the bit rate.
 pub fn classic_frame_bits(frame: &CanFrame) -> Option<u32> {
     WireBits::of(frame).map(|bits| bits.bits().len() as u32 + TAIL + INTERMISSION)
 }
@@ -130,7 +131,7 @@ mod tests {
             (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
             (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
         ];
-        // Runs of equal bits, which need stuffing, are likelier than at random.
+        // Runs of equal bits, which need stuffing, are more likely than in random bytes.
         let byte = prop_oneof![any::<u8>(), Just(0), Just(0xFF), Just(0x0F), Just(0xF0)];
         (id, prop::collection::vec(byte, 0..=8), any::<bool>()).prop_map(|(id, data, remote)| match remote {
             true => CanFrame::remote(id, data.len()).unwrap(),

@@ -24,7 +24,7 @@ fn numbered(number: u32) -> CanFrame {
     frame(0x100, &number.to_be_bytes())
 }
 
-/// The next frame of a bus in real time.
+/// Returns the next frame of a bus in real time.
 fn take(bus: &mut impl CanBus) -> CanFrame {
     let mut patience = Patience::begin();
     loop {
@@ -43,19 +43,19 @@ fn until(mut done: impl FnMut() -> bool) {
     }
 }
 
-/// A server of the socketcand protocol and the bus behind it.
+/// A server of the socketcand protocol and its bus.
 fn socketcand_bench() -> (SocketcandServer, VirtualHub) {
     let hub = VirtualHub::new();
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     (server, hub)
 }
 
-/// What happens on a bus in virtual time up to a moment.
+/// Returns the events of a bus in virtual time up to a time.
 fn run(bus: &mut TimedBus, until_ns: u64) -> Vec<TimedEvent> {
     std::iter::from_fn(|| bus.advance_to(until_ns)).collect()
 }
 
-/// The frames that a member received.
+/// Returns the frames that a member received.
 fn received(events: &[TimedEvent], by: MemberId) -> Vec<CanFrame> {
     let frame = |event: &TimedEvent| match event.what {
         BusEvent::Received { member, frame } if member == by => Some(frame),

@@ -1,4 +1,4 @@
-//! The socketcand protocol on the wire: what a client that knows nothing but the protocol sees.
+//! The socketcand protocol on the wire, as a client sees it that knows only the protocol.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -20,7 +20,7 @@ impl Raw {
         Self(stream)
     }
 
-    /// One read, as python-can does it.
+    /// Reads once, like python-can.
     fn read(&mut self) -> String {
         let mut buffer = [0; 256];
         let count = self.0.read(&mut buffer).unwrap();
@@ -85,15 +85,15 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
         let alone = (0..50).any(|_| {
             let mut client = Raw::connect(&server);
             assert_eq!(client.read(), "< hi >");
-            // None before raw mode.
+            // Before raw mode the client receives no frames.
             assert_eq!(client.ask("< open can0 >"), "< ok >");
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
-            // Long enough for frames that are not held back; on a busy computer sometimes too long for those that are.
+            // Long enough for frames that are not held back. On a busy computer this is sometimes long enough for those that are, too.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
             assert!(first.starts_with("< ok >"), "{first}");
-            // What was held back comes, without a gap.
+            // The frames that were held back arrive without a gap.
             let text = client.read_until(" >< frame 100 ");
             let text = text + &client.read_until(" >< frame 100 ");
             let numbers: Vec<_> = text.split(" >").filter_map(|line| line.get(line.len() - 8..)).collect();
@@ -186,20 +186,20 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    // A sender would wait for ever for a member that it waits for.
+    // If a sender waited for this member, it would wait for ever.
     let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
     let mut listener = open(&server.url("can0")).unwrap();
-    // More than waits for it and fits into the buffers of any system.
+    // More frames than fit into its queue and into the buffers of any system.
     let count = 100_000;
     let (done, waited) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
         let mut received = 0;
         for number in 0..count {
             node.send(&numbered(number)).unwrap();
-            // A client that reads receives all.
+            // A client that reads receives all frames.
             if number % 1000 == 999 {
                 while received <= number {
                     assert_eq!(take(&mut listener), numbered(received));
@@ -211,7 +211,7 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // It is still a client: it finds the oldest that waited, and with room again receives what is new.
+    // The sleeper is still a client: it finds the oldest frames that waited. When its queue has space again, it receives new frames.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
         sleeper.read();
@@ -235,7 +235,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     assert_eq!(client.ask("< open can0 >"), "< ok >");
     assert_eq!(client.ask("< subscribe 0 0 123 >"), "< error unknown command >");
     assert_eq!(client.ask("< rawmode >"), "< ok >");
-    // In raw mode no error texts: python-can would stumble over them.
+    // In raw mode the server sends no error texts, because python-can could not parse them.
     client.write("< noise >< send 281 9 >< send xyz 0  ><<<>>> \u{e4} < \u{e4} >");
     client.write(&"x".repeat(100_000));
     client.write(&format!("< {}", "y".repeat(100_000)));
@@ -292,7 +292,7 @@ fn ten_thousand_visitors_leave_nothing_behind() {
         // The server may have ended the connection already.
         let _ = stream.write_all(texts[number % texts.len()]);
         if number % 16 == 15 {
-            // No more at a time than there is room for.
+            // At most as many connections at a time as the server accepts.
             until(|| server.stats().accepted > number as u64 && server.stats().clients < 32);
         }
     }

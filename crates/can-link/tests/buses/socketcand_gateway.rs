@@ -27,7 +27,7 @@ fn a_host_can_run_the_bus_itself() {
     a.send(&numbered(1)).unwrap();
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
-    // No client has received it yet: the host decides.
+    // No client has received the frame yet, because the host decides.
     gateway.deliver(0, &numbered(2), None);
     gateway.deliver(0, &numbered(1), Some(id_a));
     gateway.deliver(0, &numbered(3), None);
@@ -42,7 +42,7 @@ fn a_host_can_run_the_bus_itself() {
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
     assert_eq!(gateway.next(Duration::ZERO), None);
-    // Full queues towards a host that takes nothing do not keep the gateway from ending.
+    // Full queues towards a host that takes no events do not prevent the end of the gateway.
     std::thread::scope(|scope| {
         scope.spawn(move || while b.send(&numbered(4)).is_ok() {});
         until(|| gateway.stats().received > 1000);

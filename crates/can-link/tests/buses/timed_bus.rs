@@ -59,7 +59,7 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
     bus.queue(b, frame(0x100, &[])).unwrap();
     let events = run(&mut bus, 2 * MS);
     assert_eq!(received(&events, listener), [frame(0x100, &[]), remote]);
-    // A frame on the wire goes on.
+    // A frame on the wire is not interrupted.
     bus.queue(a, frame(0x700, &[])).unwrap();
     assert_eq!(bus.advance_to(2 * MS + 10_000), None);
     bus.queue(b, frame(0x000, &[])).unwrap();
@@ -149,7 +149,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     assert_eq!([a, b].map(|member| bus.state(member).tec), [Some(8), Some(8)]);
     assert_eq!(bus.state(listener).rec, Some(1));
     let events = run(&mut bus, 20 * MS);
-    // 16 failures make both passive at once; in the 17th collision the one with the dominant bit goes through.
+    // 16 failures make both passive at once. In the 17th collision the node with the dominant bit succeeds.
     assert_eq!(bus.stats().collisions, 17);
     assert_eq!(received(&events, listener), [one, other]);
     assert_eq!(received(&events, b), [one], "the member that dropped out receives it");
@@ -180,7 +180,7 @@ fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     assert_eq!(bus.pending(b), 0);
 }
 
-/// D-05: whoever goes on colliding leaves the bus in the end.
+/// D-05: a node that collides again and again finally leaves the bus.
 #[test]
 fn d_05_endless_collisions_end_in_bus_off() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -205,7 +205,7 @@ fn d_05_endless_collisions_end_in_bus_off() {
     assert_eq!(bus.queue(b, frame(1, &[])), Err(QueueError::BusOff));
 }
 
-/// D-07: frames that are alike bit for bit are one frame on the wire.
+/// D-07: frames with identical bits are one frame on the wire.
 #[test]
 fn d_07_frames_alike_bit_for_bit_look_like_one() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -220,7 +220,7 @@ fn d_07_frames_alike_bit_for_bit_look_like_one() {
     assert_eq!((bus.pending(a), bus.pending(b)), (0, 0));
 }
 
-/// D-03 and the load of 11: at 1 Mbit/s a bus carries exactly the bits that its rate has.
+/// D-03 and the load of 11: a bus at 1 Mbit/s carries exactly as many bits as its rate says.
 #[test]
 fn the_load_is_the_share_of_bits() {
     for bitrate in [1_000_000, 500_000, 250_000, 125_000] {

@@ -20,7 +20,7 @@ fn who_is_alone_tries_for_ever_and_becomes_passive_but_never_bus_off() {
         .collect();
     let (active, passive) = (times[1] - times[0], times[101] - times[100]);
     assert_eq!(passive - active, 8000);
-    // A member that receives and does not acknowledge does not help; the next does.
+    // A member that receives but does not acknowledge does not help; the next one acknowledges.
     let mute = bus.join();
     bus.set_acknowledges(mute, false);
     assert!(received(&run(&mut bus, 101 * MS), mute).is_empty());
@@ -44,7 +44,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     assert_eq!((failed, bus.state(a).errors), (2, ErrorState::BusOff));
     assert_eq!(bus.state(b).rec, Some(32));
     bus.set_disturbance(0.0);
-    // It receives nothing and acknowledges nothing meanwhile.
+    // A member in bus-off does not receive and does not acknowledge.
     bus.queue(b, frame(0x200, &[])).unwrap();
     assert!(
         run(&mut bus, 51 * MS)
@@ -55,7 +55,7 @@ fn a_wire_that_is_always_disturbed_ends_in_bus_off_and_recovery_brings_back() {
     let events = run(&mut bus, 100 * MS);
     let is_back = |event: &TimedEvent| matches!(event.what, BusEvent::State { member, .. } if member == a);
     let back = events.iter().position(is_back).unwrap();
-    // Nobody acknowledges the other one's frame: each try ends with 11 recessive bits.
+    // No member acknowledges the other frame: each attempt ends with 11 recessive bits.
     assert_eq!(errors(&events[..back]), [BusError::NotAcknowledged; 128]);
     assert_eq!(received(&events, a), [frame(0x200, &[])]);
     bus.queue(a, frame(0x100, &[1])).unwrap();
@@ -87,7 +87,7 @@ fn recovery_on_a_busy_bus_takes_128_frames() {
         bus.advance_to(50 * MS);
     }
     bus.set_disturbance(0.0);
-    // Waits for it, and nobody's frame waits meanwhile.
+    // The frame waits for the recovery, and no other frame waits meanwhile.
     bus.queue(a, frame(0x001, &[])).unwrap();
     for _ in 0..200 {
         bus.queue(b, frame(0x200, &[0x55; 8])).unwrap();
@@ -156,7 +156,7 @@ fn faults_of_a_member_are_those_of_a_gateway_and_cost_no_counters() {
         events.iter().filter(|e| matches!(e.what, BusEvent::Sent { .. })).map(|e| e.at_ns).collect();
     let times = events.iter().filter(|e| matches!(e.what, BusEvent::Received { .. })).map(|e| e.at_ns);
     assert!(times.into_iter().all(|at| sent.contains(&(at - MS))));
-    // Corruption before the queue is a frame like any other on the wire.
+    // A frame that is corrupted before the queue is like any other frame on the wire.
     bus.set_faults(
         a,
         FaultSchedule {

@@ -2,7 +2,7 @@
 //!
 //!     cargo run --profile dist -p jtc-plan --example campaign -- [CASES [SEED]]
 //!
-//! Prints the seed of every case that is wrong, and ends with 1 if there was one.
+//! Prints the seed of every wrong case. Ends with exit code 1 if a case was wrong.
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;

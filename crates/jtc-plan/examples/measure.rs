@@ -1,11 +1,11 @@
-//! Measures what planning takes, and how good motions that are limited in jerk are, on fixed random waypoints.
+//! Measures the planning time, and the quality of jerk-limited motions, on fixed random waypoints.
 //!
 //!     cargo run --profile dist -p jtc-plan --example measure -- speed
 //!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
 //!
-//! `speed` prints time of the processor in ms, the least of some plans. `quality` prints a line for each kind of path: the sums and the
-//! worst of durations as shares of those without a limit of jerk, and how many motions became slower with all limits doubled. With a
-//! file name behind the seed, the duration of each motion is written to it.
+//! `speed` prints the processor time in ms, the least of some plans. `quality` prints a line for each kind of path: sum and worst case of
+//! the durations, as shares of the durations without a jerk limit, and the number of motions that became slower with all limits doubled. If
+//! a file name follows the seed, the duration of each motion is written to that file.
 use std::fmt::Write as _;
 
 use jtc_core::{Config, Parameters};
@@ -21,7 +21,7 @@ fn main() {
     }
 }
 
-/// Time of the processor that this thread has used, ms (Linux).
+/// Returns the processor time that this thread has used, ms (Linux).
 fn cpu_ms() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(f64::NAN) * 1e-6
@@ -31,7 +31,7 @@ fn random(rng: &mut fastrand::Rng, size: f64) -> JointVec {
     std::array::from_fn(|_| size * (2.0 * rng.f64() - 1.0))
 }
 
-/// That of `cargo xtask bench`: steps of 0.4 rad at most, within 1 rad.
+/// Returns a random walk within ±1 rad, with steps of at most `size` rad per joint, as in `cargo xtask bench`.
 fn walk(rng: &mut fastrand::Rng, count: usize, size: f64) -> Vec<JointVec> {
     let mut all = vec![[0.0; JOINTS]];
     while all.len() < count {

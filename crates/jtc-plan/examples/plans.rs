@@ -1,12 +1,12 @@
-//! Plans what standard input asks for, for comparison with other implementations.
+//! Plans the motions that standard input requests, for comparison with other implementations.
 //!
-//! Lines of words, each number with all its digits; the arm is the default one, without friction and payload:
+//! Input is lines of words, each number with all its digits. The arm is the default one, without friction and payload:
 //!
-//! - `limits`, then velocity, acceleration, jerk (`inf`: none) and torque of six joints: those from here on.
-//! - `move`, then six joints from where and six to where: answered by the duration in s.
-//! - `path`, then the blend (rad), 1 with torque or 0 without, how many places are wanted, and waypoints of six joints: answered by a line
-//!   with duration (s), time that planning took (s) and the number of places, and a line for each of these: the path's parameter,
-//!   then position, first and second derivative of six joints.
+//! - `limits`, then velocity, acceleration, jerk (`inf`: none) and torque of six joints: sets the limits for the lines that follow.
+//! - `move`, then start and end positions of six joints: prints the duration in s.
+//! - `path`, then the blend (rad), 1 with torque or 0 without, the number of places, and waypoints of six joints: prints a line with
+//!   duration (s), planning time (s) and the number of places. A line for each place follows: the path's parameter, then position, first
+//!   and second derivative of six joints.
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::time::Instant;
@@ -62,7 +62,7 @@ fn path(
     let start = Instant::now();
     let motion = along(&path, limits, (*with_torque == 1.0).then_some(arm))?;
     let taken = start.elapsed().as_secs_f64();
-    // As many as asked for, and where the path changes its form.
+    // The requested number of places, and the places at which the path changes its form.
     let mut parameters: Vec<f64> = (0..=*places as usize).map(|i| path.end() * i as f64 / places).collect();
     parameters.extend(path.breaks());
     parameters.sort_by(f64::total_cmp);

@@ -1,12 +1,12 @@
 //! Answers poses of the flange with joint positions, and lines of the flange with paths, for comparison with other implementations.
 //!
-//! Standard input, a line each; each but `model` is answered by a line:
+//! Input is lines of words. Each line except `model` is answered by a line:
 //!
 //! - `model`: 7 joint origins (xyz in m, rpy in rad), then lowest and highest position of the 6 joints (rad).
-//! - `pose`: position (m), quaternion x y z w, joint positions to be near to: `solved`, the nearest solution, and all within the
-//!   limits; or `refused` and why.
-//! - `line`: joint positions to start from, position and quaternion where it ends, number of samples: `path`, and for each sample,
-//!   evenly from start to end, its parameter, joint positions, first and second derivatives; or `refused` and why.
+//! - `pose`: position (m), quaternion x y z w, joint positions that the solution should be near to: `solved`, the nearest solution, and all
+//!   solutions within the limits; or `refused` and the reason.
+//! - `line`: joint positions at the start, position and quaternion at the end, number of samples: `path`, and for each sample, evenly from
+//!   start to end, its parameter, joint positions, first and second derivatives; or `refused` and the reason.
 use std::io::{BufRead, Write};
 
 use jtc_dynamics::{ArmModel, Origin, Pose};

@@ -8,11 +8,10 @@ use crate::motion::Motion;
 use crate::path::Path;
 use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 
-/// Plans the fastest motion from rest to rest along a path within velocity, acceleration and torque: time-optimal path
-/// parameterisation by reachability analysis (Pham and Pham 2018). If the limits have a jerk, an interior-point method
-/// shortens the time law. It starts from a law that is averaged over a window and uses velocity, acceleration, jerk and
-/// torque at places along the path. The motion is also verified between its samples, and slowed down until all limits
-/// hold.
+/// Plans the fastest motion from rest to rest along a path within velocity, acceleration and torque: time-optimal path parameterisation by
+/// reachability analysis (Pham and Pham 2018). If the limits have a jerk, an interior-point method shortens the time law. The method starts
+/// from a law that is averaged over a window, and uses velocity, acceleration, jerk and torque at places along the path. The motion is also
+/// verified between its samples, and slowed down until all limits hold.
 ///
 /// # Errors
 ///
@@ -245,7 +244,7 @@ const FASTER: f64 = 1.1;
 
 /// Number of repairs of single cells in which a limit is violated between the samples, before the whole motion is slowed down.
 const REPAIRS: usize = 4;
-/// Maximum factor by which the whole motion is slowed down instead of a repair.
+/// Maximum slowdown factor of the whole motion that replaces a repair.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
@@ -292,7 +291,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns a time factor for each cell with which its limits hold.
+    /// Returns a time factor for each cell, which makes its limits hold.
     pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

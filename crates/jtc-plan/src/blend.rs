@@ -203,8 +203,8 @@ impl BlendedPath {
     }
 }
 
-/// Step from 0 at 0 to 1 at 1 whose slope rises, stays constant and falls for a third each. Of all steps with a slope
-/// of at most 3/2 this one has the smallest second derivative. Returns its integral, its value and its slope at `u`.
+/// Step from 0 at 0 to 1 at 1 whose slope rises, stays constant and falls for a third each. No other step with a slope of at most 3/2 has a
+/// smaller second derivative. Returns the integral, the value and the slope of the step at `u`.
 fn step(u: f64) -> (f64, f64, f64) {
     const THIRD: f64 = 1.0 / 3.0;
     if u < THIRD {

@@ -5,7 +5,7 @@ use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
-/// Shares of the blend by which dropped waypoints may deviate from the line.
+/// Maximum deviations of dropped waypoints from the line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
 /// Factor of corners over a thinner path from which a path is not planned.
 const DENSE: usize = 8;

@@ -11,14 +11,14 @@ use crate::motion::Motion;
 use crate::profile::{self, Bounds};
 use crate::{JOINTS, Limits};
 
-/// Factor by which the acceleration is lowered from attempt to attempt: lower accelerations have shorter ramps.
+/// Factor of the acceleration from attempt to attempt: lower accelerations have shorter ramps.
 const LOWER: f64 = 0.7;
 /// Maximum number of attempts.
 const ATTEMPTS: usize = 24;
 /// Shares of acceleration and jerk that the curvature may use, in the order of the attempts: nearly all if the path
 /// keeps its speed in curves, less if its speed must change there.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// Maximum factor by which the whole motion is slowed down instead of a repair.
+/// Maximum slowdown factor of the whole motion that replaces a repair.
 const LEFT_OVER: f64 = 1.002;
 /// Like [`LEFT_OVER`], for a law by the interior-point method.
 const LITTLE: f64 = 1.005;

@@ -87,8 +87,8 @@ impl Kinematics {
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
     }
 
-    /// Returns the joint positions within the limits that bring the flange to `target`. Of all solutions it returns the
-    /// one nearest to `near`: with the smallest sum of squares of the joint motions.
+    /// Returns the joint positions within the limits that bring the flange to `target`. The solution is the one nearest to `near`: the one
+    /// with the smallest sum of squares of the joint motions.
     ///
     /// A singular target, with infinitely many solutions, returns one near `near`.
     ///

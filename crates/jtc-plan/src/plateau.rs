@@ -2,8 +2,8 @@
 //! so that it need not change by both in one window.
 use crate::profile::simplified;
 
-/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until it lasts for `window` seconds, or until
-/// it is no higher than the lowest adjacent speed.
+/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until it lasts for `window` seconds, or until it is as low as the
+/// lowest adjacent speed.
 pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk { done: Vec::with_capacity(vertices.len()), ahead: vertices, next: 0 };
     while walk.next < vertices.len() {

@@ -15,7 +15,7 @@ const TORQUE_SHARE: f64 = 0.9985;
 const MUCH: f64 = 1.01;
 /// Maximum number of torque samples; a longer motion has them further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
-/// Maximum factor of the time by which a motion is slowed down for its torque.
+/// Maximum time factor of a motion that is slowed down for its torque.
 const SLOWEST: f64 = 64.0;
 
 /// Returns the limits restricted to the speeds in the friction table (J-36).
@@ -52,8 +52,7 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the factor by which a piece's time must be multiplied so that velocity, acceleration and jerk hold
-/// everywhere in it; below 1 if they hold.
+/// Returns the factor for a piece's time that makes velocity, acceleration and jerk hold everywhere in it; below 1 if they already hold.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
@@ -78,7 +77,7 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// Returns the factor by which a piece's time must be multiplied so that the torque suffices in it, by a few samples.
+/// Returns the factor for a piece's time that makes the torque suffice in it, by a few samples.
 /// Only the part that depends on the speed can be reduced. Returns 1 if the torque suffices, and if no speed would
 /// help.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {

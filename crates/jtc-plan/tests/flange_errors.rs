@@ -51,7 +51,7 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// To an arm that is stretched up to half a degree.
+/// A line leads to an arm that is stretched up to half a degree.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -82,7 +82,7 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends are in reach, but not the places between them: the column around the axis of joint 1 that a PUMA 560
+/// Both ends are in reach, but not the positions between them: the column around the axis of joint 1 that a PUMA 560
 /// cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {

@@ -384,7 +384,7 @@ fn targets_are_resolved_one_after_the_other_and_errors_name_the_waypoint() {
     assert!(matches!(error, PoseError::Waypoint { waypoint: 1, .. }), "{error}");
 }
 
-/// By central differences of independent forward kinematics: the velocity of the flange and the rate of its rotation.
+/// Compares with central differences of independent forward kinematics: the velocity of the flange and the rate of its rotation.
 #[test]
 fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
     let q = [0.3, -0.7, 1.1, 0.4, -0.9, 2.0];

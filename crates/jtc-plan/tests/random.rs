@@ -1,6 +1,6 @@
 //! Random motions on random arms, judged by samples of their positions: no limit is exceeded, no corner is cut by more
 //! than the blend, both ends are met exactly and at rest. `cargo run --profile dist -p jtc-plan --example campaign`
-//! judges any number of them.
+//! judges any number of motions.
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 

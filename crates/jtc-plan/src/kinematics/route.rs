@@ -32,8 +32,7 @@ pub struct RoutePoint {
     pub leg: LegKind,
 }
 
-/// A path through waypoints, straight in joint space or with the flange on lines and arcs. It stops between the two
-/// kinds.
+/// A path through waypoints, straight in joint space or with the flange on lines and arcs. Between the two kinds the path stops.
 ///
 /// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has at the start of the first
 /// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must belong to
@@ -52,7 +51,7 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Places where the path changes its form, ends included: by the route's parameter and by the section's own. A sum
+    /// Places at which the path changes its form, ends included: by the route's parameter and by the section's own. A sum
     /// of parameters is rounded, and this rounding must not move a place to the other side of a mark.
     marks: Vec<(f64, f64)>,
 }

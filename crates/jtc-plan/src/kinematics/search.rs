@@ -12,8 +12,8 @@ pub(crate) const TOLERANCE: f64 = 1e-9;
 const ROUNDING: f64 = 1e-29;
 /// Largest step of a joint in an iteration, rad: beyond it the linearisation has no meaning.
 const STEP: f64 = 0.7;
-/// Two solutions are the same if no joint differs by more, rad. Closer solutions are next to a singularity, where the
-/// flange moves by nanometres in between.
+/// Two solutions are the same if no joint differs by more, rad. Closer solutions are next to a singularity, and the flange moves only by
+/// nanometres between them.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;

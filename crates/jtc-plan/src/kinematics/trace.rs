@@ -1,10 +1,9 @@
 //! Path of the flange: consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of
-//! the previous leg runs out while that of the next leg starts. With w rising smoothly from 0 to 1 and W = ∫w, the
-//! place is that of the previous leg at τ − W plus the displacement of the next leg by W, τ from −r to r. Position and
-//! orientation have continuous second derivatives. They stay within the triangle of the corner if the legs are
-//! straight.
+//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of the previous leg
+//! runs out while that of the next leg starts. With w rising smoothly from 0 to 1 and W = ∫w, the place is that of the previous leg at τ −
+//! W plus the displacement of the next leg by W, τ from −r to r. Position and orientation have continuous second derivatives. The position
+//! stays within the triangle of the corner if the legs are straight.
 use nalgebra::Vector3;
 
 use super::PoseError;

@@ -9,7 +9,7 @@ use jtc_plan::{ArmDynamics, JOINTS, JointVec, Limits, Motion, Waypoint};
 
 /// Distance of the samples, s.
 const H: f64 = 5e-4;
-/// Amount that differences may exceed a limit by: rounding of positions.
+/// Tolerance of the limits for differences, because positions are rounded.
 const ROUNDING: f64 = 1e-6;
 
 /// An arm with limits, and waypoints.

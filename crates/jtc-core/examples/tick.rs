@@ -20,7 +20,8 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
 /// Ticks that the drives' speed is the mean over.
 const WINDOW: usize = 10;
 
-/// Nodes that answer at once and are where they should be: `position` has where they were in the last ticks, rad, the newest first.
+/// Returns the answers of nodes that answer at once and follow their set values exactly. `position` has their positions in the last ticks,
+/// rad, the newest first.
 fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f64; 6]>) -> Vec<Frame> {
     let at = |j: usize, ago: usize| position.get(ago).or(position.back()).map_or(0.0, |position| position[j]);
     let mut out = Vec::new();

@@ -6,12 +6,13 @@ use crate::friction;
 use crate::limits::JointConfig;
 use crate::parameters::{PidGains, TableOf};
 
-/// Share of the velocity limit up to which friction has been measured; a curve fitted to it may do anything beyond.
+/// Share of the velocity limit up to which friction has been measured; a curve that was fitted to it may have any value beyond.
 const MEASURED: f64 = 0.5;
-/// Speeds at which a friction polynomial is checked: a cubic does not get far between them.
+/// Number of speeds at which a friction polynomial is checked. A cubic changes little between them.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction: values beyond them do not belong to an arm of these drives, and would throw or drop one (J-06).
+/// Bounds of gains, masses and friction. Values beyond them do not belong to an arm with these drives, and could throw or drop the arm
+/// (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
     /// Highest Kp, N·m/rad. No such drive is known to run with more than 28 000.
@@ -35,7 +36,7 @@ pub struct ParameterBounds {
     /// Like `friction_max`, up to half of the velocity limit. Up to 0.82 is in use.
     pub slow_friction_max: f64,
     /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of the torque
-    /// limit: possible noise of a measurement.
+    /// limit. Noise of a measurement can cause such a torque.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,
@@ -177,7 +178,7 @@ impl ParameterBounds {
             }
         }
         for &temperature in &table.temperature {
-            // A table without standstill is good for no path (J-36).
+            // A table without standstill cannot be used for any path (J-36).
             if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
                 self.check_friction(torque, 0.0, joint)?;
             }

@@ -3,8 +3,8 @@
 //! Such a load begins to fall when its joint is enabled. The joint then swings around the position at which it will be held, and at the end
 //! of the first swing the control law needs up to 1.7 times the torque that the model lacks. If that is beyond the torque limit, the limit
 //! is commanded, which stops every load that it can hold, and the set position *sags* towards the joint: by as much as the computed torque
-//! exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. Held at its old position instead, the
-//! joint would be thrown upwards and fall again, for ever when there is little friction.
+//! exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. If it were held at its old position
+//! instead, the joint would be thrown upwards and fall again; with little friction this would never end.
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
@@ -63,7 +63,7 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill is not a half of a swing: the fall that follows it has not grown out of it.
+            // Noise around standstill does not count as a half of a swing: a fall that follows it has not grown from it.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -84,7 +84,7 @@ impl Catch {
         }
     }
 
-    /// Forgets earlier swings: only swings from now on count.
+    /// Clears earlier swings: only swings from now on count.
     pub fn watch_anew(&mut self) {
         (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
     }
@@ -149,7 +149,7 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // Torque that the derivative alone asks for causes no sag. Without gain the set position sags to the joint, not further.
+            // Torque that only the derivative requires causes no sag. Without gain the set position sags to the joint, not further.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -187,7 +187,7 @@ mod tests {
         }
     }
 
-    /// Returns `true` if the catch goes on after velocities (rad/s) of one tick each.
+    /// Returns `true` if the catch continues after velocities (rad/s) of one tick each.
     fn goes_on(velocities: &[f64]) -> bool {
         let mut catch = begun();
         velocities.iter().all(|&velocity| catch.step(velocity))

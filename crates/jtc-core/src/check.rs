@@ -1,13 +1,13 @@
-//! The check of a trajectory when it is loaded, point by point, before anything moves (J-36).
+//! The check of a trajectory while it is loaded, point by point, before the arm moves (J-36).
 //!
 //! Between two points (J-32) the commanded velocity is a cubic, the position a quintic and its derivative a quartic: the cubic
 //! and a bump for the way that the velocities do not explain. In Bernstein form each lies within the hull of a few control
 //! points. An interval whose hulls, roughly taken, are within the limits passes at once (`screen`); for any other the curves
 //! are halved until the hull is within or the curve itself is seen outside (`curve`).
 //!
-//! Positions come in steps of 96 µrad, and the effect of that rounding on the derivative is not a fault of the path: the way of each
-//! interval is judged less one such step. The effect on the positions themselves, and the way of a joint that begins outside its limits,
-//! are in `range`.
+//! Positions come in steps of 96 µrad. The effect of that rounding on the derivative is not a fault of the path, so the distance of each
+//! interval is reduced by one such step. `range` handles the effect on the positions themselves, and the path of a joint that begins
+//! outside its limits.
 mod curve;
 mod range;
 mod screen;
@@ -33,8 +33,8 @@ pub const REST_SPEED: f64 = 0.02;
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of halvings of curves in one interval, all joints together. A curve is followed until its hull is within about a
-/// thousandth of its own height; six joints at their limits in the same interval share them, and then the hull decides.
+/// Highest number of halvings of curves in one interval, all joints together. A curve is halved until its hull is within about a thousandth
+/// of its own height. Six joints at their limits in the same interval share the halvings; if these are used up, the hull decides.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.

@@ -26,7 +26,8 @@ pub struct Config {
     pub velocity_full_scale: f64,
     /// Speed at which the drives trip by themselves while configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
-    /// Time over which the drives average their speed, ms: over it their position and their speed are compared (J-35); 0: they are not.
+    /// Time over which the drives average their speed, ms. The controller compares their position with their speed over this time (J-35); 0
+    /// means no comparison.
     pub drive_speed_window_ms: u8,
     /// Torque that twists a gear by 1 rad, N·m/rad: the position at one end of the gear may differ from the speed at the other by the twist
     /// (J-35).
@@ -46,20 +47,20 @@ pub struct Config {
     pub gripper_config_bits: u8,
     /// Ticks between statuses without a response (J-04).
     pub status_period_ms: u16,
-    /// Consecutive Moves that stay unanswered or unacknowledged until that is an error (J-14), and that stay without a
-    /// usable answer of a joint (J-35). Until then the joint's motion is predicted (J-63).
+    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14); also of Moves without a usable
+    /// answer of a joint (J-35). Until then the joint's motion is predicted (J-63).
     pub missed_moves_max: u8,
     /// Silence of a node after its reset that is not an error yet, ms.
     pub node_boot_ms: u32,
     /// Longest READY→ENABLE, ms (J-16); counted while enabling is requested.
     pub enable_timeout_ms: u32,
-    /// Joints are enabled only while every one has moved slower than this for `enable_still_ms`, rad/s (J-16): an arm that
-    /// falls is not caught with a jolt.
+    /// Joints are enabled only if every joint has moved slower than this for `enable_still_ms`, rad/s (J-16), so that a falling arm is not
+    /// caught with a jolt.
     pub enable_speed_max: f64,
-    /// Time for which the arm must have been that slow, ms.
+    /// Time for which the arm must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
-    /// Time for which joints are not enabled after torque was taken away, ms: as long as the motor control of the drives
-    /// rests after a stop. Asked earlier, they would answer only then, when the arm may have begun to fall.
+    /// Time for which joints are not enabled after torque was taken away, ms. The motor control of the drives rests for this time after a
+    /// stop. If enabling were requested earlier, the drives would enable only after it, when the arm may have begun to fall.
     pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
@@ -67,13 +68,13 @@ pub struct Config {
     pub ramp_ms: u16,
     /// Measured speed that is an error while torque is on, as a multiple of the joint's limit (J-35).
     pub overspeed_factor: f64,
-    /// Time for which a joint may be that fast before that is an error, ms.
+    /// Time for which a joint may exceed `overspeed_factor` before this is an error, ms.
     pub overspeed_ms: u16,
     /// Longest pause or stop, ms, if the torque limits allow it (J-33).
     pub stop_ms: u16,
     /// Time for which a pause or stop may brake with all available torque, ms; an arm that still moves then is an error (J-33).
     pub braking_ms_max: u16,
-    /// Torque of a joint that yields against a slow push, as a share of its torque limit (J-68); a feedback torque beyond it is a push
+    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque beyond it counts as a push
     /// (J-66).
     pub yield_torque_share: f64,
     /// Time out of any 100 ms, ms, in which a computed torque may exceed its limit before the joint is overloaded (J-43). Meanwhile the
@@ -82,10 +83,10 @@ pub struct Config {
     pub torque_over_ms: u16,
     /// An overloaded joint releases the arm, as in the manual, instead of a reaction of the controller (J-43, J-66).
     pub torque_release: bool,
-    /// A held stop is over only when the host has cleared it (J-69).
+    /// A held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43): the load that the
-    /// joint carries need not be known before, and must be caught.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43): the load of the joint
+    /// may be unknown before, and must be caught.
     pub catch_ms_max: u16,
     /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
     pub blend_ms: u16,
@@ -96,22 +97,22 @@ pub struct Config {
     /// Highest speed of the flange in a jog (J-58), and speed from which on Teaching brakes harder, fully at twice that (J-25), m/s; 0:
     /// any.
     pub tool_speed_max: f64,
-    /// Time that a motion has for its stop when the safety input becomes 0, before the torque is taken away, ms (J-22); 0: none.
+    /// Time in which a motion can stop when the safety input becomes 0, before the torque is taken away, ms (J-22); 0: none.
     pub safety_input_ramp_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
     /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.
     pub host_timeout_ms: u16,
-    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). It is not part of an arm.
+    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). The speed override is not part of an arm.
     pub speed: f64,
-    /// Joints that are not there, for work on a bench (J-53): no node is expected for them, and no motion is executed. They are not part of
-    /// an arm, and all joints are there at the start of the device.
+    /// Absent joints, for work on a bench (J-53). The controller expects no node for them, and executes no motion. This setting is not part
+    /// of an arm: at the start of the device no joint is absent.
     pub absent: [bool; JOINTS],
-    /// Position of each of them in the model, rad.
+    /// Position of each absent joint in the model, rad.
     pub absent_position: [f64; JOINTS],
-    /// Payload at the flange of the arm (J-60). It is not part of an arm, and the device starts without a payload.
+    /// Payload at the flange of the arm (J-60). The payload is not part of an arm, and the device starts without one.
     pub payload: Payload,
-    /// Bounds of the gains and masses that a host may give (J-06).
+    /// Bounds of the gains and masses that a host may send (J-06).
     pub parameter_bounds: ParameterBounds,
 }
 
@@ -134,7 +135,7 @@ impl Config {
     }
 }
 
-/// Why no arm can be run with some settings: its drives cannot do what its limits allow.
+/// Reason why no arm can be run with some settings: the drives cannot do what the limits allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConfigError {

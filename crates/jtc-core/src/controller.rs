@@ -1,4 +1,4 @@
-//! The controller: what it remembers, and how it changes its state (J-20 to J-25).
+//! The controller: its memory, and the changes of its state (J-20 to J-25).
 use jtc_wire::{RawPoint, STATUS_LEN};
 
 use crate::check::{TrajectoryCheck, Violation};
@@ -49,7 +49,7 @@ pub struct Controller<M> {
     /// Ticks since the safety input has stopped a motion, which takes the torque away later (J-22).
     pub(crate) safety_stop_ms: Option<u16>,
     pub(crate) motion: Motion,
-    /// Why the arm came to a held stop last (J-69).
+    /// Cause of the last held stop (J-69).
     pub(crate) last_stop: LastStop,
     // The link to the host.
     pub(crate) slice_progress: SliceProgress,
@@ -64,7 +64,7 @@ pub struct Controller<M> {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// A controller in Start. The first tick takes it to Init.
+    /// Creates a controller in Start. The first tick changes to Init.
     pub fn new(config: Config, points: M) -> Self {
         Self {
             state: ControllerState::Start,
@@ -103,22 +103,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.errors.raise_device();
     }
 
-    /// The JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first.
+    /// Returns the JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first one.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         &self.status_frame
     }
 
-    /// Why the last segment or the last Execute was refused by the check of J-36; `None` when it was not.
+    /// Returns the reason why the check of J-36 refused the last segment or Execute; `None` if it was not refused.
     pub fn violation(&self) -> Option<&Violation> {
         self.violation.as_ref()
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// Frames of the joint bus that were ignored because they were not understood (J-15).
+    /// Returns the number of frames of the joint bus that were ignored because they were not understood (J-15).
     pub fn ignored_frames(&self) -> u32 {
         self.nodes.ignored
     }
@@ -187,7 +187,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 self.motion.release(&self.nodes);
                 self.errors.end_held_stop();
-                // A pump that does not run on is off until it is commanded again.
+                // If the gripper does not keep its part, the pump stays off until it is commanded again.
                 self.pump &= self.nodes.gripper_keeps_part(&self.config);
             }
             ControllerState::HoldPos if last == ControllerState::Teaching => {

@@ -12,8 +12,8 @@ const STANDING: f64 = 0.02;
 const CATCH_DECELERATION: f64 = 3.0;
 /// Highest deceleration of a falling joint, in the middle of its way, as a multiple of the mean.
 const STEEPEST: f64 = 1.5;
-/// Highest deceleration of a joint that was led, at the begin, as a multiple of the mean: there the damping of Teaching decelerates it
-/// already.
+/// Highest deceleration of a joint that was led, at the beginning, as a multiple of the mean. There the damping of Teaching already
+/// decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// Returns `true` if a joint with this velocity (rad/s) moves.
@@ -29,7 +29,7 @@ pub(crate) struct Deceleration {
     /// 0 in the first tick, which commands the measured values: the error begins at 0, and so does its derivative.
     elapsed_ms: f64,
     length_ms: f64,
-    /// The joint falls: no torque decelerates it at the begin.
+    /// The joint falls: no torque decelerates it at the beginning.
     falls: bool,
 }
 
@@ -55,7 +55,7 @@ impl Deceleration {
         (self.from, self.velocity)
     }
 
-    /// Shifts the whole way by `way` (rad).
+    /// Shifts all positions by `way` (rad).
     pub fn shift(&mut self, way: f64) {
         self.from += way;
     }

@@ -1,9 +1,9 @@
-//! Parts of the documents that tests draw from the code; `UPDATE_DOCS=1` draws them again.
+//! Parts of the documents that tests generate from the code; `UPDATE_DOCS=1` writes them again.
 extern crate std;
 use std::format;
 use std::path::Path;
 
-/// Checks that a part of docs/protocol-jtc.md, between its marks, is what the code draws.
+/// Checks that a part of docs/protocol-jtc.md, between its marks, is equal to the generated text.
 pub(crate) fn is_in_the_protocol(part: &str, drawn: &str) {
     std::println!("{drawn}");
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/protocol-jtc.md");

@@ -18,7 +18,7 @@ pub(crate) struct Errors {
     held: [u16; JOINTS],
     /// CAN flags that are errors.
     can: u32,
-    /// CAN flags that are shown only, as they are now.
+    /// Present CAN flags that are only shown, because they are not errors.
     can_shown: u32,
     can_occurred: u32,
     occurred: u16,
@@ -75,7 +75,7 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
-    /// Takes the errors of joints that a refused trajectory would have in motion (J-36): they have occurred, and nothing is latched.
+    /// Takes the errors of joints that a refused trajectory would have in motion (J-36): the errors have occurred, but are not latched.
     pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
@@ -99,7 +99,7 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Shows the CAN flags of this tick that are not errors: those of the gripper (J-14). They are gone when their cause is.
+    /// Shows the CAN flags of this tick that are not errors: the flags of the gripper (J-14). A flag disappears with its cause.
     pub fn show_can(&mut self, flags: u32) {
         self.can_shown = flags;
         self.can_occurred |= flags;

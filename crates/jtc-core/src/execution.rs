@@ -1,4 +1,4 @@
-//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, at any place.
+//! The execution of a trajectory (J-30 to J-36): from Execute to standstill, at any point of the path.
 pub(crate) mod phase;
 
 use jtc_wire::{DataStatus, ExecCommand, RawPoint, StopCause, StopKind};
@@ -15,7 +15,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Starts the path: Execute from Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        // Joints that are enabled later are looked at again then.
+        // Joints that are enabled later are checked again then.
         if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Sets another speed on the path (J-57): path time gets there along the ramp of J-33.
+    /// Sets another speed on the path (J-57). Path time changes to it along the ramp of J-33.
     pub(crate) fn set_speed(&mut self, speed: f64) {
         self.config.speed = speed;
         if self.clock.set_pace(speed) {
@@ -93,7 +93,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Holds back the time of the path or of the approach, because a joint is overloaded by that motion (J-75). Returns `false` if the arm
-    /// is not in such a motion, or stops already. In the tick in which the arm arrives, nothing needs to be done about the overload.
+    /// is not in such a motion, or stops already. In the tick in which the arm arrives, the overload needs no reaction.
     pub(crate) fn hold_back(&mut self) -> bool {
         if self.state != ControllerState::Operate {
             return false;
@@ -185,7 +185,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     match if self.near(&to) { self.approach_to(&to) } else { None } {
                         Some(phase) => self.phase = phase,
                         None => {
-                            // The host was told that it would move.
+                            // The host was told that the arm would move.
                             self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
                             self.set_trajectory(TrajectoryState::Stop);
                         }
@@ -266,13 +266,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Runs one more tick of a pause or stop, until the arm stands. Returns `true` if the stop goes on: meanwhile all available torque may
-    /// brake. After `stop_ms` the rest of a motion may be too slow to count as one. Path time that still runs when all its time is over
-    /// cannot be stopped by torque: that is an error of the joints that move. An arm that is held by then and moved by something else is a
-    /// matter of the ordinary limits.
+    /// Runs one more tick of a pause or stop, until the arm stands. Returns `true` if the stop continues. Meanwhile all available torque
+    /// may brake. After `stop_ms` the remaining motion may be too slow to count. If path time still runs when the braking time is over,
+    /// torque cannot stop it: this is an error of the joints that move. If the arm is already held then, and is moved from outside, the
+    /// ordinary limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog that has begun since, or goes on again.
+            // A jog has begun since, or continues.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };

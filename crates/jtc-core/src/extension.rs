@@ -51,15 +51,15 @@ pub struct Identity {
 pub(crate) struct Extensions {
     pub answers: Answers,
     pub stored: StoredArm,
-    /// The stored arm must be written to the memory that lasts.
+    /// The stored arm must be written to non-volatile memory.
     pub store_requested: bool,
-    /// An arm is stored, and is not in use: it could not be loaded, or could not be written. The built-in arm does not stand in.
+    /// An arm is stored but not in use, because it could not be loaded or written. The built-in arm does not replace it.
     pub unusable: bool,
     /// Hash of the arm in use; `None` until it is computed again.
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
-    /// Ticks in which no Jog with a velocity may come before one is taken again.
+    /// Ticks without a Jog with a velocity until one is accepted again.
     pub jogs_refused_ms: u16,
     /// Progress of the hash of the arm.
     hashed: (usize, Hash),
@@ -102,13 +102,13 @@ impl Extensions {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Gives the controller its identity. The board calls this before the first tick.
+    /// Sets the identity of the controller. The board calls this before the first tick.
     pub fn set_identity(&mut self, identity: Identity) {
         self.extensions.firmware_hash = firmware_hash(identity.firmware, identity.revision);
         self.extensions.identity = identity;
     }
 
-    /// Gives the controller the program in its flash, for boards that read it after the start (J-67).
+    /// Sets the program in the flash, for boards that read it after the start (J-67).
     pub fn set_program(&mut self, program: Option<Program>) {
         self.extensions.identity.program = program;
     }
@@ -118,7 +118,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.frame()
     }
 
-    /// Carries out an extension request.
+    /// Executes an extension request.
     pub(crate) fn carry_out_extension(&mut self, line: usize, command: Command<'_>) -> SliceOutcome {
         match command {
             command if self.asked_twice(line, &command) => SliceOutcome::Refused(DataStatus::NotAllowed),
@@ -171,7 +171,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !self.stops_held()
             && (set.jogging() || set.all_holding());
         if !free {
-            // A key that is held down through a held stop moves nothing when that is cleared.
+            // A key that is held down during a held stop causes no motion when the stop is cleared.
             if self.stops_held() && velocities.iter().any(|velocity| velocity != 0.0) {
                 self.extensions.refuse_jogs();
             }
@@ -196,7 +196,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 return Err(DataStatus::NotAllowed);
             }
         } else if !set.jogging() {
-            // There is nothing to end.
+            // No jog needs to end.
             return Ok(());
         }
         let jogging = set.jogging();

@@ -10,8 +10,8 @@ pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// Like [`polynomial`]; `sign_slope`: one over the speed at which the sign of the speed, which is a straight line around 0, is whole,
-/// s/rad.
+/// Like [`polynomial`]; `sign_slope`: reciprocal of the speed at which the sign of the speed, which is a straight line around 0, reaches
+/// ±1, s/rad.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
     // A speed that is NaN makes the torque NaN by c1.
@@ -64,7 +64,7 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
 /// nearest column; `None` for a velocity outside, the ends being inside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
-    // Rounding in the interpolation between two points does not lead out of the table.
+    // Rounding in the interpolation between two points does not count as outside the table.
     let inside = (v >= slowest - ROUNDING) & (v <= fastest + ROUNDING);
     let (coldest, warmest) = temperatures(table);
     // Not `clamp`, which may panic. NaN becomes the coldest.

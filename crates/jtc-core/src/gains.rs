@@ -1,7 +1,7 @@
-//! Gains that the inertia of the joints bears (J-71), and gains on trial.
+//! Gains that suit the inertia of the joints (J-71), and gains on trial.
 //!
-//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. The least inertia that
-//! a joint feels is looked for in some fixed poses, one in a tick; gains are compared with it.
+//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. The controller searches
+//! the least inertia that a joint feels in some fixed poses, one per tick, and compares gains with it.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -14,14 +14,14 @@ use crate::parameters::PidGains;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Number of poses in which the inertia of the joints is looked at.
+/// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
 /// Half of the ticks over which the derivative is taken, and half of the tick for which a torque is held: how much older than
 /// [`Config::delay_ticks`] the torque of the derivative is, ticks.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Age of the torque of the position error beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Inertia that is asked for, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times the inertia that the loop of one joint needs to
+/// Required inertia, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times the inertia that the loop of one joint needs to
 /// be stable, if Kp is at most half of the Kp that its Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
@@ -32,7 +32,7 @@ const STIFF: f64 = 0.03;
 /// Time over which new gains come in, and for which they are on trial, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
-/// Time after which an unstable loop is not attributed to new gains any more, ms.
+/// Time after new gains during which an unstable loop is attributed to them, ms.
 const BLAMED_MS: u16 = 10_000;
 /// Factor of the gains of a joint whose loop is unstable, and time within which it may not be unstable again, ms.
 const SOFTER: f64 = 0.3;
@@ -74,7 +74,7 @@ fn pose(number: usize, config: &Config) -> JointVec {
     })
 }
 
-/// The least inertia that each joint feels, with the others free, in the poses that were looked at; kg·m².
+/// The least inertia that each joint feels, with the others free, in the poses computed so far; kg·m².
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FeltInertia {
     joints: [f64; JOINTS],
@@ -83,10 +83,10 @@ pub(crate) struct FeltInertia {
 remembered!(FeltInertia { joints });
 
 impl FeltInertia {
-    /// No pose was looked at.
+    /// No pose was computed yet.
     pub const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
-    /// Looks at the pose of this number of an arm, without a payload.
+    /// Computes the pose of this number of an arm, without a payload.
     #[inline(never)]
     pub fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
@@ -96,7 +96,7 @@ impl FeltInertia {
         }
     }
 
-    /// Returns `true` if all poses of an arm were looked at.
+    /// Returns `true` if all poses of an arm were computed.
     pub fn is_known(&self) -> bool {
         self.joints.iter().all(|felt| felt.is_finite())
     }
@@ -130,8 +130,8 @@ fn position_delay(delay_ticks: u8) -> f64 {
 }
 
 /// Returns `true` if a joint that is held by the torque `p` of its position error and the torque `i` of its integral, N·m, does not fall
-/// when it gets these gains: its position gain makes some torque, and the torque that its integral does not hold any more makes a small
-/// error (J-71).
+/// when it gets these gains: its position gain makes some torque, and the torque that its integral no longer holds makes a small error
+/// (J-71).
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -139,7 +139,7 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
     stiff && gains.kp > 0.0 && (held - kept).abs() < SAG * limits.position_error_max * gains.kp
 }
 
-/// Gains that were given under torque, and the state of their trial.
+/// Gains that were received under torque, and the state of their trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
     /// Gains before, while they may come back.
@@ -166,7 +166,7 @@ impl Trial {
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
-        // Gains that have held come back: there is nothing to try.
+        // Gains that have held the arm before need no trial.
         self.before = self.before.filter(|before| before != given);
         self.held_ms = 0;
     }
@@ -183,7 +183,7 @@ impl Trial {
         self.before = self.before.filter(may);
     }
 
-    /// Returns `true` if there is something to count.
+    /// Returns `true` if a time must be counted.
     #[inline(always)]
     pub fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
@@ -219,7 +219,7 @@ impl Trial {
         Some(blended)
     }
 
-    /// Begins to go over to other gains from those that act while `given` are in use.
+    /// Begins to change to other gains from those that act while `given` are in use.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
@@ -231,7 +231,7 @@ impl Trial {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Takes joints (a bit each) that do not bear their `gains`; the loops of the `unstable` ones are unstable. Returns the cause and the
+    /// Takes joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. Returns the cause and the
     /// new gains, if they must change: the gains before come back. Without such gains, an unstable joint is held more softly.
     pub fn fails(
         &mut self,
@@ -251,7 +251,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // The joints that fail are not held any longer with gains that they do not bear.
+        // The joints that fail are not held with these gains any more.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];

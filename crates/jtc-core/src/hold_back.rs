@@ -2,21 +2,21 @@
 //!
 //! A path at the torque limits needs more torque than there is if the arm is heavier or has more friction than its model. A slower path
 //! needs less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling
-//! under torque limits, Dahl and Nielsen 1990), and gets its pace back when no joint is at its limit any more.
+//! under torque limits, Dahl and Nielsen 1990), and returns to its rate when no joint is at its limit any more.
 use crate::JOINTS;
 use crate::path::PathClock;
 use crate::remembered::remembered;
 
-/// Time for which the inertia of the arm is taken for constant, ms.
+/// Time for which the inertia of the arm is assumed to be constant, ms.
 const INERTIA_MS: u16 = 60;
-/// Time without a joint at its limit after which the path gets its pace back, ms.
+/// Time without a joint at its limit after which the path returns to its rate, ms.
 const QUIET_MS: u16 = 200;
 /// Longest time that a joint may be at its limit without a break, ms.
 const PRESSED_MS: u16 = 250;
 /// Longest total time of holding back in a run, ms.
 const RUN_MS: u16 = 5_000;
-/// Rate below which the path stands, and longest time below it, ms, until the path has its pace again. Torque that just suffices to hold
-/// the arm would let the path stand for ever.
+/// Rate below which the path stands, and longest time below it, ms, until the path returns to its normal rate. If the torque just sufficed
+/// to hold the arm, the path could stand for ever.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -24,7 +24,7 @@ const STANDS_MS: u16 = 1_000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
-    /// The path is on the way back to its pace (`restores`), and the time for which it has stood.
+    /// The path returns to its rate (`restores`), and the time for which it has stood.
     restores: bool,
     stands_ms: u16,
     /// Ticks since the inertia was computed.
@@ -44,9 +44,9 @@ remembered!(HoldBack { active, restores, stands_ms, since_ms, pressed_ms, quiet_
 /// Result of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Next {
-    /// The path goes on as before.
+    /// The path continues as before.
     Nothing,
-    /// The path gets its pace back.
+    /// The path returns to its rate.
     Restore,
     /// Holding back does not help: the arm stops.
     Stop,

@@ -338,7 +338,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
                 self.model_taken(outcome)
             }
-            // The stored arm has one friction, whichever a host asks for.
+            // The stored arm has one kind of friction for both requests of a host.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
@@ -366,7 +366,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: a stopped path must not go on.
+            // J-33: a stopped path must not continue.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
@@ -428,7 +428,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     /// Checks J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was loaded,
-    /// the path inside its velocities. No other parameter that is accepted in HoldPos bears on that check.
+    /// the path inside its velocities. No other parameter that is accepted in HoldPos affects this check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

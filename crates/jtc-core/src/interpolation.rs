@@ -49,7 +49,8 @@ pub(crate) fn smooth(u: f64) -> f64 {
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Weights of the samples of both points in the channels at one place between them: Hermite's basis. They are the same for all joints.
+/// Weights of the samples of both points in the channels at one place between them: Hermite's basis. The weights are the same for all
+/// joints.
 struct Weights {
     /// Weights of the positions, the velocities and the accelerations in the position.
     position: [[f64; 2]; 3],

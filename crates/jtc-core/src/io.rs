@@ -7,7 +7,7 @@ use crate::HOST_LINES;
 /// State of the joint bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusState {
-    /// The frame given out by the last tick was acknowledged on the bus.
+    /// The frame that the last tick returned was acknowledged on the bus.
     pub acknowledged: bool,
     /// The CAN controller is bus-off.
     pub bus_off: bool,
@@ -31,7 +31,7 @@ pub struct HostEvent<'a> {
 /// Inputs of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a> {
-    /// Frames received since the last tick, oldest first (at most 32 are looked at).
+    /// Frames received since the last tick, oldest first. The controller reads at most 32.
     pub bus: &'a [Frame],
     /// State of the bus.
     pub bus_state: BusState,
@@ -40,11 +40,11 @@ pub struct Inputs<'a> {
     pub safety_input: bool,
     /// Ticks since the last one that did not come, or came half a tick late or more (J-12).
     pub missed_ticks: u16,
-    /// Stop and Pause that have arrived on each line since the last tick. They act in this tick, before all events that wait (J-04); their
-    /// frames come as events, too, when it is their turn.
+    /// Stop and Pause that have arrived on each line since the last tick. These commands act in this tick, before all events that wait
+    /// (J-04). Their frames also come as events in their turn.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The oldest events of the host link (at most [`jtc_wire::EVENTS_MAX`] are looked at). Events that are not done must be offered again
-    /// in the next tick.
+    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Events that are not done must be offered
+    /// again in the next tick.
     pub host: &'a [HostEvent<'a>],
     /// The serial transmitter can take a status now.
     pub status_free: bool,

@@ -20,8 +20,8 @@ pub struct JointConfig {
     pub position_error_max: f64,
     /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
     pub rotor_inertia: f64,
-    /// Torque that the drive is asked for, as a multiple of the torque wanted at the joint (J-61). Drives that deliver less than they are
-    /// asked need more than 1.
+    /// Torque that is requested from the drive, as a multiple of the wanted torque at the joint (J-61). Drives that deliver less than the
+    /// requested torque need more than 1.
     pub torque_gain: f64,
     /// Damping in Teaching, N·m·s/rad (J-25); less if the joint is too light for it.
     pub teach_damping: f64,

@@ -23,7 +23,7 @@ pub(crate) struct PayloadBlend {
 pub(crate) struct BlendState {
     left_ms: u16,
     mass: f64,
-    /// Numbers of the arm at the begin of the blend, unless the blend has ended.
+    /// Numbers of the arm at the beginning of the blend, unless the blend has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
@@ -67,7 +67,7 @@ impl PayloadBlend {
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
     }
 
-    /// Forgets the blend, because the model was rebuilt with the whole payload in it.
+    /// Clears the blend, because the model was rebuilt with the whole payload in it.
     pub fn forget(&mut self) {
         (self.left_ms, self.mass) = (0, 0.0);
     }

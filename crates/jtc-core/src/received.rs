@@ -1,4 +1,4 @@
-//! The parameters received from the host: gains, model and friction, taken whole or not at all (J-06).
+//! The parameters received from the host: gains, model and friction. Each is accepted completely or not at all (J-06).
 mod floats;
 mod frames;
 
@@ -35,7 +35,7 @@ pub(crate) struct ReceivedParameters {
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// Inertia that the joints feel in the model that was received, and in a model that is being looked at (J-71).
+    /// Inertia that the joints feel in the received model, and in a model that is being checked (J-71).
     felt: FeltInertia,
     looked_at: FeltInertia,
     /// Gains that were given under torque.
@@ -140,7 +140,7 @@ impl ReceivedParameters {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Returns `true` if each of them was received since the start: no number is a built-in one that a host has not asked for.
+    /// Returns `true` if each of them was received since the start, so that no number is a built-in one that no host has requested.
     pub fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -206,7 +206,7 @@ impl ReceivedParameters {
         self.payload.step(&mut self.dynamics);
     }
 
-    /// Ends the blend in a tick without torque: the payload is there.
+    /// Ends the blend in a tick without torque: the payload counts completely.
     pub fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
@@ -258,12 +258,12 @@ impl ReceivedParameters {
         self.trial.blended(&self.pid)
     }
 
-    /// Returns `true` if the gains suit the model that was looked at last, with the present settings.
+    /// Returns `true` if the gains suit the model that was checked last, with the present settings.
     pub fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
-    /// The model that was looked at last, taken or not, does not bear the gains.
+    /// The gains do not suit the model that was checked last, accepted or not.
     #[cfg(test)]
     pub fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
@@ -315,7 +315,7 @@ impl ReceivedParameters {
             return SliceOutcome::Done;
         }
         if self.missing() & missing_parameter::MODEL != 0 {
-            // The model is looked at when it is given again.
+            // The model is checked when it is received again.
             self.felt = FeltInertia::NONE;
             return SliceOutcome::Done;
         }

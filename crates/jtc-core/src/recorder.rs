@@ -47,7 +47,7 @@ pub const SNAPSHOT_MS: u16 = 500;
 pub const AFTER_ERROR_MS: u16 = 300;
 /// Ticks from one snapshot to the next after an input that a replay cannot repeat.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Ticks for which recording rests after a page was asked for, so that the block being read is not overwritten.
+/// Ticks for which recording pauses after a page was requested, so that the block being read is not overwritten.
 const HELD_MS: u16 = 2_000;
 
 /// A request to the recorder that a host has sent.
@@ -107,7 +107,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.writer.into_memory()
     }
 
-    /// Returns the memory as it is.
+    /// Returns the present memory.
     pub fn memory(&self) -> &[P; N] {
         self.writer.memory()
     }
@@ -147,7 +147,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         controller.extensions.log = self.writer.state;
     }
 
-    /// Records one tick of a log that goes on.
+    /// Records one tick of a log that continues.
     fn take<M>(
         &mut self,
         controller: &Controller<M>,
@@ -244,7 +244,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.held = HELD_MS;
         }
         let (oldest, end) = self.writer.range();
-        // Blocks that are not there any more are passed over.
+        // Blocks that no longer exist are skipped.
         let (block, offset) = if block < oldest { (oldest, 0) } else { (block, offset) };
         let mut bytes = [0; LOG_PAGE];
         let read = self.writer.read(block, usize::from(offset) & !3, &mut bytes);

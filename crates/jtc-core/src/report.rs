@@ -11,7 +11,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
     }
 
-    /// Returns the values that the last tick computed. They are collected here, not in the tick: a board needs few of them.
+    /// Returns the values that the last tick computed. This function collects them, not the tick, because a board needs few of them.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
         Telemetry {

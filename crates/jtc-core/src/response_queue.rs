@@ -25,7 +25,7 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Puts a record at the end. Returns `false` if a record is lost by that: the record of noise if there is one, else the oldest.
+    /// Puts a record at the end. Returns `false` if this drops a record: the record of noise if the queue has one, else the oldest.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
             // The noise joins the record that waits.
@@ -61,13 +61,13 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // The record of noise moves up, or has gone.
+        // The record of noise moves up, or was removed.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
 }
 
-/// The records of all lines: a line that floods costs the other none of its own.
+/// The records of all lines. A line with many records does not drop those of another line.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseQueues {
     lines: [ResponseQueue; HOST_LINES],

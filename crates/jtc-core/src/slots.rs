@@ -1,7 +1,8 @@
 //! Two slots of flash that keep one image over any loss of power (J-54).
 //!
-//! An image, here a stored arm, is bytes of any meaning. It is written to the slot that does not hold the newest image, so that the image
-//! before it stays whole until the new one is. A slot is a header of one flash word followed by the image, filled up to whole words:
+//! An image, here a stored arm, is bytes of any meaning. An image is written to the slot that does not hold the newest image, so that the
+//! previous image stays complete until the new one is complete. A slot is a header of one flash word followed by the image, filled up to
+//! whole words:
 //!
 //! | bytes | what |
 //! |---|---|
@@ -124,7 +125,7 @@ pub fn newer(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
 }
 
-/// Content of the slots: the sequence number of each slot that is whole.
+/// Content of the slots: the sequence number of each complete slot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Slots([Option<u32>; SLOTS]);
 
@@ -134,7 +135,7 @@ impl Slots {
         Self(found)
     }
 
-    /// Returns the slot of the newest image, with its sequence number; `None` if no slot is whole.
+    /// Returns the slot of the newest image, with its sequence number; `None` if no slot is complete.
     pub fn current(&self) -> Option<(usize, u32)> {
         match self.0 {
             [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
@@ -177,7 +178,7 @@ pub enum Action {
     Stored,
 }
 
-/// An image on its way into its slot.
+/// An image that is being written into its slot.
 ///
 /// ```
 /// use jtc_core::slots::{Action, Header, Slots, Storing, WORD};

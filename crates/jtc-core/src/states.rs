@@ -6,7 +6,7 @@ use crate::ControllerState;
 pub(crate) struct Conditions {
     /// An error is latched (J-21).
     pub error: bool,
-    /// A joint is still being cleared: the cause of its error is not gone.
+    /// A joint is still being cleared: the cause of its error persists.
     pub clearing: bool,
     /// Every parameter was received and every node brought up (J-20).
     pub initialised: bool,

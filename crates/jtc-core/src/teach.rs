@@ -1,9 +1,9 @@
 //! Torques that Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, part of the joints' own friction
 //! taken away, and soft ends.
 //!
-//! A hand leads the arm; when the hand lets go, the arm must stay. Of the torques that HoldPos had found, a mass at the flange is carried
-//! to other poses, and the rest fades as the arm is led ([`carried`]). Every motion is damped, and a joint that is too fast for that ends
-//! Teaching ([`joint`]).
+//! A hand leads the arm. When the hand lets go, the arm must stay at its pose. From the torques that HoldPos had found, a mass at the
+//! flange is carried to other poses; the remaining torques fade as the arm is led ([`carried`]). Every motion is damped, and a joint that
+//! is too fast for the damping ends Teaching ([`joint`]).
 mod carried;
 mod joint;
 
@@ -31,7 +31,7 @@ const LOADS: (f64, f64) = (2.0, 6.0);
 /// Time after which a mass that drives the arm by itself counts as not there, ms, and time constant of the mass as it then goes, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
-/// Time after which a mass that has gone comes back if a joint sinks without it, ms, and time constant of its return, s.
+/// Time after which a removed mass is added again if a joint sinks without it, ms, and time constant of this return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
 /// Speed from which on a joint is led, rad/s, and distance of the fastest joint over which torque that no mass explains falls to a third,
@@ -155,7 +155,7 @@ impl Taught {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// Returns `true` in the tick in which nothing else is computed, so that there is time for the inertia of the whole arm.
+    /// Returns `true` in the tick that computes no other value, so that it has time for the inertia of the whole arm.
     pub fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
@@ -165,8 +165,8 @@ impl Taught {
         self.carried[j].rest.into()
     }
 
-    /// Computes the values that change slowly, in turns: one in each tick. Returns `true` if that took so long that the rest stays as it
-    /// was in this tick. The first tick of all only adds the load, without which there would be a step.
+    /// Computes the values that change slowly in turns, one in each tick. Returns `true` if this took too long to compute other values in
+    /// this tick. The very first tick only adds the load, because the torque would step without it.
     #[inline(never)]
     pub fn look(
         &mut self,

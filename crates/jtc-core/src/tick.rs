@@ -163,7 +163,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Runs the control law and its limits. Returns the torques to command, and the errors that were not acted upon (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint beyond its over-speed limit is out of control: the only reaction is to take its torque away.
+        // A joint beyond its over-speed limit is out of control. The only possible reaction takes its torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {

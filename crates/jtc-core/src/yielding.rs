@@ -44,7 +44,7 @@ const AT_REST: f64 = 0.02;
 /// Time for which a joint must be calm until it is held again, and time for which its load may seem to drive it meanwhile, ms.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
-/// Share of the torque limit by which gravity must load a joint before its motion counts as sinking.
+/// Minimum load of a joint by gravity, as a share of the torque limit, for a motion to count as sinking.
 const LOADED: f64 = 0.05;
 /// Distance (rad) and time (ms) of sinking after which the joint counts as overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
@@ -63,8 +63,8 @@ const COMES_BACK_S: f64 = 0.3;
 const HOLDABLE: f64 = 0.95;
 /// Missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Number of yields of a joint, of which the last one goes on until the host clears it. They count together while each yield of the arm
-/// comes within [`AGAIN_MS`] of the one before.
+/// Number of yields of a joint; the last of them continues until the host clears it. Yields count together if each yield of the arm begins
+/// within [`AGAIN_MS`] of the one before.
 const TIMES: u8 = 3;
 /// See [`TIMES`].
 const AGAIN_MS: u16 = 10_000;
@@ -74,7 +74,7 @@ const AGAIN_MS: u16 = 10_000;
 pub(crate) struct Yield {
     /// The joint lowers a load, without a spring (J-70).
     lowers: bool,
-    /// The yield goes on until the host clears it.
+    /// The yield continues until the host clears it.
     stays: bool,
     /// Position that the spring pulls to, rad.
     set: f64,
@@ -184,7 +184,7 @@ impl Yield {
         self.is_calm() && (self.holdable || self.cleared) && !self.stays
     }
 
-    /// Ends the yield for the host; the yield goes on until the joint is calm.
+    /// Ends the yield for the host. The yield continues until the joint is calm.
     pub fn clear(&mut self) {
         (self.stays, self.cleared) = (false, true);
     }
@@ -330,7 +330,7 @@ impl Yielded {
         }
     }
 
-    /// Counts a yield of the joint. Returns `true` if the joint yields too often: its yield goes on until the host clears it.
+    /// Counts a yield of the joint. Returns `true` if the joint yields too often: its yield then continues until the host clears it.
     pub fn count(&mut self, joint: usize) -> bool {
         self.since_ms = 0;
         let Some(times) = self.times.get_mut(joint) else { return false };

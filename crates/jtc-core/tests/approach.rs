@@ -40,7 +40,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
-/// A Stop or a Pause means that the arm must be held. It also cancels a Teaching that waits for the arm to stand.
+/// A Stop or a Pause means that the arm must be held, and also cancels a Teaching that waits for standstill.
 #[test]
 fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     for command in [ExecCommand::Stop, ExecCommand::Pause] {

@@ -345,7 +345,7 @@ fn j14_a_silent_node_is_seen_within_seven_frames() {
 
 #[test]
 fn j44_a_new_model_under_a_holding_arm_makes_no_step() {
-    // The same arm with heavier links, on a wall so that gravity acts on them.
+    // An arm on a wall, so that gravity acts on its links, gets a model with heavier links.
     let mut rig = Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() });
     let mut model = jtc_core::Parameters::avena().model;
     model.links.iter_mut().for_each(|link| link.mass *= 1.2);

@@ -98,7 +98,7 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// Gains with which a loop is unstable, without an external load to swing against: the catch must not allow the swing.
+/// The gains make a loop unstable, without an external load to swing against. The catch must not allow the swing.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {

@@ -307,8 +307,8 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// A key that is held down moves joint 2 of an arm with 3.5 or 4 kg outwards to a position where it stays, without an
-/// error, and with enough torque left to come back.
+/// A key that is held down moves joint 2 of an arm with 3.5 or 4 kg outwards to a position at which it stays, without an error, and with
+/// enough torque left to come back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {

@@ -12,7 +12,7 @@ const JOINT: usize = 1;
 /// Pattern of the lost answers of the joint.
 #[derive(Clone, Copy, Debug)]
 enum Loss {
-    /// One good answer, then this number of lost ones, repeated for ever.
+    /// A good answer, then this number of lost ones, repeated for ever.
     Periodic(u32),
     /// On average every second answer at random, at most four consecutive ones; the seed.
     Random(u32),
@@ -194,7 +194,7 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // One tick on the bus, then five Moves.
+                // A tick on the bus, then five Moves.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

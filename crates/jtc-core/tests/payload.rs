@@ -345,7 +345,7 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
 }
 
 /// The load that the integral had found is not carried twice if it has just been set as the payload, or in a new model:
-/// an arm that no hand leads stays where it is.
+/// an arm that no hand leads keeps its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {

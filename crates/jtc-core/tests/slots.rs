@@ -214,7 +214,7 @@ fn j54_a_power_cut_leaves_one_whole_image() {
     }
 }
 
-/// If both slots are damaged, there is no image, and a store creates one.
+/// If both slots are damaged, no image exists, and a store creates one.
 #[test]
 fn j54_two_damaged_slots_are_no_image() {
     let mut flash = Flash::new();

@@ -1,4 +1,4 @@
-//! Holding joints with stiction, with which an integral can cause endless hunting (J-41).
+//! Holding joints with stiction, because an integral can cause endless hunting in such joints (J-41).
 use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};

@@ -72,8 +72,7 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // Fills the store to its last point. One more is refused, and segment 0 of another trajectory counts only its own
-    // points.
+    // Fills the store to its last point. A further point is refused, and segment 0 of another trajectory counts only its own points.
     for s in 0..8 {
         assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
     }
@@ -176,7 +175,7 @@ fn j33_pause_and_resume_follow_the_path() {
             path.push((t.joints[2].set_position, t.joints[5].set_position));
         }
     }
-    // The same run with a pause.
+    // Repeats the run with a pause.
     let mut rig = Rig::holding();
     rig.move_along(&points, 1400);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);

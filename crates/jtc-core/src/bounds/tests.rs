@@ -1,4 +1,4 @@
-//! The bounds of parameters (J-06): each is reached, and nothing is beyond.
+//! The bounds of parameters (J-06): each bound can be reached, and no value beyond it is accepted.
 use jtc_dynamics::Link;
 
 use super::*;
@@ -43,7 +43,7 @@ fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     }
 }
 
-/// A table in which all friction torque is 0 but that of one row in one column.
+/// Checks a table in which all friction torques are 0 except one.
 fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
     let mut table = TableOf {
         velocity: core::array::from_fn(|i| (i as f32 - 10.0) * 0.125),

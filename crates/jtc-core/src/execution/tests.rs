@@ -87,7 +87,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     assert!(!controller.errors.any(), "it stands");
 }
 
-/// The last of a motion may be too slow for torque to end it.
+/// The end of a motion may be too slow for torque to stop it.
 #[test]
 fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
     let most = Config::avena().stop_ms;
@@ -220,7 +220,7 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // At most the rest of the way; and at most the way of a path that stops although it still gets faster for half of the ramp.
+            // At most the remaining distance, and at most the stopping distance of a path that still gets faster for half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");

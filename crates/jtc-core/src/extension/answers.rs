@@ -15,9 +15,9 @@ struct Line {
 #[derive(Clone, Debug)]
 pub(crate) struct Answers {
     lines: [Line; HOST_LINES],
-    /// The line whose frame was given out last.
+    /// The line whose frame was sent last.
     sent: usize,
-    /// Bytes of it.
+    /// Bytes of that frame.
     sent_len: usize,
 }
 

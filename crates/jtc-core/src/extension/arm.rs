@@ -20,13 +20,13 @@ impl Extensions {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Loads the arm that was stored (J-54): its settings and its name are in use from now on, and the UseDefault frames mean it; the
-    /// parameters stay missing. The board calls this before the first tick. Returns `false` if the image is not an arm that this controller
-    /// takes: its settings stay as they were, and the UseDefault frames are refused until an arm is stored.
+    /// Loads the stored arm (J-54). Its settings and its name are in use from now on, and the UseDefault frames select it; the parameters
+    /// stay missing. The board calls this before the first tick. Returns `false` if this controller does not accept the image. The settings
+    /// then do not change, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // Its numbers are taken into their place of use, not tried on the stack, which is as small as possible.
+        // The numbers are written directly into the parameters, not tried on the stack, which is as small as possible.
         let loaded = arm.zip(config).is_some_and(|(arm, config)| {
             let taken = takes(&mut self.parameters, &arm, &config);
             if taken {
@@ -40,14 +40,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         if !loaded {
             self.parameters.begin(&self.config);
         }
-        // The host must ask for them.
+        // The host must request the parameters.
         self.parameters.forget();
         self.extensions.forget_hash();
         self.extensions.unusable = !loaded;
         loaded
     }
 
-    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] asks for it; empty without a stored arm.
+    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] requests it; empty without a stored arm.
     pub fn stored_arm(&self) -> &[u8] {
         self.extensions.stored.bytes()
     }
@@ -101,7 +101,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
-            // Its parts may have come one by one, each without the others (J-71).
+            // The parts of the arm may have arrived separately (J-71).
             _ if !self.parameters.gains_are_borne(&self.config) => {
                 return SliceOutcome::Refused(DataStatus::IncorrectValue);
             }

@@ -109,7 +109,7 @@ impl Output<'_> {
     }
 }
 
-/// Image of the arm that the UseDefault frames mean, if there is one besides the built-in arm.
+/// Image of the arm that the UseDefault frames select, if an arm other than the built-in one is stored.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredArm {
     bytes: [u8; IMAGE_MAX],

@@ -19,7 +19,7 @@ mod setting_frames;
 mod stored;
 mod two_hosts;
 
-/// A controller on two lines, and what came out of it.
+/// A controller on two lines, and its outputs.
 struct Bench {
     controller: Box<Controller<[RawPoint; 8]>>,
     /// Answers by line.
@@ -54,7 +54,7 @@ impl Bench {
         self.send_as(false, line, bytes)
     }
 
-    /// On a line that is plain or not.
+    /// Sends a frame on a line that is plain or not.
     fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
         let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];
@@ -105,7 +105,7 @@ impl Bench {
         frames.map(|frame| self.send(1, &frame))
     }
 
-    /// The whole arm image, page by page.
+    /// Reads the whole arm image, page by page.
     fn image(&mut self) -> Vec<u8> {
         let mut image = Vec::new();
         loop {
@@ -131,7 +131,7 @@ impl Bench {
         self.controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Carries out a command at once, in a state that the bus does not bear out.
+    /// Executes a command at once, in a state that the nodes on the bus do not have.
     fn at_once(&mut self, command: Command<'_>) -> DataStatus {
         match self.controller.carry_out_extension(0, command) {
             SliceOutcome::Done => DataStatus::NoError,
@@ -156,7 +156,7 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
         let info = bench.info(line);
         assert_eq!((info.version, info.missing), (1, 7));
     }
-    // A request that returns nothing has its record all the same.
+    // A request without an answer still has its record.
     assert_eq!(bench.send(0, &fixed::set_name(&Name::cut("seven"))), DataStatus::NoError);
     bench.run(500);
     assert!(bench.answers.is_empty());

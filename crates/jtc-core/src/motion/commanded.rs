@@ -1,4 +1,4 @@
-//! Set values of the last ticks, so that a measurement is compared with the set value of its own time (J-62).
+//! Set values of the last ticks, so that a measurement is compared with the set value of the same time (J-62).
 //!
 //! A measurement is late: the drive had read its encoder before it received the Move that it answered, and a command in answer to the
 //! measurement acts later still. The *due* position is the position that was commanded this *delay*

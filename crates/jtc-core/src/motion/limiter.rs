@@ -14,8 +14,9 @@ const LAGS: f64 = 0.7;
 const FAST: f64 = 0.2;
 /// Number of ticks: a joint whose feedback torque was beyond its share in more than that of the last 100 ticks counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
-/// Share of its velocity limit by which a joint is faster than commanded, and distance that it has gained by that, rad. Beyond both the
-/// joint counts as pushed, however weak its gains are. A light joint is at its over-speed before the torque of such gains shows the push.
+/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit, and distance gained by this excess, rad. If a
+/// joint exceeds both, it counts as pushed, also with weak gains. A light joint is at its over-speed before the torque of such gains shows
+/// the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 

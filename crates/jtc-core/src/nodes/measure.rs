@@ -30,9 +30,10 @@ const IMPLAUSIBLE: f64 = 3.0;
 /// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
 /// the joint of an encoder that jumps has not moved.
 const UNEXPECTED: f64 = 0.1;
-/// Steps of the encoder by which a late answer may differ from its prediction: positions and the rate carried on are as coarse as that.
+/// Maximum difference of a late answer from its prediction, in steps of the encoder. Positions and their predicted rate have this
+/// resolution.
 const IN_ITS_PLACE: f64 = 2.0;
-/// Coarsest encoder for which [`IN_ITS_PLACE`] counts, rad: an answer that is used as it is may make a step of that size.
+/// Coarsest encoder for which [`IN_ITS_PLACE`] counts, rad: an answer that is used without a correction may cause a step of this size.
 const COARSEST: f64 = 1e-4;
 /// Distance from the prediction, as a share of the implausible one, within which an answer must be after the jump of its encoder is taken
 /// off.
@@ -63,7 +64,7 @@ pub(crate) struct Reading {
 pub(crate) struct Tick {
     /// Answer of the joint, if there is one.
     pub answer: Option<Reading>,
-    /// A Move asked for an answer.
+    /// A Move requested an answer.
     pub expected: bool,
     /// That Move was acknowledged.
     pub asked: bool,
@@ -241,8 +242,9 @@ impl Measurement {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported one. It differs from the `due` velocity (rad/s)
-    /// in the same direction as the reported one, and not by much more; otherwise an encoder has jumped, and the joint has not moved.
+    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported one. This velocity differs from the `due`
+    /// velocity (rad/s) in the same direction as the reported one, and not by much more. Otherwise an encoder has jumped, and the joint has
+    /// not moved.
     pub fn young_velocity(&self, due: f64) -> f64 {
         // Without the part of an offset that still fades: that part is older still.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
@@ -273,7 +275,7 @@ impl Measurement {
         Ways::of(&Reading { position, ..self.answer }, from, config)
     }
 
-    /// Takes the next answer as it is.
+    /// Takes the next answer without a correction.
     pub fn forget(&mut self) {
         self.known = false;
     }
@@ -446,7 +448,7 @@ impl Measurement {
         let answered = Answered { position, at_ms };
         let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
-        // If a joint has jumped on the way, its own report counts alone.
+        // If the encoder of the joint has jumped, only the report of the drive counts.
         let carried = match rate {
             Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
             _ => velocity,

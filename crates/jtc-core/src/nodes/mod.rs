@@ -25,7 +25,7 @@ use speed_check::SpeedCheck;
 pub(crate) const GRIPPER: usize = 6;
 /// CAN flag of the gripper's receive timeout.
 const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
-/// Highest number of frames that one tick looks at.
+/// Highest number of frames that one tick reads.
 pub(crate) const FRAMES_MAX: usize = 32;
 
 /// All nodes and the order of frames to them.
@@ -147,7 +147,7 @@ impl Nodes {
         &self.nodes[..JOINTS]
     }
 
-    /// Returns the gripper, if there is one.
+    /// Returns the gripper, if the arm has one.
     fn gripper_node(&self) -> Option<&Node> {
         self.nodes.get(GRIPPER).filter(|_| self.gripper)
     }

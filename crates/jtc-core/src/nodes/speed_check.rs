@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two looks at a joint: one joint is looked at in a tick.
+/// Ticks between two checks of a joint: one joint is checked per tick.
 const PERIOD: u8 = 10;
 /// Looks, one after the other, at which the two differ in the same direction when they do not fit.
 const LOOKS: u8 = 5;
@@ -24,7 +24,7 @@ struct Differs {
     looks: u8,
     /// Distance of its positions in the windows of these looks, rad.
     measured: f32,
-    /// Distance that its speed stands for, rad.
+    /// Distance that corresponds to its speed, rad.
     reported: f32,
 }
 
@@ -42,7 +42,7 @@ remembered!(Differs { looks, measured, reported });
 remembered!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
-    /// Runs one tick. Returns the joint whose speed has another scale, as a mask; a joint of which only one encoder moves has misbehaved.
+    /// Runs one tick. Returns the joint whose speed has another scale, as a mask. A joint with only one moving encoder has misbehaved.
     #[inline(always)]
     pub fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;

@@ -23,7 +23,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// Gains and model of a stored arm, whose gains are looked at when a host asks for them.
+    /// Gains and model of a stored arm. The gains are checked when a host requests them.
     pub fn load(&mut self, pid: &Floats<'_>, model: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
         let (pid, model) = (read_pid(pid)?, read_model(model)?);
         self.check_pid(&pid, config)?;

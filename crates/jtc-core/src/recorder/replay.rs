@@ -75,7 +75,7 @@ impl Iterator for Log<'_> {
             };
             let before = reader.block();
             if reader.at_end() {
-                // Blocks may be missing here, or recording has rested: it goes on with a snapshot.
+                // Blocks may be missing here, or recording was paused: the replay continues with a snapshot.
                 continue;
             }
             let record = if reader.peek() {
@@ -145,7 +145,7 @@ pub struct Replay<'a, M> {
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
-    /// An input is not in the log, and the outputs are the same all the same.
+    /// An input is not in the log, but the outputs are still the same.
     follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,

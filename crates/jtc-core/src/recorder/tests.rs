@@ -1,4 +1,4 @@
-//! Any frames on the bus are read back as they were.
+//! Any frames on the bus are read back unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;

@@ -64,8 +64,8 @@ impl Carried {
         self.whole(by_mass) * (1.0 - f64::from(self.left_out)) * (1.0 - f64::from(self.inside))
     }
 
-    /// Runs a tick. `balanced`: share of the load that the damping of the joint balances. `depth`: distance by which the joint has
-    /// compressed its soft end, as in [`depth`](crate::soft_end::depth), rad.
+    /// Runs a tick. `balanced`: share of the load that the damping of the joint balances. `depth`: compression of the joint's soft end, as
+    /// in [`depth`](crate::soft_end::depth), rad.
     pub fn step(&mut self, by_mass: f64, velocity: f64, balanced: f64, depth: f64) -> f64 {
         let whole = self.whole(by_mass);
         let along = if whole < 0.0 { -velocity } else { velocity };

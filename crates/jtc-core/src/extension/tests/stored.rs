@@ -1,4 +1,4 @@
-//! The arm that is kept over a loss of power (J-54).
+//! The arm that is stored over a loss of power (J-54).
 use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 
@@ -28,7 +28,7 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // Its friction is a table, whichever default an existing host asks for.
+    // The friction of the stored arm is a table for any default that an existing host requests.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));
@@ -104,7 +104,7 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     }
 }
 
-/// A stored arm that cannot be used does not make the built-in one the arm that is meant.
+/// A stored arm that cannot be used is not replaced by the built-in one.
 #[test]
 fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     let (mut image, _) = other_arm();

@@ -1,10 +1,10 @@
 //! Flash bank 2: its last two sectors keep the stored arm (J-54). Erasing and programming never block, and a damaged
 //! word cannot cause a fault when it is read.
 //!
-//! While the bank is erased or programmed, a read of it would halt the processor until the operation ends: up to two
-//! seconds, but the watchdog allows only 4.5 ms. Therefore the protection unit blocks every access, including
-//! speculative reads and cache line fills ([`memory::bank2`]). It opens the bank only for the few instructions here, as
-//! memory that is neither cached nor read ahead of the program. Code and constants are in bank 1, which stays readable.
+//! While the bank is erased or programmed, a read of it would halt the processor until the operation ends: up to two seconds, but the
+//! watchdog allows only 4.5 ms. Therefore the protection unit blocks every access, including speculative reads and cache line fills
+//! ([`memory::bank2`]). The unit opens the bank only for the few instructions here, as memory that is neither cached nor read ahead of the
+//! program. Code and constants are in bank 1, which stays readable.
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;

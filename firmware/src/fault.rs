@@ -48,7 +48,7 @@ pub struct LastWords {
     /// Hard fault: program counter and return address, 0 if unknown.
     pc: u32,
     lr: u32,
-    /// Hard fault: registers CFSR, HFSR, and the address if there is one.
+    /// Hard fault: registers CFSR, HFSR, and the address if the fault has one.
     cfsr: u32,
     hfsr: u32,
     address: u32,

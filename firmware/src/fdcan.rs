@@ -1,8 +1,8 @@
 //! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses it, and it never interrupts the tick.
 //!
-//! At most one frame is sent per tick. It goes into the one of the two transmit buffers that the last frame did not
-//! use. If the next tick finds the last frame still unsent, it cancels it: a transmission that is on the wire at that
-//! moment ends there, and the frame is never sent late. Such a frame counts as unacknowledged.
+//! At most one frame is sent per tick. The frame goes into the one of the two transmit buffers that the last frame did not use. If the next
+//! tick finds the last frame still unsent, it cancels that frame: a transmission that is on the wire at that moment ends there, and the
+//! frame is never sent late. Such a frame counts as unacknowledged.
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::can::Fdcan as Registers;

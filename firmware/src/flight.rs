@@ -13,7 +13,7 @@ use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
 
 use crate::message_ram::RX;
 
-/// Frame of the joint bus; `id` is [`NO_FRAME`] if there is no frame.
+/// Frame of the joint bus; `id` is [`NO_FRAME`] for an empty entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightFrame {

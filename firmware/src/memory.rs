@@ -198,7 +198,7 @@ fn protect(mpu: &MPU) {
 }
 
 /// Allows loads and stores in flash bank 2, or blocks them. While open, it is strongly ordered memory: not cached, and
-/// never read before the program asks for it. Only for the main program.
+/// never read before the program requests it. Only for the main program.
 pub fn bank2(open: bool) {
     let (_, size, closed) = REGIONS[BANK2_REGION as usize];
     let attributes = if open { FULL_ACCESS | NO_EXECUTE } else { closed };

@@ -28,7 +28,7 @@ const _: () = {
     assert!(END * 4 <= BYTES);
     // The codes 0..4 stand for 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // One register of new-data flags covers all receive buffers.
+    // A register of new-data flags covers all receive buffers.
     assert!(RX <= 32 && TX <= 32);
 };
 

@@ -4,7 +4,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Cause {
-    /// Power came on, or was too low.
+    /// Power came on, or the supply voltage was too low.
     PowerOn = 1,
     /// The reset button or a debugger.
     Pin = 2,

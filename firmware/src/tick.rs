@@ -1,5 +1,5 @@
-//! The tick: TIM7 at the highest priority, a thousand times a second. It owns the controller and everything that moves
-//! or stops the arm. It shares only the slot and a summary for the log with the rest of the program.
+//! The tick: TIM7 at the highest priority, a thousand times a second. The tick owns the controller and everything that moves or stops the
+//! arm. The tick shares only the slot and a summary for the log with the rest of the program.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -271,7 +271,7 @@ impl Tick {
         }
     }
 
-    /// Looks for Stop and Pause in what has arrived since the last tick (J-04).
+    /// Looks for Stop and Pause in the bytes that have arrived since the last tick (J-04).
     fn look_ahead(&mut self) {
         let now_us = self.flight.tick * u64::from(clock::TICK_US);
         for (line, ahead) in self.ahead.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! The safety input, edges included: a pulse between two ticks is seen by the next one (J-22).
+//! The safety input with its edges: the next tick detects a pulse between two ticks (J-22).
 use embassy_stm32::gpio::{Input, Pin, Pull};
 use embassy_stm32::{Peri, pac};
 
@@ -34,7 +34,7 @@ impl SafetyInput {
 
     /// Returns `true` if the level is 1 now and has been 1 since the last call.
     pub fn is_safe(&mut self) -> bool {
-        // The edge first: if one comes between the two reads, the level or the next call shows it.
+        // Reads the edge first: if an edge comes between the two reads, the level or the next call shows it.
         let edge = self.take_edge();
         !edge && self.pin.is_high()
     }

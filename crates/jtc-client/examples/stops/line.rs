@@ -1,4 +1,4 @@
-//! The line: a pseudo-terminal, the controller at its other end, and what a UART at this rate does with what the agent hands over.
+//! The line: a pseudo-terminal with the controller at its other end, and a model of the UART at this rate that carries the agent's bytes.
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -21,18 +21,18 @@ const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 pub struct Stop {
     pub first_byte: Instant,
     pub last_byte: Instant,
-    /// The silence ahead of it, where it is behind a frame that was abandoned.
+    /// Silence before the Stop, if the Stop follows an abandoned frame.
     pub gap: Option<Duration>,
 }
 
-/// What the agent has handed to the line.
+/// Bytes that the agent has handed to the line.
 #[derive(Debug)]
 pub struct Seen {
-    /// When the line has carried everything.
+    /// Time at which the line has carried all bytes.
     free_at: Instant,
-    /// Bytes of a frame that have not come yet.
+    /// Remaining bytes of the present frame.
     left: usize,
-    /// Most bytes that had been handed over and not been carried, at once.
+    /// Largest number of bytes that waited for the line at the same time.
     pub queued_most: usize,
     /// Bytes of frames since the last Stop.
     pub since_stop: usize,
@@ -40,12 +40,12 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// A frame is on its way, and not to its end.
+    /// Returns true while a frame is incomplete.
     pub fn is_in_a_frame(&self) -> bool {
         self.left > 0
     }
 
-    /// `began`, `ended`: when the bytes were being handed over.
+    /// Takes bytes that the agent handed over from `began` to `ended`.
     fn take(&mut self, mut bytes: &[u8], began: Instant, ended: Instant) {
         let queued = self.free_at.saturating_duration_since(began).as_secs_f64() * f64::from(BAUD) / 10.0;
         self.queued_most = self.queued_most.max(queued as usize + bytes.len());
@@ -62,7 +62,7 @@ impl Seen {
         self.since_stop += bytes.len();
         while !bytes.is_empty() {
             if self.left == 0 {
-                // Pieces of frames are no shorter than their heads.
+                // The first piece of a frame contains at least its head.
                 self.left = usize::from(u16::from_be_bytes([bytes[2], bytes[3]]));
             }
             let taken = self.left.min(bytes.len());
@@ -72,13 +72,13 @@ impl Seen {
     }
 }
 
-/// The agent's port, looked at.
+/// The agent's port, with a record of its bytes.
 pub struct Watched {
     port: SerialPort,
     seen: Arc<Mutex<Seen>>,
 }
 
-/// What was seen of a line so far.
+/// Record of the bytes of a line so far.
 #[derive(Clone)]
 pub struct Watch(Arc<Mutex<Seen>>);
 
@@ -88,7 +88,7 @@ impl Watch {
     }
 }
 
-/// A line with a controller.
+/// Creates a line with a controller.
 pub fn begin() -> (Watched, Watch) {
     let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).expect("a pseudo-terminal");
     grantpt(&master).and_then(|()| unlockpt(&master)).expect("it is granted");
@@ -105,7 +105,7 @@ pub fn begin() -> (Watched, Watch) {
     (Watched { port, seen: seen.clone() }, Watch(seen))
 }
 
-/// The controller's end, to the end of this program. `slave` is held: without a host it would be a hang-up.
+/// Runs the controller's end until the end of this program. `_slave` is held, because the terminal would hang up without a host.
 fn control(master: &OwnedFd, _slave: &OwnedFd) {
     let flags = rustix::fs::fcntl_getfl(master).expect("flags");
     rustix::fs::fcntl_setfl(master, flags | OFlags::NONBLOCK).expect("flags");

@@ -1,6 +1,7 @@
-//! How soon a Stop is on the line, one JSON object: `cargo run --profile dist -p jtc-client --example stops [N]`, N Stops under each load.
+//! Measures how soon a Stop is on the line, and prints one JSON object: `cargo run --profile dist -p jtc-client --example stops [N]`, N
+//! Stops under each load.
 //!
-//! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller behind it. Whoever looks is in a process of its own.
+//! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller at its other end. The viewers are in a separate process.
 #[cfg(unix)]
 #[path = "../../tests/common/mod.rs"]
 #[allow(dead_code, reason = "the tests use more")]

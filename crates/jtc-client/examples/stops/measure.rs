@@ -1,4 +1,4 @@
-//! Stops under each load, beside plain round trips to a server of the same library at the same time.
+//! Measures Stops under each load and, at the same time, plain round trips to a server of the same library.
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
@@ -10,28 +10,29 @@ use crate::crowd::Crowd;
 use crate::line::{self, Watch};
 use crate::operator::Operator;
 
-/// Between two Stops: the first has its record by then. And up to as much as this more, so that they come at any time.
+/// Time between two Stops, in which the first one gets its record; plus a random time up to `AT_ANY_TIME_US`, so that Stops come at any
+/// phase of the statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
-/// What does not come within this time does not come.
+/// Time after which a missing event counts as a failure.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Bytes of an upload that are on their way before it is stopped.
+/// Bytes of an upload that are on the line before it is stopped.
 const UPLOADED: usize = 300;
 
-/// What was measured under one load, ms.
+/// Measurements under one load, ms.
 #[derive(Default)]
 struct Samples {
-    /// From the request, before it connects, to the first and to the last byte of the Stop on the line.
+    /// Time from the request, before it connects, to the first and to the last byte of the Stop on the line.
     first: Vec<f64>,
     last: Vec<f64>,
-    /// From a request to its response, of a server that does nothing.
+    /// Time from a request to its response, for a server that does nothing.
     bare: Vec<f64>,
-    /// Silence behind an abandoned frame.
+    /// Silence after an abandoned frame.
     gaps: Vec<f64>,
     queued_most: usize,
 }
 
-/// Measures under each load, and prints the figures; a load under which a measurement failed stands under `failed`, with its cause.
+/// Measures under each load and prints the results. If a measurement failed, its load is listed under `failed`, with the cause.
 pub fn print(n: usize) {
     let (port, watch) = line::begin();
     let served = Served::start_on(port, None, &[]);
@@ -55,7 +56,7 @@ pub fn print(n: usize) {
     println!("{}", Value::Object(figures));
 }
 
-/// A server of the same library and settings that answers and does nothing else.
+/// Starts a server of the same library with the same settings, which only answers.
 fn bare_server() -> Http {
     let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
     let address = listener.local_addr().expect("it listens");
@@ -77,7 +78,7 @@ fn measure(
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     watch.look().queued_most = 0;
     for _ in 0..n {
-        // xorshift64: when in the cycle of the statuses, and where in a frame.
+        // xorshift64: a random time in the cycle of the statuses, and a random position in a frame.
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;

@@ -1,4 +1,4 @@
-//! The one who commands, and uploads one segment after the other.
+//! The lease holder, which uploads one segment after the other.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -13,10 +13,10 @@ use crate::line::Watch;
 
 /// Points of a segment: five seconds of the line.
 const POINTS: usize = 1600;
-/// A segment that is not on the line after this time will not be: it was stopped.
+/// A segment that is not on the line after this time was stopped, and will not be sent.
 const AGAIN: Duration = Duration::from_millis(30);
 
-/// Somebody who has the lease, until it is dropped.
+/// A client that holds the lease until it is dropped.
 pub struct Operator {
     uploads: Arc<AtomicBool>,
     ended: Arc<AtomicBool>,
@@ -41,7 +41,7 @@ impl Operator {
                 port.read(&mut buffer, Duration::from_millis(5)).expect("it is there");
                 let due = wanted.load(Ordering::Relaxed) && sent_at.elapsed() > AGAIN;
                 if due && !watch.look().is_in_a_frame() {
-                    // After a Stop nothing is uploaded that was requested before it, so each upload is a new client's.
+                    // After a Stop the agent refuses requests from before it, so each upload comes from a new client.
                     drop(port);
                     port = AgentPort::open(&url, &options).expect("it is let in");
                     port.write_all(&segment).expect("it is there");

@@ -226,7 +226,7 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
-/// J-15: a frame that is too short for its identifier is ignored, whichever member sends it.
+/// J-15: a frame that is too short for its identifier is ignored, from any member.
 #[test]
 fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });

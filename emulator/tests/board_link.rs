@@ -111,7 +111,7 @@ fn j01_frames_of_60_000_bytes_at_15_mbd() {
     longest_frames(rig);
 }
 
-/// J-04: an answer goes to the line that asked, in order, regardless of simultaneous frames on the other line.
+/// J-04: an answer goes to the line of the request, in order, regardless of simultaneous frames on the other line.
 #[test]
 fn j04_every_port_gets_its_own_records() {
     let mut rig = Rig::new(BOARDS[0]);

@@ -1,4 +1,4 @@
-//! J-56: the flight recorder of the board, in memory that a reset leaves as it is.
+//! J-56: the flight recorder of the board, in memory that a reset does not change.
 mod rig;
 
 use jtc_core::recorder::{BLOCK_BYTES, Block, Log, Outcome, Replay};

@@ -49,7 +49,7 @@ fn j22_the_safety_input_acts_in_one_tick() {
             assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
             let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
             assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
-            // Clearing has an effect only when the cause is gone.
+            // Clearing has no effect while the cause persists.
             rig.ask(HOST, &frames::clear_all());
             rig.run(50);
             assert_eq!(rig.state(), ControllerState::Error);

@@ -1,5 +1,5 @@
 //! J-54: the stored arm. The flash contents of an emulated board go from one board to the next, as over a loss of
-//! power. The program is asked to store through its mailbox, which only a test or a debugger can reach.
+//! power. The test requests a store through the program's mailbox, which only a test or a debugger can reach.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -112,7 +112,7 @@ fn clean(rig: &mut Rig) {
     assert_eq!(wrong, None, "the first sectors are not the store's");
 }
 
-/// J-54: a stored image is there when the power comes back, and the image before it stays until the next but one.
+/// J-54: a stored image survives a loss of power, and the image before it stays until the next store but one.
 #[test]
 fn j54_a_stored_image_outlasts_the_power() {
     let mut rig = board(Bank2::default());
@@ -206,7 +206,7 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     let (idle, none) = run(None);
     let (storing, operations) = run(Some(&image(IMAGE_MAX, 5)));
     assert_eq!((none, operations), (0, 1 + IMAGE_MAX / WORD + 1), "all is stored in that time");
-    // The tick asks for the progress of the image, which changes its instructions by a few.
+    // The tick reads the progress of the image, which changes its number of instructions by a few.
     assert_eq!(idle.calls, storing.calls);
     for (idle, storing) in [(idle.min, storing.min), (idle.max, storing.max)] {
         assert!(idle.abs_diff(storing) <= 32, "instructions of the tick: {idle} and {storing}");
@@ -322,7 +322,7 @@ fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     }
 }
 
-/// The flash reports an error: the program reports it, the image of before stays, and the next attempt may succeed.
+/// The flash reports an error: the program reports it, the previous image stays, and the next attempt may succeed.
 #[test]
 fn j54_a_failed_store_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));

@@ -134,7 +134,7 @@ pub fn read(slot: usize, word: usize) -> Option<Word> {
 fn load(address: u32) -> u32 {
     let value: u32;
     // SAFETY: an aligned load from flash. With FAULTMASK set and BFHFNMIGN a bus fault of it is ignored; the barrier waits for
-    // it. The protection unit goes on working with faults masked (HFNMIENA, `memory`), so it is neither cached nor read ahead.
+    // it. The protection unit continues to work with faults masked (HFNMIENA, `memory`), so it is neither cached nor read ahead.
     unsafe {
         asm!(
             "cpsid f",

@@ -39,7 +39,7 @@ impl fmt::Display for Joint {
     }
 }
 
-/// Serializes the joint as its number, 1..6.
+/// Serialises the joint as its number, 1..6.
 #[cfg(feature = "serde")]
 impl serde::Serialize for Joint {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

@@ -240,7 +240,7 @@ impl Port for AgentPort {
                 return Ok(0);
             }
         }
-        // Also reads the messages that arrived meanwhile: a caller that asks for new data must not get old data.
+        // Also reads the messages that arrived meanwhile: a caller that requests new data must not get old data.
         while self.received.len() < buffer.len() {
             match self.receive(Duration::ZERO) {
                 Ok(true) => {}

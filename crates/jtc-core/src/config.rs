@@ -19,8 +19,8 @@ pub struct Config {
     /// A gripper is on the bus (J-20).
     pub gripper: bool,
     /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. `true`: the pump is switched off until the host
-    /// switches it on again, and the gripper is in ReadyToOperate; a part drops. `false`: an enabled gripper is left as it is, with its
-    /// pump as it was commanded last; it keeps its part.
+    /// switches it on again, and the gripper is in ReadyToOperate; a part drops. `false`: an enabled gripper does not change, and its pump
+    /// stays as it was commanded last; the gripper keeps its part.
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,

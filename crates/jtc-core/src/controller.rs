@@ -23,7 +23,7 @@ use crate::{ControllerState, TrajectoryState};
 
 /// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
 ///
-/// Parts with state of their own are in modules of their own: `nodes` (the bus), `received` (parameters), `store` (trajectory),
+/// Parts with their own state are in separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory),
 /// `motion` (control law), `errors`. This type connects them; [`Controller::tick`] is the figure of the manual, top to bottom.
 #[derive(Clone, Debug)]
 pub struct Controller<M> {

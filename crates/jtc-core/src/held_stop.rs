@@ -33,7 +33,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Like [`Self::hold_stop`], for a known cause.
     pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
-        // A cause that comes while the arm is already held is a consequence more often than not.
+        // A cause that occurs while the arm is already held is usually a consequence of the first one.
         if !self.errors.held_stop() {
             self.keep_cause(cause);
         }
@@ -43,7 +43,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Brings moving joints to rest, and holds the arm.
     pub(crate) fn rest_and_hold(&mut self, errors: &[u16; JOINTS]) {
         self.errors.hold_joints(errors, self.config.protective_stop_latches);
-        // A teach request that waits begins its wait again.
+        // A waiting teach request begins its wait again.
         self.teaching_waits_ms = 0;
         if self.trajectory == TrajectoryState::Execute && self.phase.leave().is_none() {
             self.leave_path(ExecCommand::Pause);
@@ -51,7 +51,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Brings the arm to rest and holds it, also out of Teaching, because encoders of joints do not fit (J-35).
+    /// Brings the arm to rest and holds it, also from Teaching, because encoders of joints do not agree (J-35).
     #[cold]
     pub(crate) fn hold_misfits(&mut self) {
         let misfits = self.nodes.misfits();
@@ -74,7 +74,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         for j in 0..JOINTS {
             let speed = f64::from(speeds[j]);
             let limit = too_fast(&self.config.joints[j], &self.config);
-            // The speed that the drive reports is later, but says that no encoder has jumped.
+            // The speed that the drive reports is later, but shows that no encoder has jumped.
             if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
                 self.teaching = false;
                 let cause = self.cause(StopKind::Shove, j, speed, limit);
@@ -107,7 +107,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Returns the measured value of a joint, and its limit, in the unit of the kind.
     fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
-        // An index of this crate's own: written so that the compiler sees that it is one of a joint.
+        // The index comes from this crate. This form lets the compiler see that it is in range.
         let j = joint.min(JOINTS - 1);
         let limits = &self.config.joints[j];
         let (law, set) = (&self.motion.law, &self.motion.set);
@@ -128,12 +128,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             StopKind::Velocity | StopKind::FrictionTable => (of(&set.point.velocity), limits.velocity_max),
             StopKind::Acceleration => (of(&set.point.acceleration), limits.acceleration_max),
-            // These come with their figures, or have none.
+            // These kinds come with their values, or have none.
             _ => (0.0, 0.0),
         }
     }
 
-    /// Returns the present reactions of the controller, and why it stopped last, for Info (J-69).
+    /// Returns the present reactions of the controller, and the cause of the last held stop, for Info (J-69).
     pub fn reactions(&self) -> Reactions {
         let LastStop { cause, tick } = self.last_stop;
         let ago = self.observed.tick.saturating_sub(tick).min(u32::MAX.into()) as u32;

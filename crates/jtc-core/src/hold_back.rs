@@ -1,8 +1,9 @@
 //! Path time that is held back while a joint is overloaded by its motion (J-75).
 //!
-//! A path at the torque limits needs more torque than there is if the arm is heavier or has more friction than its model. A slower path
-//! needs less: inertia with the square of the rate. So path time slows down as hard as the joints at their limits need it (time scaling
-//! under torque limits, Dahl and Nielsen 1990), and returns to its rate when no joint is at its limit any more.
+//! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than available. A slower path
+//! needs less torque: that for inertia falls with the square of the rate. Therefore path time slows down as much as the joints at their
+//! limits need it (time scaling under torque limits, Dahl and Nielsen 1990), and returns to its rate when no joint is at its limit any
+//! more.
 use crate::JOINTS;
 use crate::path::PathClock;
 use crate::remembered::remembered;

@@ -37,11 +37,11 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
 
 /// Cost of an event that was served.
 enum Served {
-    /// With a few instructions: there is time for another.
+    /// Took a few instructions: the tick has time for another event.
     Quickly,
-    /// With the full budget of a tick.
+    /// Took the full budget of a tick.
     Fully,
-    /// In part; the rest takes more ticks.
+    /// Served in part; the remainder takes more ticks.
     Partly,
 }
 
@@ -69,7 +69,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// Executes Stop and Pause at once (J-04). Their records come when their frames have their turn.
+    /// Executes Stop and Pause at once (J-04). Their records are sent in the turn of their frames.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
@@ -117,7 +117,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // A command that the state forbids has cost nothing. A jog may have been computed before it was refused.
+                            // A command that the state forbids took no time. A jog may have been computed before it was refused.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
@@ -138,7 +138,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// Returns `true` if the command takes a few instructions and leaves the state of the controller as it is, on which the next command
+    /// Returns `true` if the command takes a few instructions and does not change the state of the controller, on which the next command
     /// depends.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
@@ -152,7 +152,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     pub(crate) fn carry_out(&mut self, received: &HostEvent<'_>, command: Command<'_>) -> SliceOutcome {
-        // Parameters would change the torque under a moving arm.
+        // Parameters would change the torque of a moving arm.
         let jogging = self.motion.set.jogging();
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
@@ -160,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: the condition that the controller reacts to is not gone yet.
+            // J-69: the condition that the controller reacts to persists.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -188,7 +188,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            // J-53: a drive on a bench does not bear the load that the model has.
+            // J-53: a drive on a bench does not carry the load of the model.
             Command::TeachingModeEnable
                 if self.state == ControllerState::HoldPos
                     && !self.joints_absent()
@@ -232,8 +232,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21): a fault that a joint still reports is raised again in this tick. A `clear` after which all is as before is
-    /// refused: it is not carried out later either, when the joint has been cleared.
+    /// Clears errors (J-21): a fault that a joint still reports is raised again in this tick. A `clear` without an effect is refused. The
+    /// controller does not execute it later either, when the joint has been cleared.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -298,7 +298,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.model_taken(outcome)
     }
 
-    /// Tells the control law of an arm under torque about the model that was taken.
+    /// Reports an accepted model to the control law of an arm under torque.
     fn model_taken(&mut self, outcome: SliceOutcome) -> SliceOutcome {
         if self.powered() && matches!(outcome, SliceOutcome::Done) {
             self.motion.law.change_model();
@@ -360,7 +360,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
         // J-30: also while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
-        // A Stop or a Pause holds the arm: it also ends Teaching, and calls off Teaching that has not begun.
+        // A Stop or a Pause holds the arm. Therefore it also ends Teaching, and cancels Teaching that has not begun.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         if command != ExecCommand::Execute && self.stop_jog() {
             return Ok(());

@@ -119,7 +119,7 @@ impl Weights {
 /// The step between the points of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
-    /// ms, and one over it.
+    /// ms, and its reciprocal.
     pub ms: u16,
     pub per_ms: f64,
     units: Units,

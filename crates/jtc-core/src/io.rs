@@ -19,7 +19,7 @@ pub struct HostEvent<'a> {
     /// The line, which gets the response record.
     pub line: usize,
     /// The event was received before an urgent command that the controller was given in this tick or an earlier one: an Execute is not
-    /// carried out any more, and a Stop or a Pause has acted already (J-04).
+    /// executed any more, and a Stop or a Pause has already acted (J-04).
     pub overtaken: bool,
     /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51). Its record has no data
     /// status above 6, and segment 0 acts as a Stop in Operate (J-30).
@@ -35,8 +35,8 @@ pub struct Inputs<'a> {
     pub bus: &'a [Frame],
     /// State of the bus.
     pub bus_state: BusState,
-    /// Level of the safety input: true = no error (J-22). A board that latches pulses shorter than a tick gives false in the
-    /// tick after one.
+    /// Level of the safety input: true = no error (J-22). A board that latches pulses shorter than a tick reports false in the tick after
+    /// such a pulse.
     pub safety_input: bool,
     /// Ticks since the last one that did not come, or came half a tick late or more (J-12).
     pub missed_ticks: u16,
@@ -46,7 +46,7 @@ pub struct Inputs<'a> {
     /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Events that are not done must be offered
     /// again in the next tick.
     pub host: &'a [HostEvent<'a>],
-    /// The serial transmitter can take a status now.
+    /// The serial transmitters can take a status now.
     pub status_free: bool,
 }
 
@@ -70,15 +70,15 @@ pub struct Outputs {
     pub bus: Option<Frame>,
     /// Level of the safety output: true = no error (J-22).
     pub safety_output: bool,
-    /// A JtcStatus frame must be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. The frame is not in here,
-    /// because these outputs are copied in every tick, and few of them have a status.
+    /// A JtcStatus frame must be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. The outputs do not contain
+    /// the frame, because they are copied in every tick and few of them have a status.
     pub status: bool,
-    /// Line that the response record in that status is for; the other line gets the status without it. `None`: the status has no record.
+    /// Line that gets the response record in that status. The other line gets the status without it. `None`: the status has no record.
     pub record_line: Option<usize>,
     /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). Never together with a
     /// status.
     pub answer_line: Option<usize>,
-    /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to the memory that lasts (J-54).
+    /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to non-volatile memory (J-54).
     pub store: bool,
     /// Number of host events that are done, from the oldest on: release them.
     pub host_done: usize,

@@ -1,6 +1,6 @@
 //! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of bounded
-//! acceleration and jerk, and slows down before the end of its range by itself. When the jog ends, its time comes to rest like path time,
-//! which stops all joints as hard as on a path (J-33).
+//! acceleration and jerk, and slows down by itself before the end of its range. When the jog ends, its time comes to rest like path time,
+//! so that all joints stop as hard as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::config::Config;
@@ -58,8 +58,8 @@ impl Jog {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that come on the way to rest count when the joints
-    /// stand.
+    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that arrive while the joints come to rest count when the
+    /// joints stand.
     pub fn command(
         &mut self,
         wanted: &[f64; JOINTS],
@@ -70,7 +70,7 @@ impl Jog {
         self.silent_ms = 0;
         for (j, joint) in self.joints.iter_mut().enumerate() {
             joint.wanted = wanted[j];
-            // A joint that is too fast to stop in its range that softly stops as before.
+            // A joint that is too fast to stop within its range at this acceleration keeps the previous one.
             let (softer, jerk) = (JointJog { most: acceleration[j], ..*joint }, jerk(&config.joints[j]));
             let (low, high) = config.position_range(j);
             let rest = position[j] + softer.stopping_way(jerk);
@@ -125,7 +125,7 @@ impl Jog {
             (joints.map(|joint| joint.velocity), joints.map(|joint| joint.acceleration))
         };
         if self.clock.standing() {
-            // Forgets the velocities of the commands before the arm came to rest.
+            // Clears the velocities that were commanded before the arm came to rest.
             for joint in &mut self.joints {
                 (joint.velocity, joint.acceleration) = (0.0, 0.0);
             }
@@ -159,7 +159,7 @@ impl JointJog {
         let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
-        // As wanted, as long as the joint could still stop inside its range from there.
+        // The wanted velocity, as long as the joint could still stop inside its range from there.
         let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
@@ -185,7 +185,7 @@ impl JointJog {
         }
         let round = jerk * tick;
         let left = target - self.velocity;
-        // The acceleration from which the rest of the way to that velocity just suffices to take it back.
+        // Highest acceleration that can still be reduced to zero before the joint has this velocity.
         let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
             flat.min(self.most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);

@@ -10,7 +10,7 @@ const WINDOW_MS: u64 = 1_000;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LateTicks {
     now_ms: u64,
-    /// The last times, in a ring; times that never were lie far enough back.
+    /// The last times, in a ring. Empty slots have times that are far enough in the past.
     at_ms: [u64; COUNT],
     next: usize,
 }

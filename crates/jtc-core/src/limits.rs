@@ -1,4 +1,4 @@
-//! Limits of a joint (J-43), and what else is set for it.
+//! Limits of a joint (J-43), and its other settings.
 use crate::interpolation::ROUNDING;
 use crate::joint_error;
 use crate::remembered::remembered;
@@ -31,7 +31,7 @@ pub struct JointConfig {
 const UNKNOWN_ROTOR: f64 = 0.7;
 
 impl JointConfig {
-    /// Returns the rotor inertia that counts, kg·m²: a drive has a rotor also if the configuration gives none.
+    /// Returns the rotor inertia that counts, kg·m²: a drive also has a rotor if the configuration has no value for it.
     pub fn counted_rotor(&self) -> f64 {
         if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
     }
@@ -62,7 +62,7 @@ impl Recent {
         has & (self.count > most)
     }
 
-    /// Forgets all ticks.
+    /// Clears all ticks.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
@@ -98,7 +98,7 @@ impl Saturation {
         (if torque.is_nan() { 0.0 } else { limited }, overloaded)
     }
 
-    /// Forgets all counts.
+    /// Clears all counts.
     pub fn forget(&mut self) {
         self.over.forget();
     }
@@ -110,7 +110,7 @@ const TURNS_MS: u32 = 200;
 /// Changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
-    /// Ticks in which it came to a limit from the other one: the last three, oldest first.
+    /// Ticks in which the torque came to a limit from the other one: the last three, oldest first.
     at: [u32; 3],
     /// Number of such ticks, three at most.
     count: u8,
@@ -136,7 +136,7 @@ impl Turns {
 
 /// Returns set values (position, velocity, acceleration) outside the limits, or a position `error` (rad, J-62), as joint errors. The
 /// position limit holds for positions that were `commanded`: an arm that is found beyond it is held at its position, because otherwise it
-/// could never be brought back. Rounding on the way between two points that the check of J-36 has passed is not an error.
+/// could never be moved back. Rounding on the way between two points that the check of J-36 has passed is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
     // Written so that NaN is outside.
@@ -148,7 +148,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
-/// Returns as much of the `wanted` torque as a `torque` so far leaves of the limit, N·m.
+/// Returns the part of the `wanted` torque that fits within the limit in addition to the present `torque`, N·m.
 pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)

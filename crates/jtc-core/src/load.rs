@@ -3,17 +3,17 @@ use crate::DT;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two observations of a joint: one joint is looked at in each tick.
+/// Ticks between two observations of a joint: one joint is observed in each tick.
 const PERIOD: f64 = crate::JOINTS as f64;
 /// Time constant of the low-pass filter, s.
 const TIME_S: f64 = 1.0;
 /// Highest load, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Difference of integral and load, as a share of the torque limit, beyond which it is taken for a contact: the load stays.
+/// Difference of integral and load, as a share of the torque limit, beyond which it counts as a contact and the load does not change.
 const APART: f64 = 0.1;
 /// Change of the integral, as a share of the torque limit, up to which the joint is held steadily.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the integral is taken for the load, s.
+/// Time of steady holding after which the integral counts as the load, s.
 const STEADY_S: f64 = 10.0;
 
 /// The load of a joint.
@@ -21,9 +21,9 @@ const STEADY_S: f64 = 10.0;
 pub(crate) struct Load {
     /// N·m. Single precision, because the flight recorder keeps it.
     torque: f32,
-    /// The joint has settled since it was enabled, or since its load was forgotten.
+    /// The joint has settled since it was enabled, or since its load was cleared.
     known: bool,
-    /// Integral at the begin of steady holding, N·m, and observations since.
+    /// Integral at the beginning of steady holding, N·m, and observations since.
     steady: f32,
     observations: u16,
 }
@@ -31,7 +31,7 @@ pub(crate) struct Load {
 remembered!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// Forgets the load: the joint must find it again.
+    /// Clears the load: the joint must find it again.
     pub fn forget(&mut self) {
         *self = Self::default();
     }

@@ -1,7 +1,7 @@
 //! The motion of the arm (J-40 to J-44): set values, the control law, its limits.
 //!
 //! Each part has its state and one step a tick; [`Motion`] connects them, and does to all of them what a change of the
-//! controller's state asks for.
+//! controller's state requires.
 mod commanded;
 mod law;
 mod limiter;

@@ -74,7 +74,7 @@ impl Pid {
     /// the joint is commanded at rest, and this is the resolution of its encoder; `None` in motion.
     ///
     /// At rest the integral is held from the tick in which the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
-    /// that goes on below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does an
+    /// that continues below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does an
     /// integral that restarts at each toggle of the last bit.
     pub fn step(
         &mut self,

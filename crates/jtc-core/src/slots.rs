@@ -19,7 +19,7 @@
 //! being erased, may hold anything; the CRC shows it. All numbers are little-endian.
 //!
 //! This module has no hardware: [`Storing`] returns the next action, and the owner of the flash carries it out. A flash word can be
-//! programmed once after it was erased, and [`Storing`] asks for no more.
+//! programmed once after it was erased, and [`Storing`] requires no more.
 use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};

@@ -3,7 +3,7 @@
 //! The position controller answers a push with the whole torque limit within a few milliradians: the joint clamps any obstacle, and only
 //! the torque limit bounds its force. A joint that yields has a weak spring instead, whose other end is dragged along, and a damper. So the
 //! joint follows a hand with a share of its torque limit, and stops a shove with all of it. Meanwhile the model and the load that the
-//! integral had found go on carrying the arm.
+//! integral had found continue to carry the arm.
 //!
 //! A joint that lowers a load has no spring: the damper alone lets the load sink slowly, at any torque within the limit. The torque that
 //! the damper needs for that becomes part of the load, so a load that the limit does hold comes to rest.
@@ -80,7 +80,7 @@ pub(crate) struct Yield {
     set: f64,
     /// Inertia that the joint moves, kg·m²: a lower bound.
     inertia: f64,
-    /// Torque of the load that the model lacks, N·m, and its value at the begin of the yield, or of lowering (`least`): `load` is never
+    /// Torque of the load that the model lacks, N·m, and its value at the beginning of the yield, or of lowering (`least`): `load` is never
     /// taken back beyond that.
     load: f64,
     least: f64,
@@ -268,7 +268,7 @@ impl Yield {
         if !self.lowers {
             self.doubt(velocity, p + d);
         } else if loaded {
-            // Never beyond the limit; and what was there at the begin is not taken back from a joint that is lifted.
+            // Never beyond the limit. The torque at the beginning is not taken back from a joint that is lifted.
             let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);

@@ -1,7 +1,7 @@
 //! Sine, cosine and square root of f64 without the standard library; sine and cosine without branches on the argument.
 //!
-//! A table has sine and cosine of 128 directions. The values of the nearest direction are rotated by the remaining angle, which is at most
-//! π/128, so that short polynomials are sufficient.
+//! Sine and cosine of 128 directions are in a table. The values of the nearest direction are rotated by the remaining angle, which is at
+//! most π/128, so that short polynomials are sufficient.
 
 /// Directions of the table in a turn, a power of two.
 const DIRECTIONS: usize = 128;

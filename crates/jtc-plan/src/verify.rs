@@ -241,7 +241,7 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     Ok(())
 }
 
-/// Checks that the arm, if there is one, can be held at a place; `waypoint`, from 1, names it in the error.
+/// Checks that the arm, if given, can be held at a place; `waypoint`, from 1, names it in the error.
 pub(crate) fn holds(
     position: &JointVec,
     waypoint: usize,

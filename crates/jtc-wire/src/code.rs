@@ -58,7 +58,7 @@ pub trait Known: Copy + Eq + fmt::Debug + 'static {
     fn name(self) -> &'static str;
 }
 
-/// A code as it was received: one of `T`, or one that this version does not know.
+/// A received code: one of `T`, or one that this version does not know.
 ///
 /// A code is compared with variants of `T`, never with a number.
 ///

@@ -55,7 +55,7 @@ pub const ALL_NODES: u8 = 0x7F;
 /// A command's meaning, borrowed from the frame. Lengths are right; numbers in `Floats` are not yet checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
-    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old 6-byte form reads as everything.
+    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old 6-byte form clears everything.
     ClearCurrentErrors {
         /// Clear the controller's own errors.
         jtc: bool,

@@ -9,7 +9,7 @@ use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
 
-/// Any bytes in words: a frame of either direction, or what is wrong with them.
+/// Any bytes in words: a frame of either direction, or the fault of the bytes.
 ///
 /// ```
 /// use jtc_wire::Described;
@@ -251,7 +251,7 @@ pub enum Piece<'a> {
     Other(&'a [u8]),
 }
 
-/// The frames of a whole capture and what is between them, in order; gaps in time are not known and end nothing.
+/// Returns the frames of a whole capture and the bytes between them, in order. Gaps in time are not known, so they end no frame.
 ///
 /// ```
 /// use jtc_wire::{Piece, fixed, pieces};

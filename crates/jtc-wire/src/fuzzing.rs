@@ -36,7 +36,7 @@ fn body_len(kind: FrameType, pick: u8) -> usize {
 /// The frame that an input of [`frame_bodies`] stands for: type, pick of a length, then the body, repeated or cut to the length.
 pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     let [kind, pick, rest @ ..] = data else { return None };
-    // Types up to 0x11 by their number, as ever; the others are the extensions.
+    // Types up to 0x11 are selected by their number, as in earlier inputs; the others are the extensions.
     let kind = match usize::from(*kind % 0x20) {
         kind @ 0..0x12 => FrameType::from_byte(kind as u8)?,
         more => *FrameType::ALL.get(more - 1)?,

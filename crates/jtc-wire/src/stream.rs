@@ -9,7 +9,7 @@
 //! the inter-byte timeout or more after received bytes.
 //!
 //! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
-//! any candidate is checked with two registers and some arithmetic, however long it is. Hostile bytes full of false
+//! a candidate of any length is checked with two registers and some arithmetic. Hostile bytes full of false
 //! headers cost a constant each, and [`Receiver::poll`] scans a bounded number of them per call.
 use crate::batch::ReceivedEvent;
 use crate::crc::advance;

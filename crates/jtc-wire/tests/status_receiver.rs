@@ -1,4 +1,4 @@
-//! The host's parser of statuses: what it counts, and what it does not wait for.
+//! The host's parser of statuses: its counters, and bytes that it does not wait for.
 use jtc_wire::{STATUS_LEN, Status, StatusReceiver};
 
 /// Feeds all bytes at once and returns the number of statuses found.

@@ -1,4 +1,4 @@
-//! FDCAN: dedicated buffers, order of transmission, acknowledge, bus-off and what comes after.
+//! FDCAN: dedicated buffers, order of transmission, acknowledge, bus-off and recovery.
 use std::cell::RefCell;
 use std::rc::Rc;
 

@@ -16,7 +16,7 @@ const FAILED: [u32; 3] = [4, 5, 6];
 /// Memory of the flight recorder, in the same pieces as on the board.
 pub type LogMemory = [Vec<Block>; 3];
 
-/// Returns the memory as it is after a loss of power.
+/// Returns the state of the memory after a loss of power.
 pub fn no_log() -> LogMemory {
     RECORDER_BLOCKS.map(|blocks| vec![[0; BLOCK_WORDS]; blocks])
 }

@@ -116,7 +116,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
     written.expect("a String takes everything");
 }
 
-/// Bits of the flags that `F` asks for.
+/// Bits of the flags that `F` requests.
 const WARNING: u8 = 1 << 2;
 const PASSIVE: u8 = 1 << 5;
 

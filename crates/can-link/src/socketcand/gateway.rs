@@ -79,8 +79,8 @@ impl SocketcandGateway {
     }
 
     /// Reports to a client that its own controller has left the bus ([`ErrorState::BusOff`]) or is back ([`ErrorState::Active`]), as an
-    /// error frame between the frames before and after. The protocol's error frames carry no data, so that it cannot express other states.
-    /// These are not reported. Never waits.
+    /// error frame between the frames before and after. The protocol's error frames carry no data, so that the protocol cannot express
+    /// other states. These are not reported. Never waits.
     pub fn report_state(&self, client: ClientId, state: ErrorState) {
         self.server.report_state(client, state);
     }

@@ -171,7 +171,7 @@ fn j66_j71_gains_that_fail_are_taken_back() {
     assert_eq!((softer[0], softer[2]), (given()[0], given()[2]), "the others keep theirs");
 }
 
-/// Those that were on trial have not held: what comes back is what held before them.
+/// Gains on trial have not held the arm, so the gains that held it before are used again.
 #[test]
 fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     for (ms, back) in [(100, 0.5), (2_000, 1.2)] {

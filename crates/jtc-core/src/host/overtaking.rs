@@ -1,4 +1,4 @@
-//! Priority of Stop and Pause, which act before the frames in front of them have had their turn (J-04).
+//! Priority of Stop and Pause, which act before earlier frames have had their turn (J-04).
 use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 
 use crate::TrajectoryState;

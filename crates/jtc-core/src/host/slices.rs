@@ -14,7 +14,7 @@ pub(crate) enum SliceProgress {
     TableCheck(usize),
     /// Joints whose table is copied.
     TableCopy(usize),
-    /// Poses in which the inertia of the joints was looked at.
+    /// Poses in which the inertia of the joints was computed.
     Pose(usize),
     /// Bytes of the arm image that are written.
     Image(usize),

@@ -8,14 +8,14 @@ use crate::io::HostEvent;
 use crate::remembered::remembered;
 use crate::{ControllerState, TrajectoryState};
 
-/// Ticks that the check of a segment takes at most (J-36), and ticks for copying it: with the record, less than 40 ms.
+/// Maximum number of ticks for the check of a segment (J-36), and ticks for copying it: with the record, less than 40 ms.
 const CHECK_TICKS: usize = 28;
 const COPY_TICKS: usize = 10;
 /// Points of a short segment checked and copied in one tick.
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
-/// State of a line for the upload that was begun on it last.
+/// State of a line for the last upload that was begun on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LineUpload {
     /// Its segment 0 came on a plain line (J-51). `None` before the first, and after the Execute of one that did not.
@@ -36,7 +36,7 @@ impl LineUpload {
         }
     }
 
-    /// Takes note that a trajectory is executed. Another client that executes it once more has not shown yet what it knows.
+    /// Notes that a trajectory is executed. Another client that executes it again has not shown yet if it knows the extensions.
     pub fn executed(&mut self) {
         self.plain = self.plain.filter(|plain| *plain);
     }
@@ -47,7 +47,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // Its host repeats the segment until it is taken, and forwards no Stop meanwhile. The segment is refused in the tick of this
+            // The host repeats the segment until it is accepted, and forwards no Stop meanwhile. The segment is refused in the tick of this
             // Stop.
             self.execute(ExecCommand::Stop).ok();
         }
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins the check: segment 0 begins a trajectory, other segments go on after the received ones.
+    /// Begins the check: segment 0 begins a trajectory, other segments continue after the received ones.
     fn begin_check(&mut self, segment: &Segment<'_>) {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);

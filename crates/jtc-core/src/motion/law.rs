@@ -15,8 +15,8 @@ use crate::teach::{LedJoint, Taught};
 use crate::yielding::{Joint, Yield, Yielded};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed, rad/s, below which the torque that the integral finds in motion may be friction that the model has wrong: no load is learned from
-/// it.
+/// Speed, rad/s, below which the torque that the integral finds in motion may be an error of the friction model. No load is learned from
+/// such a torque.
 const CREEPS: f64 = 0.05;
 
 /// Share of a torque limit below which friction of the joint holds the torque that is missing besides the load found.
@@ -61,7 +61,7 @@ const UNWINDS_MS: u16 = 3_000;
 /// Inputs of a tick of the control law.
 pub(crate) struct LawInputs<'a> {
     pub mode: ControlMode,
-    /// The arm brakes with all the torque there is (J-33).
+    /// The arm brakes with all available torque (J-33).
     pub braking: bool,
     pub nodes: &'a Nodes,
     pub config: &'a Config,
@@ -74,7 +74,7 @@ pub(crate) struct ControlParameters<'a> {
     pub pid: &'a [PidGains; JOINTS],
     pub polynomial: &'a [[f64; 6]; JOINTS],
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
-    /// The gains are on trial: swings are looked for (J-71).
+    /// The gains are on trial: the law looks for swings (J-71).
     pub on_trial: bool,
 }
 
@@ -84,7 +84,7 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
-    /// In Teaching. Outside of it nothing of it is remembered, and the flight recorder does not keep it.
+    /// State of Teaching, which is kept neither outside of Teaching nor by the flight recorder.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// Joints that yield (J-68, J-70).
@@ -94,14 +94,14 @@ pub(crate) struct ControlLaw {
     loads: [Load; JOINTS],
     /// The joint whose load is observed in this tick.
     observed: u8,
-    /// Time left in which what is missing is what the controller had found for a payload that is now given, ms (J-60).
+    /// Time left in which the missing torque is the one that the controller had found for a payload that is now configured, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
 remembered!(ControlLaw { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms });
 
 impl ControlLaw {
-    /// Forgets all torques.
+    /// Clears all torques.
     pub fn release(&mut self) {
         let Self { pid, torque, taught, transfer, yields, yielded, loads, observed, unwinds_ms } = self;
         (*unwinds_ms, *observed) = (0, 0);
@@ -151,7 +151,7 @@ impl ControlLaw {
         (0..JOINTS).all(holds)
     }
 
-    /// Forgets the loads: each joint must find its load again.
+    /// Clears the loads: each joint must find its load again.
     fn forget_loads(&mut self) {
         self.loads.iter_mut().for_each(Load::forget);
     }
@@ -197,7 +197,7 @@ impl ControlLaw {
             }
             return;
         }
-        // The joint lets go of the commanded torque, not of the computed torque.
+        // The joint releases the commanded torque, not the computed torque.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
@@ -279,7 +279,7 @@ impl ControlLaw {
         (contact || self.unwinds_ms == 0) && (0..JOINTS).all(|j| !held[j] || known(j))
     }
 
-    /// As if every joint had found that it carries nothing.
+    /// Sets the loads as if every joint had found that it carries none.
     #[cfg(test)]
     pub fn find_loads_for_test(&mut self) {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
@@ -298,8 +298,8 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// Takes note that the payload of the arm comes into the model while the arm is held: the missing torque says nothing until the
-    /// integral has given back the torque that it had found for the payload (J-60).
+    /// Notes that the payload of the arm comes into the model while the arm is held. The missing torque has no meaning until the integral
+    /// has given back the torque that it had found for the payload (J-60).
     pub fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
@@ -343,7 +343,7 @@ impl ControlLaw {
         }
     }
 
-    /// Runs one tick: computes its torque, before any limit. Returns joint errors found on the way (friction table).
+    /// Runs one tick: computes its torque, before any limit. Also returns the joint errors found (friction table).
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -356,7 +356,7 @@ impl ControlLaw {
         self.yielded.step();
         let before = self.transfer.begin(&self.torque);
         if before.is_some() && mode != ControlMode::Teach {
-            // Only Teaching has these.
+            // Only Teaching has these parts.
             self.torque.iter_mut().for_each(|torque| (torque.load, torque.brake) = (0.0, 0.0));
         }
         let q = nodes.positions();

@@ -9,8 +9,8 @@ use crate::{JOINTS, joint_error};
 pub(super) const DRIVEN: f64 = 0.05;
 /// Share of its set velocity below which a joint that comes to rest after Teaching is held up by an obstacle.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit from which on the feedback torque may be twice as high: friction and inertia that the model has wrong are
-/// not a push. An obstacle in the way of a fast motion takes the torque beyond the doubled share some milliseconds later.
+/// Share of the velocity limit from which on the feedback torque may be twice as high: errors of friction and inertia in the model are not
+/// a push. An obstacle in the way of a fast motion takes the torque beyond the doubled share some milliseconds later.
 const FAST: f64 = 0.2;
 /// Number of ticks: a joint whose feedback torque was beyond its share in more than that of the last 100 ticks counts as pushed (J-66).
 const PUSHED_MS: u16 = 20;
@@ -73,7 +73,7 @@ impl Limiter {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
 
-    /// Forgets the counts of a joint.
+    /// Clears the counts of a joint.
     #[inline(always)]
     pub fn forget(&mut self, joint: usize) {
         self.saturation[joint].forget();
@@ -81,7 +81,7 @@ impl Limiter {
         self.turns[joint] = Turns::default();
     }
 
-    /// Forgets earlier torques from limit to limit; only those from now on count.
+    /// Clears earlier torques from limit to limit; only those from now on count.
     pub fn forget_turns(&mut self) {
         self.turns = Default::default();
     }
@@ -135,7 +135,7 @@ impl Limiter {
             }
             let settled = set.catch[j].settled();
             let (feedback, share) = (law.feedback(j), config.yield_torque_share * limits.torque_max);
-            // A fast motion may use more.
+            // A fast motion may use more feedback torque.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
             // Feedback torque that brakes a joint is not a push against it; feedback torque on a joint that stands is.

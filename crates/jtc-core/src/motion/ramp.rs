@@ -10,8 +10,8 @@ use crate::path::{Bounds, PathClock, SlopeBounds};
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the rest is for what changes within
-/// a tick and for the controller.
+/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the remainder is for changes within a tick and
+/// for the controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
 /// Share of the remaining torque for a stop of an arm that a hand has led: the position controller, which makes the torque, overshoots.
@@ -140,7 +140,7 @@ mod tests {
     use crate::Parameters;
     use crate::motion::JointTorque;
 
-    /// Joints that stand, that move as slowly as counts as standing, and that move.
+    /// Joints that stand, that move slowly enough to count as standing, and that move.
     fn velocities() -> impl Strategy<Value = [f64; JOINTS]> {
         prop::array::uniform6(prop_oneof![Just(0.0), Just(0.02), Just(-0.02), -1.5..1.5f64])
     }

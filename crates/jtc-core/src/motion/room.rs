@@ -6,7 +6,7 @@ use super::Motion;
 use super::law::{LawInputs, compensation};
 use crate::{JOINTS, jog};
 
-/// Highest share of a torque limit that an approach asks for; the feedback of a fast one takes up to a fifth.
+/// Highest share of a torque limit that an approach uses; the feedback of a fast approach takes up to a fifth.
 const APPROACH_TORQUE: f64 = 0.8;
 /// Highest share of a torque limit that a jog uses: the rest is for the feedback, and for the return from a position that takes more torque
 /// to hold.
@@ -15,7 +15,8 @@ const JOG_TORQUE: f64 = 0.92;
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
-/// Top speed of a minimum-jerk polynomial, in ways over its time, and its highest acceleration, in ways over the square of its time.
+/// Top speed of a minimum-jerk polynomial, in distances over its time, and its highest acceleration, in distances over the square of its
+/// time.
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
@@ -23,13 +24,13 @@ const TOP_ACCELERATION: f64 = 5.774;
 const REST_S: f64 = 0.3;
 /// Speed of a slow jog, rad/s: if friction leaves no torque at the wanted speed, it may leave some at this speed.
 const CREEP: f64 = 0.02;
-/// Speed from which on a joint slides, so that the friction of the model is all there, rad/s.
+/// Speed from which on a joint slides, so that the friction of the model acts completely, rad/s.
 const SLIDES: f64 = 0.1;
 /// Highest speed that counts as zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
 /// Share of a torque limit that counts as left at least for a motion that unloads the joint.
 const UNLOADING: f64 = 0.01;
-/// Share of the tool speed limit that joints which get faster have at least, so that the jog goes on.
+/// Least share of the tool speed limit for joints that get faster, so that the jog continues.
 const LEAST_ROOM: f64 = 0.005;
 /// Lowest share of a jog's acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
@@ -115,7 +116,7 @@ impl Motion {
 
     /// Returns the `wanted` velocities (rad/s), reduced to fit the tool speed limit. The contributions of all joints to the speed of the
     /// flange are summed up, because joints whose motions cancel out do not speed up alike. Joints that get faster share the speed that the
-    /// other joints leave; those become slower or go on as they are.
+    /// other joints leave; those become slower or keep their speed.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -127,7 +128,7 @@ impl Motion {
         }
         let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
         let share = if speed > most { most / speed } else { 1.0 };
-        // A joint goes on getting faster, or turns round, until its acceleration is back at zero.
+        // A joint continues to get faster, or reverses, until its acceleration is back at zero.
         let peak: [f64; JOINTS] = core::array::from_fn(|j| {
             let (v, a) = (set.velocity[j], set.acceleration[j]);
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
@@ -183,7 +184,7 @@ impl Motion {
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
-        // The jog goes on as long as a command lasts, and then comes to rest.
+        // The jog continues as long as a command lasts, and then comes to rest.
         let ahead_s = f64::from(jog::LASTS_MS) / 1_000.0 + 0.5 * REST_S;
         let rest = core::array::from_fn(|j| {
             let (low, high) = config.position_range(j);
@@ -197,7 +198,7 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that comes to a position with a lower holding torque moves as long as there is any torque for it.
+            // A joint that comes to a position with a lower holding torque moves as long as any torque is available for it.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;

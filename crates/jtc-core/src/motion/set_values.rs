@@ -21,7 +21,7 @@ pub(crate) struct SetValues {
     pub commanded: Commanded,
     /// The joint is enabled and its set position latched.
     pub(super) holding: [bool; JOINTS],
-    /// The joint is set absent (J-53): there is nothing to hold.
+    /// The joint is set absent (J-53), so it need not be held.
     absent: [bool; JOINTS],
     /// Joints whose set values restarted from the measured state since the last tick, in motion or at rest.
     found_moving: [bool; JOINTS],
@@ -165,7 +165,7 @@ impl SetValues {
     fn decelerate(&mut self, j: usize, mut deceleration: Deceleration, config: &Config) {
         let (from, velocity) = deceleration.start();
         self.commanded.begin(j, from, velocity, config.delay_ticks);
-        // J-62: the joint has moved on since the measurement.
+        // J-62: the joint has moved since the measurement.
         deceleration.shift(self.commanded.position(0)[j] - from);
         self.deceleration[j] = Some(deceleration);
         self.found_moving[j] = true;
@@ -176,7 +176,7 @@ impl SetValues {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
 
-    /// As if every joint were enabled and its position latched.
+    /// Sets the state as if every joint were enabled and its position latched.
     #[cfg(test)]
     pub fn hold_for_test(&mut self) {
         self.holding = [true; JOINTS];
@@ -195,7 +195,7 @@ impl SetValues {
         self.catch[joint].settled()
     }
 
-    /// Returns `true` if every joint that is there is enabled and held at rest.
+    /// Returns `true` if every joint that is not absent is enabled and held at rest.
     pub fn all_holding(&self) -> bool {
         self.jog.is_none()
             && self.deceleration.iter().all(Option::is_none)
@@ -226,7 +226,7 @@ impl SetValues {
                     self.decelerate(j, falling, config);
                 }
             } else if another {
-                // Its load moves when that of another joint does.
+                // Its load moves when the load of another joint moves.
                 self.catch[j] = Catch::begin(config);
             }
         }

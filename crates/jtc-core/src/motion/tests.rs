@@ -29,7 +29,7 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// Otherwise it would be without the limits of torque while it stands, and nothing could be begun.
+/// Otherwise the torque limits would not apply while the arm stands, and no motion could begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());

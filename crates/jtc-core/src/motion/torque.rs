@@ -19,9 +19,9 @@ pub(crate) struct JointTorque {
 remembered!(JointTorque { model, pid, friction, load, brake, blend });
 
 impl JointTorque {
-    /// Sum of all parts but the model.
+    /// Returns the sum of all parts except the model.
     pub fn correction(&self) -> f64 {
-        // Two partial sums: shorter to wait for than one.
+        // Two partial sums have a shorter latency than one.
         (self.pid.sum() + self.friction) + (self.load + self.brake + self.blend)
     }
 

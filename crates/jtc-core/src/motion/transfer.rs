@@ -12,7 +12,7 @@ const FALL_MS: u16 = 10;
 /// Part of the last torque that the next torque continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
-    /// All but the model.
+    /// All parts except the model.
     Correction,
     /// All parts.
     Everything,
@@ -33,14 +33,14 @@ pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 /// Steps that are being blended out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Transfer {
-    /// Step to blend out, N·m, and how long that has gone on.
+    /// Step to blend out, N·m, and the time since it began.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
     /// The step is blended out within [`FALL_MS`].
     falls: [bool; JOINTS],
     /// Time left until all steps are blended out, ms.
     left_ms: u16,
-    /// Joints that yield from this tick on: what their torque loses is gone soon.
+    /// Joints that yield from this tick on: their torque falls within [`FALL_MS`].
     yields: [bool; JOINTS],
     /// Joints that were latched in this tick: their torque starts from that of the model.
     just_enabled: [bool; JOINTS],
@@ -61,18 +61,17 @@ impl Remembered for Continued {
 }
 
 impl Transfer {
-    /// The control mode changes: no step but that of the model.
+    /// The control mode changes: only the model may step.
     pub fn change_mode(&mut self) {
         self.next = Some(Continued::Correction);
     }
 
-    /// The model changes: no step at all.
+    /// The model changes: no torque may step.
     pub fn change_model(&mut self) {
         self.next = Some(Continued::Everything);
     }
 
-    /// The joint yields from the next tick on: no step but that of the model, and torque that is too much for it falls within
-    /// [`FALL_MS`] (J-68).
+    /// The joint yields from the next tick on: only the model may step, and excess torque falls within [`FALL_MS`] (J-68).
     #[inline(always)]
     pub fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
@@ -89,7 +88,7 @@ impl Transfer {
         self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
     }
 
-    /// Adds what is left of the steps to `torque`, and clears that of joints that are not enabled.
+    /// Adds the remainder of the steps to `torque`, and clears it for joints that are not enabled.
     #[inline(always)]
     pub fn blend(
         &mut self,
@@ -133,7 +132,7 @@ impl Transfer {
         self.left_ms = config.blend_ms.max(FALL_MS);
     }
 
-    /// Adds what is left of the steps in this tick.
+    /// Adds the remainder of the steps in this tick.
     fn blend_steps(&mut self, torque: &mut [JointTorque; JOINTS], config: &Config) {
         for j in 0..JOINTS {
             let length_ms = if self.falls[j] { FALL_MS } else { config.blend_ms };

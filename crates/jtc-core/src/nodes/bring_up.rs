@@ -1,4 +1,4 @@
-//! The frame of each tick: Move, or a frame in its place that brings a node up (J-12, J-20).
+//! The frame of each tick: Move, or instead a frame that brings a node up (J-12, J-20).
 use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
@@ -57,7 +57,7 @@ impl Nodes {
             // A frame that only the gripper needs leaves the arm its torque in nearly every tick (J-23).
             return None;
         }
-        // Nodes that are enabled refuse their configuration and should not be: they come first.
+        // Nodes that are enabled refuse their configuration and should not be enabled, so they come first.
         let to_disable = self
             .nodes
             .iter()
@@ -88,7 +88,7 @@ impl Nodes {
         target
     }
 
-    /// Returns the requested state of the gripper: it is brought up in any state with torque as well, on the side (J-23).
+    /// Returns the requested state of the gripper, which is also brought up in any state with torque, in addition to the joints (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

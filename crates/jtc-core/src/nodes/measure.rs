@@ -1,13 +1,13 @@
 //! Measured position and velocity of a joint, and their substitutes while its answers are missing (J-35, J-63).
 //!
 //! Terms: an answer is *usable* if the joint can have reached its position since the last usable answer. A tick without a usable answer
-//! takes the *prediction*: the last usable answer, carried on at the rate at which the joint moved, and the change of the commanded
+//! takes the *prediction*: the last usable answer, extrapolated at the rate at which the joint moved, plus the change of the commanded
 //! velocity since. The first usable answer after missing ones differs from the prediction by an *offset*, which fades, so that neither the
 //! loss nor the return makes a step of position, nor of the derivative of its error. A *late* answer ([`Lateness`]) belongs to the time at
-//! which it was due: it is compared with the prediction for that time, and the prediction goes on from it. A late answer that is close to
-//! its prediction is used as it is, like one in time: offsets that fade in each tick would be a filter in the position loop, which makes it
-//! swing. The offset has no part in the prediction: the prediction depends on answers and commands alone, so that the position loop stays
-//! closed however often answers are lost.
+//! which it was due: it is compared with the prediction for that time, and the prediction continues from it. A late answer that is close to
+//! its prediction is used directly, like an answer in time. Offsets that fade in each tick would be a filter in the position loop, which
+//! would make the loop swing. The offset has no part in the prediction: the prediction depends on answers and commands alone, so that the
+//! position loop stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -35,8 +35,8 @@ const UNEXPECTED: f64 = 0.1;
 const IN_ITS_PLACE: f64 = 2.0;
 /// Coarsest encoder for which [`IN_ITS_PLACE`] counts, rad: an answer that is used without a correction may cause a step of this size.
 const COARSEST: f64 = 1e-4;
-/// Distance from the prediction, as a share of the implausible one, within which an answer must be after the jump of its encoder is taken
-/// off.
+/// Distance from the prediction, as a share of the implausible one, within which an answer must be after the jump of its encoder is
+/// subtracted.
 const NEAR: f64 = 0.5;
 /// Highest difference between the rate carried on and the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
@@ -45,7 +45,7 @@ const DISAGREEMENT: f64 = 0.2;
 const YOUNGER: f64 = 2.5;
 /// Highest rate that is carried on, in velocity limits.
 const FASTEST: f64 = 1.2;
-/// Double pole of a fading offset times the setting: a fifth is left when that is over, a fiftieth after twice as long.
+/// Double pole of a fading offset times the setting: a fifth remains after that time, a fiftieth after twice that time.
 const FADING: f64 = 3.0;
 /// Remainder at which an offset ends, rad or rad/s.
 const FADED: f64 = 1e-9;
@@ -62,7 +62,7 @@ pub(crate) struct Reading {
 /// The measurements of a joint in a tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tick {
-    /// Answer of the joint, if there is one.
+    /// Answer of the joint, if it has arrived.
     pub answer: Option<Reading>,
     /// A Move requested an answer.
     pub expected: bool,
@@ -108,7 +108,7 @@ struct Unexpected {
     joint: usize,
 }
 
-/// An answer that is late, and what was commanded since it was due.
+/// A late answer, and the motion that was commanded since it was due.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     /// ms.
@@ -126,7 +126,7 @@ pub(crate) struct Measurement {
     used: Reading,
     /// There is a last usable answer.
     known: bool,
-    /// Milliseconds; it wraps around after 49 days, which the differences that are taken of it do not notice.
+    /// Time, ms. Wraps around after 49 days, which does not affect differences.
     clock_ms: u32,
     /// The last usable answer, its position carried on since.
     answer: Reading,
@@ -140,21 +140,21 @@ pub(crate) struct Measurement {
     carried: f64,
     /// The last usable answers.
     history: History,
-    /// How late the answers are.
+    /// Lateness of the answers.
     lateness: Lateness,
     /// Jumps of the encoder.
     jumps: Jumps,
     /// An answer has been missing since the last usable one.
     missing: bool,
-    /// Prediction less answer, as much as has not faded.
+    /// The part of prediction minus answer that has not faded.
     position_offset: Fading,
     velocity_offset: Fading,
     /// At least one of the offsets has not faded.
     fading: bool,
 }
 
-/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. The offset goes on fading when
-/// more is added to it; if it restarted instead, it would never fade while every other answer is lost.
+/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. The offset continues to fade when
+/// more is added to it. If it restarted instead, it would never fade while every other answer is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
     /// rad or rad/s.
@@ -189,7 +189,7 @@ impl Fading {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;
-        // 1/eˣ by its series, which is stable however long the tick was.
+        // 1/eˣ by its series, which is stable for any length of the tick.
         let decay = 1.0 / (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)));
         let both = self.slope + pole * self.left;
         (self.left, self.slope) = ((self.left + both * ms) * decay, (self.slope - pole * both * ms) * decay);
@@ -252,7 +252,7 @@ impl Measurement {
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }
 
-    /// Returns the jump of the encoder that is taken off an answer, rad.
+    /// Returns the jump of the encoder that is subtracted from an answer, rad.
     pub fn taken_off(&self) -> f64 {
         self.jumps.taken_off()
     }
@@ -296,7 +296,7 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Nearly always every answer is in time. The code that this needs is compiled on its own.
+        // Nearly always every answer is in time. The code for this case is compiled separately.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -316,7 +316,7 @@ impl Measurement {
         self.take(&tick, late, config)
     }
 
-    /// Takes the answer of a tick, if the answer is usable. Inlined: without a late answer half of the code falls away.
+    /// Takes the answer of a tick, if the answer is usable. Inlined, because half of the code is not needed without a late answer.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -405,7 +405,7 @@ impl Measurement {
     }
 
     /// Bridges the difference between the answer of this tick and `predicted`, which must not be a step. An answer in its place makes no
-    /// step; it takes back what is left of earlier differences, as far as it can, because they would add up otherwise.
+    /// step; it reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;

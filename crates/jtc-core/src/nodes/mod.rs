@@ -266,7 +266,7 @@ impl Nodes {
         }
     }
 
-    /// Sets the substitutes of the joints that are set absent, and finds drives of such joints that answer all the same (J-53).
+    /// Sets the substitutes of the joints that are set absent, and finds drives of such joints that still answer (J-53).
     #[inline(never)]
     fn stand_in(&mut self, config: &Config) {
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {

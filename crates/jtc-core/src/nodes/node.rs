@@ -97,7 +97,7 @@ impl Node {
         self.absent
     }
 
-    /// Returns the reported state; Start for an absent joint, unless its drive reports all the same.
+    /// Returns the reported state; Start for an absent joint, unless its drive still reports.
     pub fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }

@@ -26,7 +26,7 @@ impl Nodes {
             }
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
-            // No node can have answered, and the bus is not given up yet: the joint is predicted all the same (J-63).
+            // No node can have answered, but the controller has not given up the bus yet: the joint is still predicted (J-63).
             let predicted =
                 self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
@@ -105,7 +105,7 @@ impl Nodes {
         self.joints().iter().any(|node| !node.clear && node.in_fault())
     }
 
-    /// Returns `true` if a joint is still being cleared: the cause of its error is not gone.
+    /// Returns `true` if a joint is still being cleared: the cause of its error persists.
     pub fn clearing(&self) -> bool {
         self.joints().iter().any(|node| node.clear)
     }

@@ -115,7 +115,7 @@ pub(super) fn flags(state: LogState, powered: bool) -> u16 {
     state as u16 | if powered { POWERED } else { 0 }
 }
 
-/// Returns `true` if the block has this number; its content is not looked at.
+/// Returns `true` if the block has this number, without a check of its content.
 pub(super) fn in_place(block: &Block, sequence: u32) -> bool {
     block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
 }

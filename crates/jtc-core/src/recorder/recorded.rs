@@ -131,7 +131,7 @@ impl RecordedInputs {
         self.bus.iter().map_while(|frame| *frame)
     }
 
-    /// Returns the events of hosts, as far as the controller looked at them.
+    /// Returns the events of hosts that the controller has read.
     pub fn host(&self) -> &[RecordedEvent] {
         self.host.get(..self.host_len).unwrap_or(&[])
     }

@@ -1,5 +1,5 @@
-//! The state of the controller in a snapshot: all that decides how the arm moves and what is reported of it, without the arm and the
-//! points of the trajectory, which a log names by hash.
+//! The state of the controller in a snapshot: all values that decide how the arm moves and what the controller reports, without the arm and
+//! the points of the trajectory, which a log names by hash.
 //!
 //! The link's own bookkeeping (records that wait, frames to be sent, how far a long frame has been executed) is not part of it: a replay
 //! gives the same frames on the joint bus and the same states, not the same bytes on the lines.

@@ -11,7 +11,7 @@ fn j53_every_setting_is_read_and_set_and_its_default_is_in_its_range() {
     let all: Vec<_> = values(&config, 0, false).collect();
     assert_eq!(all.len(), count(false));
     assert_eq!(with_values(&config, all.iter().copied()), Ok(config.clone()));
-    // Each value alone changes its setting, and nothing else.
+    // Each value changes only its own setting.
     for value in &all {
         let row = setting(value.setting).expect("it is in the table");
         let half = 0.5 * (row.low + row.high);

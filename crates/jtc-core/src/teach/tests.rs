@@ -141,7 +141,8 @@ impl Driven {
     }
 }
 
-/// A mass that alone explains the motion goes, within seconds and without a step; one that a hand lifts faster or slower than that does not.
+/// A mass that alone explains the motion is removed, within seconds and without a step. A mass that a hand lifts faster or slower than that
+/// is not removed.
 #[test]
 fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     let left = |against, velocity, ms| Driven::new().moves(against, velocity, ms);
@@ -154,7 +155,7 @@ fn j25_a_mass_that_drives_the_arm_by_itself_goes() {
     }
 }
 
-/// A mass that has gone comes back if the joint sinks without it and nothing else explains that.
+/// A removed mass is added again if the joint sinks without it and no other cause explains this.
 #[test]
 fn j25_a_mass_that_is_missed_comes_back() {
     let mut driven = Driven::new();

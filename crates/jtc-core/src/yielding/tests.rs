@@ -220,7 +220,7 @@ fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
             yields.is_over()
         });
         assert_eq!(over, held, "{load} N·m");
-        // The host may have it held all the same: it stands.
+        // The host may still request to hold the joint, because it stands.
         assert!(yields.is_calm());
         yields.clear();
         assert!(yields.is_over());

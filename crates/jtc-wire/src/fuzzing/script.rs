@@ -52,7 +52,7 @@ impl<'a> Reader<'a> {
     }
     fn step(&mut self) -> Step {
         Step::Bytes(match self.byte() % 16 {
-            // With 0 exactly a gap: 200 µs are gone already.
+            // A byte of 0 makes exactly a gap, because 200 µs have passed already.
             0 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 200 + u64::from(self.byte()) * 100),
             1 => return Step::Silence(INTER_BYTE_TIMEOUT_US - 201),
             2 => return Step::Hold(self.byte() % 40),
@@ -122,7 +122,7 @@ struct Driver {
     lazy: bool,
     found: Vec<(u64, Event)>,
     watch: UrgentWatch<1>,
-    /// Time of the watch, which sees bytes as they arrive, however slow the reader is.
+    /// Time of the watch, which sees bytes as they arrive, even if the reader is slow.
     arrived_us: u64,
     /// Positions at which Stops and Pauses ended.
     urgent: Vec<u64>,

@@ -11,7 +11,7 @@ use super::{ON, receiver, segment};
 enum Received {
     Good(FrameType, usize),
     Bad(u8, FrameStatus, u16),
-    /// Not even a header.
+    /// A run without a header.
     Noise(FrameStatus, u16),
 }
 use FrameStatus::*;
@@ -119,7 +119,7 @@ fn j05_frame_type() {
     }
 }
 
-/// Also D16 of the old device: a length that the type cannot have is never executed, however right the CRC.
+/// Also D16 of the old device: a length that the type cannot have is never executed, even if the CRC is right.
 #[test]
 fn j05_length_of_another_type() {
     let mut line = Line::new();

@@ -63,7 +63,7 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// Also if set values move: a joint that comes to rest in HoldPos has a velocity.
+/// This also holds if set values move: a joint that comes to rest in HoldPos has a velocity.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {
@@ -82,7 +82,7 @@ fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_onl
     }
 }
 
-/// Such a table is for no path, but an arm can be held with it.
+/// No path can use such a table, but an arm can be held with it.
 #[test]
 fn j42_a_table_without_standstill_is_no_error_while_the_arm_is_held() {
     for (mode, error) in
@@ -128,7 +128,7 @@ fn j25_a_load_that_nobody_has_found_is_not_carried() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), [0.0; JOINTS]);
 }
 
-/// While the integral unwinds nothing can be found; joints that are not there find nothing.
+/// While the integral unwinds, no load can be found. Absent joints find no load.
 #[test]
 fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     let mut arm = taught(&[1.0; JOINTS]);
@@ -253,7 +253,7 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// As much as is wanted, or else as much as the limit leaves; never against what is wanted.
+/// The result is the wanted torque, or as much of it as the limit leaves, and never has the opposite sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [
@@ -272,7 +272,7 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     }
 }
 
-/// A joint that is not enabled yet may be found anywhere, at any speed; nothing is asked of it.
+/// A joint that is not enabled yet may be at any position and speed; the limits do not apply to it.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
     let off = 3;
@@ -287,7 +287,7 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
         let nodes = Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off);
         if mode == ControlMode::Teach {
-            // Before its first brake it looks at the inertia of the arm, and of each joint.
+            // Before its first brake the law computes the inertia of the arm, and of each joint.
             (0..10).for_each(|_| {
                 arm.tick_of(mode, false, &nodes);
             });

@@ -22,7 +22,7 @@ pub(super) struct Answered {
 impl Answered {
     /// Returns the distance to a younger answer, rad; zero if both are the same.
     fn way_to(&self, now: &Self) -> f64 {
-        // Numbers so near to each other differ exactly.
+        // The difference of such close numbers is exact.
         f64::from(now.position as f32 - self.position as f32)
     }
 
@@ -66,7 +66,7 @@ remembered!(Kept { position, at_ms });
 remembered!(History { answers, next, in_turn, as_predicted });
 
 impl History {
-    /// Creates a history that has this answer alone.
+    /// Creates a history that has only this answer.
     pub fn of(answer: &Answered) -> Self {
         let kept = Kept { position: answer.position as f32, at_ms: answer.at_ms };
         Self { answers: [kept; SLOTS], ..Self::default() }
@@ -77,7 +77,7 @@ impl History {
     pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // Nearly always there is an answer in each millisecond, so that the oldest is old enough, and it alone.
+        // Nearly always an answer comes in each millisecond, so that only the oldest is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })

@@ -1,8 +1,9 @@
 //! Encoders that jump (J-35).
 //!
-//! A drive has two encoders: the joint's, which its position comes from, and the motor's, which its speed comes from. Its speed is the mean
-//! over a window, so the way of the position within that window follows from it. A position that has gone further within one answer, and
-//! stays there, is not a motion: the encoder has jumped. The jump is taken off all further answers, so the arm does not move.
+//! A drive has two encoders: its position comes from the encoder of the joint, its speed from the encoder of the motor. The speed is the
+//! mean over a window, so the distance that the position moves within that window follows from the speed. If a position moves further
+//! within one answer, and stays there, this is not a motion: the encoder has jumped. The jump is subtracted from all further answers, so
+//! that the arm does not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -13,7 +14,7 @@ use crate::remembered::remembered;
 
 /// Number of answers for which a difference must be constant to be a jump.
 const CONSTANT: u8 = 5;
-/// Highest number of consecutive answers that may be taken for a jump, for any change of its size.
+/// Highest number of consecutive answers that may count as a jump, for any change of its size.
 const LOOKS: u8 = 15;
 /// Number of changes of a jump's size before the size stays: a size that changes more often comes from a gear that is twisted.
 const CHANGES: u8 = 2;
@@ -28,13 +29,13 @@ const SHARE: f64 = 0.1;
 /// Multiple of the difference that does not count, which a jump must exceed: drives whose clocks drift against the controller's answer with
 /// a reading that is one of their ticks older, or not, and two such slips are not a jump.
 const SLIPS: f64 = 2.0;
-/// From this share of its full scale on a speed says nothing.
+/// From this share of its full scale on, a speed has no meaning.
 const SATURATED: f64 = 0.98;
 
 /// The jumps of an encoder.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jumps {
-    /// Jump that is taken off each answer, rad.
+    /// Jump that is subtracted from each answer, rad.
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
@@ -43,7 +44,7 @@ pub(super) struct Jumps {
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,
-    /// Number of consecutive answers that were taken for a jump.
+    /// Number of consecutive answers that counted as a jump.
     looks: u8,
     /// Number of changes of its size meanwhile.
     changes: u8,
@@ -58,7 +59,7 @@ remembered!(Jumps { taken_off, before, value, answers, looks, changes, found });
 pub(super) enum Seen {
     /// A motion, or nothing is known of it.
     Motion,
-    /// Perhaps a jump by this way, rad: until that is known, the answer is taken for a jump.
+    /// Possibly a jump by this distance, rad. Until that is known, the answer counts as a jump.
     Perhaps(f64),
     /// A jump by this way, rad.
     Jump(f64),
@@ -95,7 +96,7 @@ impl Ways {
 }
 
 impl Jumps {
-    /// Returns the jump that is taken off each answer, rad.
+    /// Returns the jump that is subtracted from each answer, rad.
     pub fn taken_off(&self) -> f64 {
         self.taken_off
     }

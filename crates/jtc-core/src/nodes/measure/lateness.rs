@@ -4,7 +4,7 @@
 //! of Moves sent after the Move that it answers: the *outstanding* Moves. A missing answer may be late or lost, and the answers that came
 //! do not distinguish the two, until two answers come in one tick: the first of them was late. For a second after such *evidence*
 //! unanswered Moves count as outstanding, never more of them than have come in together; without evidence, as lost. Evidence may be wrong:
-//! a frame that the bus repeats comes twice. An answer that was lost all the same shows in the long run, because the count does not come
+//! a frame that the bus repeats comes twice. An answer that was lost nevertheless shows in the long run, because the count does not come
 //! back to zero: the lowest count of a window is subtracted.
 use crate::remembered::remembered;
 
@@ -51,7 +51,7 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        // The Move was sent in the tick before, however long ago that is.
+        // The Move was sent in the previous tick, which may be any time ago.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
         // If there are more answers than Moves, some of them had counted as lost.

@@ -168,7 +168,7 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
         // To be brought from Init to Ready, which can wait.
         (NodeState::INIT, true, false, Sent::Mode),
         (NodeState::INIT, true, true, Sent::ControllerState),
-        // Restarted: what it reported before means nothing.
+        // After a restart, earlier reports of the node have no meaning.
         (NodeState::ENABLED, false, false, Sent::Mode),
         (NodeState::ENABLED, false, true, Sent::Mode),
     ] {

@@ -57,7 +57,7 @@ fn j63_a_move_without_acknowledge_counts_for_the_joints_whose_position_is_known(
         let node = nodes.node(1);
         assert_eq!((node.missed, node.silent), (missed, 0), "{unacknowledged} {sent_move} {valid} {before}");
     }
-    // A gripper has no position that could be wrong: what it misses is shown by its silence.
+    // A gripper has no position that could be wrong: its silence shows missing frames.
     let mut nodes = ready();
     (nodes.unacknowledged, nodes.nodes[GRIPPER].missed) = (1, 4);
     tick(&mut nodes, &[], lost);
@@ -109,7 +109,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
         assert_eq!(nodes.node(2).misbehaved, ms == 5, "after {ms}");
         assert!(!nodes.node(2).fresh() && nodes.node(1).fresh() && nodes.node(2).silent == 0);
     }
-    // An answer without a Move before it is looked at as well.
+    // An answer without a Move before it is also checked.
     let mut nodes_without = ready();
     tick(&mut nodes_without, &all(NodeState::READY), GOOD);
     nodes_without.sent_move = false;
@@ -117,7 +117,7 @@ fn j35_answers_that_no_joint_can_have_given_are_its_error_after_five() {
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes_without, &bus, GOOD);
     assert_eq!((nodes_without.node(2).missed, nodes_without.node(1).missed), (1, 0));
-    // Then it is taken as it is.
+    // Then the answer is taken without a correction.
     let mut bus = all(NodeState::READY);
     bus[2] = Answer::Joint { node: 2, report: far }.emit(SCALE);
     tick(&mut nodes, &bus, GOOD);

@@ -1,4 +1,4 @@
-//! One board on an in-memory bus: reset, number, start, run, and what happens when the PC falls silent.
+//! Runs a board on an in-memory bus: reset, number, start, control loop, and the reaction when the PC falls silent.
 //!
 //! `cargo run -p ucom --example one_board` prints the frames with their times; `<` is the PC, `>` the board.
 
@@ -10,7 +10,7 @@ fn main() {
     let profile = Profile::default();
     let number = Sequence::new(1).expect("1 is at most 31");
 
-    // A board is the state machine and four parts; here they live in memory.
+    // A board is the state machine and four hardware parts; here these are kept in memory.
     let mut flash = MemoryFlash::default();
     flash.install(Record { program_id: 0x1234, date: 0x386E, address: 0, words: 4 }, &[0; 8]);
     let pins = WirePins::chain(1).remove(0);
@@ -38,7 +38,7 @@ fn main() {
     println!("status: {}", board.status());
 }
 
-/// Lets time pass, from one thing that the board does to the next.
+/// Lets time pass until `end`, from one action of the board to the next.
 fn pass(
     board: &mut Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>,
     mut now_us: u64,

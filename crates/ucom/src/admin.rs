@@ -18,13 +18,13 @@ pub struct Admin {
 }
 
 impl Admin {
-    /// The 4 bytes.
+    /// Returns the 4 bytes.
     pub const fn payload(self) -> Payload {
         let data = [self.run as u8, self.active as u8, self.debug as u8, self.global_debug as u8, 0, 0, 0, 0];
         Payload::of(data, 4)
     }
 
-    /// `None` when a byte is neither 0 nor 1: such a frame is ignored.
+    /// Reads the 4 bytes. Returns `None` if a byte is neither 0 nor 1: such a frame is ignored.
     pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
         if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
             return None;

@@ -3,7 +3,7 @@
 use crate::frame::Payload;
 use crate::profile::Endian;
 
-/// Package of up to three words from a place on.
+/// Package of up to three words, beginning at an offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BufferPackage {
     /// Index of the first word, counted in words.
@@ -37,7 +37,7 @@ pub const fn package_count(dimension: u16) -> u16 {
 }
 
 impl BufferPackage {
-    /// The package of a buffer at a word; `None` at or beyond its end, or beyond word 65 535.
+    /// Returns the package of a buffer that begins at a word; `None` at or beyond the buffer's end, or beyond word 65 535.
     pub fn at(buffer: &[u16], offset: u16) -> Option<Self> {
         let rest = buffer.get(usize::from(offset)..)?;
         let mut package = Self { offset, count: rest.len().min(3) as u8, words: [0; 3] };
@@ -47,8 +47,7 @@ impl BufferPackage {
         (package.count > 0).then_some(package)
     }
 
-    /// The bytes: DLC 8 with zeros for the surplus words, or with `short_last` only the words that are meant
-    /// (key `pd.short_last`).
+    /// Returns the bytes: DLC 8 with zeros for the surplus words, or with `short_last` only the valid words (key `pd.short_last`).
     pub fn payload(&self, endian: Endian, short_last: bool) -> Payload {
         let mut data = [0; 8];
         let words = self.words.iter().take(usize::from(self.count));
@@ -59,7 +58,7 @@ impl BufferPackage {
         Payload::of(data, len)
     }
 
-    /// `None` unless the payload has 4, 6 or 8 bytes.
+    /// Reads a package. Returns `None` unless the payload has 4, 6 or 8 bytes.
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let len = payload.len();
         if !matches!(len, 4 | 6 | 8) {

@@ -17,7 +17,7 @@ macro_rules! error_codes {
             /// The codes of the published list.
             pub const ALL: [Self; [$($number),+].len()] = [$(Self::$code),+];
 
-            /// The code of a number.
+            /// Returns the code of a number.
             pub const fn from_number(number: u8) -> Self {
                 match number {
                     $($number => Self::$code,)+
@@ -25,7 +25,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// The number on the wire.
+            /// Returns the number on the wire.
             pub const fn number(self) -> u8 {
                 match self {
                     $(Self::$code => $number,)+
@@ -33,7 +33,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// The published name.
+            /// Returns the published name.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$code => $name,)+

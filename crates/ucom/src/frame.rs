@@ -17,7 +17,7 @@ impl Payload {
     /// No data, DLC 0.
     pub const EMPTY: Self = Self { len: 0, data: [0; 8] };
 
-    /// `None` when `data` is longer than 8 bytes.
+    /// Creates a payload. Returns `None` if `data` is longer than 8 bytes.
     pub const fn new(data: &[u8]) -> Option<Self> {
         if data.len() > 8 {
             return None;
@@ -31,7 +31,7 @@ impl Payload {
         Some(payload)
     }
 
-    /// The first `len` bytes of `data`, `len` at most 8; for encoders.
+    /// Returns the first `len` bytes of `data`, `len` at most 8; for encoders.
     pub(crate) const fn of(data: [u8; 8], len: usize) -> Self {
         let len = if len > 8 { 8 } else { len };
         let mut payload = Self { len: len as u8, data: [0; 8] };
@@ -43,17 +43,17 @@ impl Payload {
         payload
     }
 
-    /// The bytes.
+    /// Returns the bytes.
     pub fn bytes(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&[])
     }
 
-    /// All 8 bytes, 0 beyond the length (padding is 0, D-12).
+    /// Returns all 8 bytes, 0 beyond the length (padding is 0, D-12).
     pub const fn padded(&self) -> [u8; 8] {
         self.data
     }
 
-    /// Number of bytes, 0..8: the DLC.
+    /// Returns the number of bytes, 0..8: the DLC.
     pub const fn len(&self) -> u8 {
         self.len
     }
@@ -94,8 +94,8 @@ impl Format {
 }
 
 impl Frame {
-    /// `None` when `id` has more than 11 bits or `data` more than 8 bytes. The id may be one of no function:
-    /// [`Frame::address`] returns it.
+    /// Creates a frame. Returns `None` if `id` has more than 11 bits or `data` more than 8 bytes. The identifier may have no function;
+    /// [`Frame::address`] checks this.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF {
             return None;
@@ -106,7 +106,7 @@ impl Frame {
         }
     }
 
-    /// A frame of this protocol; infallible, as a [`Sequence`] always fits.
+    /// Creates a frame of this protocol; infallible, because a [`Sequence`] always fits.
     pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
         Self { id: function.id(sequence), payload }
     }
@@ -124,27 +124,27 @@ impl Frame {
         frame.address().map(|_| frame)
     }
 
-    /// Identifier, 11 bits.
+    /// Returns the identifier, 11 bits.
     pub const fn id(&self) -> u16 {
         self.id
     }
 
-    /// Function and sequence number in the identifier (D-01).
+    /// Returns function and sequence number in the identifier (D-01).
     pub const fn address(&self) -> Result<(Function, Sequence), Foreign> {
         Function::split(self.id)
     }
 
-    /// The data bytes.
+    /// Returns the data bytes.
     pub fn data(&self) -> &[u8] {
         self.payload.bytes()
     }
 
-    /// The data bytes as a value.
+    /// Returns the data bytes as a value.
     pub const fn payload(&self) -> Payload {
         self.payload
     }
 
-    /// Length code, 0..8.
+    /// Returns the length code, 0..8.
     pub const fn dlc(&self) -> u8 {
         self.payload.len
     }

@@ -15,22 +15,22 @@ impl Sequence {
     /// The highest number, 31.
     pub const MAX: Self = Self(31);
 
-    /// `None` above 31: nothing is masked silently (D-01).
+    /// Creates a number. Returns `None` above 31: nothing is masked silently (D-01).
     pub const fn new(number: u8) -> Option<Self> {
         if number > 31 { None } else { Some(Self(number)) }
     }
 
-    /// The low 5 bits of a number; for fields that have no more.
+    /// Returns the low 5 bits of a number, for fields that have only 5 bits.
     pub(crate) const fn low5(number: u8) -> Self {
         Self(number & 0x1F)
     }
 
-    /// The number, 0..31.
+    /// Returns the number, 0..31.
     pub const fn number(self) -> u8 {
         self.0
     }
 
-    /// All numbers, 0 to 31.
+    /// Returns all numbers, 0 to 31.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..32).map(Self)
     }
@@ -64,7 +64,7 @@ macro_rules! functions {
             /// All functions in the order of their numbers.
             pub const ALL: [Self; 28] = [$(Self::$variant),+];
 
-            /// The name in the published list, `PC_RESET`.
+            /// Returns the name in the published list, `PC_RESET`.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),+ }
             }
@@ -142,27 +142,27 @@ functions! {
 }
 
 impl Function {
-    /// The function of a number; `None` above 27.
+    /// Returns the function of a number; `None` above 27.
     pub const fn from_number(number: u8) -> Option<Self> {
         if number < 28 { Some(Self::ALL[number as usize]) } else { None }
     }
 
-    /// The number, 0..27.
+    /// Returns the number, 0..27.
     pub const fn number(self) -> u8 {
         self as u8
     }
 
-    /// The identifier `(sequence & 0x1F) | ((function & 0x3F) << 6)` (D-01).
+    /// Returns the identifier `(sequence & 0x1F) | ((function & 0x3F) << 6)` (D-01).
     pub const fn id(self, sequence: Sequence) -> u16 {
         (sequence.0 as u16 & 0x1F) | ((self as u16 & 0x3F) << 6)
     }
 
-    /// DSP_REPORT0..3.
+    /// Returns the function DSP_REPORT0..3 of a number 0..3; `None` above 3.
     pub const fn report(k: u8) -> Option<Self> {
         if k < 4 { Self::from_number(16 + k) } else { None }
     }
 
-    /// Function and sequence number of an identifier.
+    /// Returns function and sequence number of an identifier.
     pub const fn split(id: u16) -> Result<(Self, Sequence), Foreign> {
         if id > 0x7FF {
             return Err(Foreign::Malformed);

@@ -2,7 +2,7 @@
 
 use crate::{Frame, FromBoard, Profile, ToBoard};
 
-/// Two bytes of identifier, then the payload: read as either side, send again, compare.
+/// Reads two bytes of identifier and the payload as either side, sends the message again and compares.
 pub fn frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let Some(frame) = Frame::new(u16::from_be_bytes(*id) & 0x7FF, payload) else { return };

@@ -22,7 +22,7 @@ pub enum Memory {
 }
 
 impl Memory {
-    /// The number in the header.
+    /// Returns the number in the header.
     pub const fn number(self) -> u16 {
         match self {
             Self::Program => 0,
@@ -31,7 +31,7 @@ impl Memory {
         }
     }
 
-    /// `None` for a number without a meaning.
+    /// Returns the memory of a number; `None` for a number without a meaning.
     pub const fn from_number(number: u16) -> Option<Self> {
         match number {
             0 => Some(Self::Program),
@@ -57,7 +57,7 @@ pub struct Header {
     pub program_id: u16,
     /// Flash date (D-45).
     pub date: u16,
-    /// Flash number of the board it is for, [`Header::ANY_BOARD`] for every one.
+    /// Flash number of the board that the image is for, [`Header::ANY_BOARD`] for every board.
     pub target: u16,
 }
 
@@ -88,7 +88,7 @@ impl Header {
     /// Target of an image that any board may take.
     pub const ANY_BOARD: u16 = 0xFFFF;
 
-    /// The block, in program word order.
+    /// Returns the block, in program word order.
     pub fn build(&self, endian: Endian) -> [u8; BLOCK_LEN] {
         let mut words = [0xFFFFu16; 32];
         let fields = [
@@ -118,7 +118,7 @@ impl Header {
         block
     }
 
-    /// The header in a block.
+    /// Reads the header in a block.
     pub fn parse(block: &[u8; BLOCK_LEN], endian: Endian) -> Result<Self, HeaderError> {
         let mut words = [0u16; 32];
         for (word, bytes) in words.iter_mut().zip(block.chunks_exact(2)) {

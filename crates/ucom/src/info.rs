@@ -25,7 +25,7 @@ impl BoardInfo {
         !(self.program_id == 0xFFFF && self.date == 0xFFFF)
     }
 
-    /// The 8 bytes.
+    /// Returns the 8 bytes.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [f0, f1] = endian.bytes(self.flash_number);
         let [p0, p1] = endian.bytes(self.program_id);
@@ -33,7 +33,7 @@ impl BoardInfo {
         Payload::of([f0, f1, self.sequence, self.status.0, p0, p1, d0, d1], 8)
     }
 
-    /// `None` when the payload has fewer than 8 bytes.
+    /// Reads the frame. Returns `None` if the payload has fewer than 8 bytes.
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let &[f0, f1, sequence, status, p0, p1, d0, d1] = payload.bytes() else { return None };
         Some(Self {
@@ -58,7 +58,7 @@ pub struct Dimensions {
 }
 
 impl Dimensions {
-    /// The 6 bytes.
+    /// Returns the 6 bytes.
     pub const fn payload(&self, endian: Endian) -> Payload {
         let [c0, c1] = endian.bytes(self.ci);
         let [s0, s1] = endian.bytes(self.so);
@@ -66,7 +66,7 @@ impl Dimensions {
         Payload::of([c0, c1, s0, s1, p0, p1, 0, 0], 6)
     }
 
-    /// `None` when the payload has fewer than 6 bytes; surplus bytes are ignored (D-12).
+    /// Reads the frame. Returns `None` if the payload has fewer than 6 bytes; surplus bytes are ignored (D-12).
     pub fn parse(payload: &Payload, endian: Endian) -> Option<Self> {
         let &[c0, c1, s0, s1, p0, p1, ..] = payload.bytes() else { return None };
         Some(Self { ci: endian.word([c0, c1]), so: endian.word([s0, s1]), par: endian.word([p0, p1]) })

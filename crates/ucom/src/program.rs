@@ -54,7 +54,7 @@ impl core::fmt::Debug for Digest {
 }
 
 impl Digest {
-    /// `endian` is the order of the bytes in program words (`prog.endian`).
+    /// Creates a digest. `endian` is the order of the bytes in program words (`prog.endian`).
     pub fn new(checksum: Checksum, endian: Endian) -> Self {
         Self { checksum, endian, crc: CCITT_FALSE_TABLE.digest(), word: 0, odd: None }
     }
@@ -101,12 +101,12 @@ pub fn checksum(checksum: Checksum, endian: Endian, image: &[u8]) -> u16 {
     digest.finish()
 }
 
-/// Data blocks of an image, without the header block.
+/// Returns the number of data blocks of an image, without the header block.
 pub const fn block_count(len: usize) -> usize {
     len.div_ceil(BLOCK_LEN)
 }
 
-/// The `i`-th data block of an image, the last one padded with 0xFF; `None` after it (D-41).
+/// Returns the `i`-th data block of an image, the last one padded with 0xFF; `None` after the last block (D-41).
 pub fn data_block(image: &[u8], i: usize) -> Option<[u8; BLOCK_LEN]> {
     let rest = image.get(i.checked_mul(BLOCK_LEN)?..)?;
     if rest.is_empty() {

@@ -6,7 +6,7 @@ use crate::profile::ReportMode;
 /// DSP_REPORT frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Report {
-    /// 0..3, which of the four functions it came with.
+    /// Index of the DSP_REPORT function, 0..3.
     pub k: u8,
     /// The sequence field of the identifier.
     pub id_field: Sequence,
@@ -15,7 +15,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// The report of a board in mode `flash7`: 128 identifiers, one for each 7-bit flash id.
+    /// Returns the report of a board in mode `flash7`: 128 identifiers, one for each 7-bit flash id.
     pub const fn flash7(flash_number: u16) -> Self {
         Self {
             k: (flash_number >> 5 & 3) as u8,
@@ -43,7 +43,7 @@ impl Report {
         by_data.k == self.k && by_data.id_field.number() == self.id_field.number()
     }
 
-    /// DSP_REPORT0..3.
+    /// Returns the function, DSP_REPORT0..3.
     pub const fn function(&self) -> Function {
         match self.k & 3 {
             0 => Function::Report0,

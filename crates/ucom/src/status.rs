@@ -39,7 +39,7 @@ impl Status {
         ("IPINIT", Self::IPINIT),
     ];
 
-    /// The bit of a name, in either case.
+    /// Returns the bit of a name, in either letter case.
     pub fn bit(name: &str) -> Option<Self> {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, bit)| *bit)
     }
@@ -49,14 +49,13 @@ impl Status {
         self.0 & bits.0 == bits.0
     }
 
-    /// `bits` set or cleared.
+    /// Returns the status with `bits` set or cleared.
     #[must_use]
     pub const fn with(self, bits: Self, on: bool) -> Self {
         if on { Self(self.0 | bits.0) } else { Self(self.0 & !bits.0) }
     }
 
-    /// The published formula of PC_SETSTATUS, literally: `(old & ~mask) | value`. The second operand is not
-    /// masked (D-22).
+    /// Applies the published formula of PC_SETSTATUS literally: `(old & ~mask) | value`. The second operand is not masked (D-22).
     #[must_use]
     pub const fn set(self, mask: u8, value: u8) -> Self {
         Self((self.0 & !mask) | value)
@@ -99,14 +98,14 @@ impl Not for Status {
     }
 }
 
-/// The names of the bits that are set, `EXLRUN INIT IPINIT`; `-` when none is.
+/// Prints the names of the bits that are set, `EXLRUN INIT IPINIT`; `-` if no bit is set.
 impl fmt::Display for Status {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         words(f, Self::NAMES.map(|(name, bit)| (self.has(bit), name)))
     }
 }
 
-/// The names that are set, with blanks between them; `-` when none is.
+/// Prints the names that are set, separated by blanks; `-` if no name is set.
 pub(crate) fn words<const N: usize>(f: &mut fmt::Formatter<'_>, names: [(bool, &str); N]) -> fmt::Result {
     let mut gap = "";
     for (_, name) in names.iter().filter(|(on, _)| *on) {

@@ -10,7 +10,7 @@ use crate::profile::Profile;
 pub struct Latin1<'a>(pub &'a [u8]);
 
 impl Latin1<'_> {
-    /// The characters.
+    /// Returns the characters.
     pub fn chars(&self) -> impl Iterator<Item = char> + '_ {
         self.0.iter().map(|byte| char::from(*byte))
     }
@@ -23,7 +23,7 @@ impl fmt::Display for Latin1<'_> {
     }
 }
 
-/// The `i`-th package of a string: 0 is the header, the data follow; `None` after the last.
+/// Returns the `i`-th package of a string: 0 is the header, the data follow; `None` after the last package.
 ///
 /// Texts longer than `string.max` are cut there.
 pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload> {
@@ -46,7 +46,7 @@ pub struct StringPackages<'a> {
 }
 
 impl<'a> StringPackages<'a> {
-    /// `text` is Latin-1 without NUL.
+    /// Creates the packages of `text`, which is Latin-1 without NUL.
     pub const fn new(text: &'a [u8], profile: &'a Profile) -> Self {
         Self { text, next: 0, profile }
     }
@@ -76,7 +76,7 @@ pub enum Assembled<'a> {
 
 /// Puts one string together: one assembler for each function and board (D-14).
 ///
-/// Loss cannot be seen inside a string: a lost package makes it wait for more. [`StringAssembler::expired`] shows when
+/// A loss inside a string cannot be detected: after a lost package the assembler waits for more. [`StringAssembler::expired`] shows that
 /// 100 ms (`string.gap`) passed in silence; the next package then starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {

@@ -12,8 +12,8 @@ use crate::report::Report;
 
 /// A message from a board.
 ///
-/// DSP_INFO, the IO description and debug texts are several frames with one identifier and no tag (G-15): a receiver must
-/// count the frames to know which part a frame is. They are returned as bare payloads, to be read with
+/// DSP_INFO, the IO description and debug texts are sent in several frames with the same identifier and no tag (G-15). A receiver must
+/// therefore count the frames to know which part a frame is. These messages are returned as bare payloads; read them with
 /// [`BoardInfo::parse`](crate::BoardInfo::parse), [`Dimensions::parse`](crate::Dimensions::parse) and
 /// [`StringAssembler`](crate::StringAssembler).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub enum FromBoard {
 }
 
 impl FromBoard {
-    /// The function that carries it.
+    /// Returns the function that carries the message.
     pub const fn function(&self) -> Function {
         match self {
             Self::Error(_) => Function::Error,
@@ -66,7 +66,7 @@ impl FromBoard {
         }
     }
 
-    /// The frame of a board. A report brings its own sequence field, `from` does not count there.
+    /// Returns the frame of a board. A report has its own sequence field, so `from` is not used there.
     pub fn encode(&self, from: Sequence, profile: &Profile) -> Frame {
         let byte = |byte| Payload::of([byte, 0, 0, 0, 0, 0, 0, 0], 1);
         let (sequence, payload) = match *self {
@@ -83,7 +83,7 @@ impl FromBoard {
         Frame::of(self.function(), sequence, payload)
     }
 
-    /// The message in a frame and the sequence field of its identifier.
+    /// Returns the message in a frame and the sequence field of its identifier.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -105,7 +105,7 @@ impl FromBoard {
                 Self::Report(Report { k, id_field: from, ucom_id: byte()? })
             }
             Function::McaReady => empty(Self::McaReady)?,
-            // Without data it is the PC's request, always (D-12).
+            // Without data the frame is the PC's request, always (D-12).
             Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
             Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Debug => Self::Debug(some()?),

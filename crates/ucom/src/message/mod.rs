@@ -1,7 +1,7 @@
 //! The messages of both directions, made from and into frames.
 //!
-//! Functions 22, 24 and 26 are sent by both sides with one identifier (D-05): which side a frame comes from is
-//! given by choosing [`ToBoard`] or [`FromBoard`].
+//! Both sides send functions 22, 24 and 26 with the same identifier (D-05). The caller tells the sender by choosing [`ToBoard`] or
+//! [`FromBoard`].
 
 mod from_board;
 mod to_board;
@@ -21,7 +21,7 @@ use crate::profile::Profile;
 pub enum DecodeError {
     /// Not of this protocol at all (D-02).
     Foreign(Foreign),
-    /// A message of the other side (D-04).
+    /// A message that only the other side sends (D-04).
     Direction(Function),
     /// Fewer bytes than the message needs (D-12).
     TooShort {
@@ -29,7 +29,7 @@ pub enum DecodeError {
         function: Function,
         /// Bytes that came.
         len: u8,
-        /// Bytes that it needs.
+        /// Bytes that the message needs.
         need: u8,
     },
     /// A length that is not valid for the message, if its length has a meaning (D-12), or any other length than the exact
@@ -67,7 +67,7 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-/// The payload when it is long enough; with `dlc.strict` it must have exactly `need` bytes.
+/// Returns the payload if it is long enough; with `dlc.strict` it must have exactly `need` bytes.
 fn need(frame: &Frame, function: Function, need: u8, profile: &Profile) -> Result<Payload, DecodeError> {
     let len = frame.dlc();
     if len < need {

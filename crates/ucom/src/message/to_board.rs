@@ -48,7 +48,7 @@ pub enum ToBoard {
 }
 
 impl ToBoard {
-    /// The function that carries it.
+    /// Returns the function that carries the message.
     pub const fn function(&self) -> Function {
         match self {
             Self::Reset => Function::Reset,
@@ -69,7 +69,7 @@ impl ToBoard {
         }
     }
 
-    /// The frame to a board.
+    /// Returns the frame to a board.
     pub fn encode(&self, to: Sequence, profile: &Profile) -> Frame {
         let payload = match *self {
             Self::SetStatus { mask, value } => Payload::of([mask, value, 0, 0, 0, 0, 0, 0], 2),
@@ -81,7 +81,7 @@ impl ToBoard {
         Frame::of(self.function(), to, payload)
     }
 
-    /// The message in a frame and to whom it goes.
+    /// Returns the message in a frame and its destination.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -100,7 +100,7 @@ impl ToBoard {
             Function::Ci => Self::Ci(package(frame, function, profile)?),
             Function::Par => Self::Par(package(frame, function, profile)?),
             Function::McaStart => empty(Self::McaStart)?,
-            // With data it is a board's answer, always (D-12).
+            // With data the frame is a board's answer, always (D-12).
             Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
             Function::DumpCi => empty(Self::DumpCi)?,
             Function::Admin => Self::Admin(admin(frame, profile)?),
@@ -111,13 +111,13 @@ impl ToBoard {
     }
 }
 
-/// The four flags of MCA_ADMIN_DATA.
+/// Reads the four flags of MCA_ADMIN_DATA.
 pub(super) fn admin(frame: &Frame, profile: &Profile) -> Result<Admin, DecodeError> {
     let [run, active, debug, global, ..] = need(frame, Function::Admin, 4, profile)?.padded();
     Admin::from_bytes([run, active, debug, global]).ok_or(DecodeError::Value(Function::Admin))
 }
 
-/// A buffer package: 4, 6 or 8 bytes.
+/// Reads a buffer package of 4, 6 or 8 bytes.
 pub(super) fn package(
     frame: &Frame,
     function: Function,

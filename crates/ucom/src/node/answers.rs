@@ -7,7 +7,7 @@ use crate::info::BoardInfo;
 use crate::message::FromBoard;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// The next frame of the most urgent answer.
+    /// Returns the next frame of the most urgent answer.
     pub(super) fn next_of_answers(&mut self) -> Option<FromBoard> {
         if self.jobs.info.is_some() {
             return self.next_of_info();
@@ -39,13 +39,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         };
         match made {
             Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
-            // The end; or the description has become shorter since, and the PC asks again.
+            // The answer has ended; or the description has become shorter since, and the PC requests it again.
             _ => self.jobs.info_done(),
         }
         made.map(|(payload, _)| FromBoard::Info(payload))
     }
 
-    /// The text of the `string`-th string of the IO description (D-36).
+    /// Returns the text of the `string`-th string of the IO description (D-36).
     fn io_text(&self, string: u32) -> &[u8] {
         let dimensions = self.application.dimensions();
         let Some(mut index) = string.checked_sub(1) else { return self.application.text(Text::Application) };
@@ -78,7 +78,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
                 self.jobs.dump_io = Some(next);
             }
-            // The end; or a text has become shorter since, and the PC asks again.
+            // The answer has ended; or a text has become shorter since, and the PC requests it again.
             _ => self.jobs.dump_io_done(),
         }
         made.map(|(payload, _)| FromBoard::IoDescription(payload))

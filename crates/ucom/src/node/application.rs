@@ -6,11 +6,11 @@ use crate::buffer::BufferPackage;
 use crate::error_code::ErrorCode;
 use crate::profile::CiLatch;
 
-/// Text when the PC's heartbeat stays away, if anybody wants texts.
+/// Text that reports the loss of the PC's heartbeat, sent if texts are requested.
 pub(super) const PC_LOST: &[u8] = b"PC alive lost";
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Back to the exloader, everything safe.
+    /// Returns to the exloader and makes everything safe.
     pub(super) fn stop_application(&mut self) {
         self.stop_loop();
         if self.app != App::Stopped {
@@ -23,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.forget_application();
     }
 
-    /// The application is up: READY, the first heartbeat, the flags (D-30, D-37).
+    /// Handles the end of the start: READY, the first heartbeat, the flags (D-30, D-37).
     pub(super) fn application_up(&mut self) {
         self.app = App::Up;
         self.outbox.mca_ready = true;
@@ -31,7 +31,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.send_admin_unasked();
     }
 
-    /// The control loop runs from now on; the PC's heartbeat is due from now on (D-50).
+    /// Starts the control loop. The PC's heartbeat is due from now on (D-50).
     pub(super) fn run_loop(&mut self) {
         if self.app != App::Up {
             return;
@@ -43,7 +43,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.so_at = Some(self.after_ms(self.config.profile.so_period));
     }
 
-    /// The control loop ends, outputs safe; whether or not it was running.
+    /// Ends the control loop and makes the outputs safe, even if the loop was not running.
     pub(super) fn stop_loop(&mut self) {
         self.set_active(false);
         if self.app == App::Running {
@@ -61,7 +61,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.active = active;
     }
 
-    /// The PC's heartbeat stayed away (D-50).
+    /// Handles the loss of the PC's heartbeat (D-50).
     pub(super) fn pc_lost(&mut self) {
         self.stop_loop();
         self.initial_ci();
@@ -80,7 +80,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.application.latch_ci();
     }
 
-    /// MCA_ADMIN_DATA of the PC (D-37).
+    /// Handles MCA_ADMIN_DATA of the PC (D-37).
     pub(super) fn set_admin(&mut self, admin: Admin) {
         match (self.app, admin.run) {
             (App::Up, true) => self.run_loop(),
@@ -95,7 +95,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.answer_admin();
     }
 
-    /// Controller inputs (D-34).
+    /// Handles controller inputs (D-34).
     pub(super) fn receive_ci(&mut self, package: &BufferPackage) {
         let dimension = usize::from(self.application.dimensions().ci);
         let applied = put(package, self.application.ci(), dimension);
@@ -110,7 +110,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Parameters (D-35).
+    /// Handles parameters (D-35).
     pub(super) fn receive_par(&mut self, package: &BufferPackage) {
         let dimension = usize::from(self.application.dimensions().par);
         if !put(package, self.application.par(), dimension) {

@@ -11,18 +11,18 @@ pub struct NodeConfig {
     pub profile: Profile,
     /// Start of its random numbers (back-off of D-05).
     pub seed: u32,
-    /// From reset until it listens, µs; at most 200 000 (D-07).
+    /// Time from a reset until the board listens, µs; at most 200 000 (D-07).
     pub boot_us: u64,
-    /// From the last frame of a block until its answer at the earliest, µs.
+    /// Time from the last frame of a block until its answer at the earliest, µs.
     pub block_us: u64,
-    /// Between control cycles, µs.
+    /// Time between control cycles, µs.
     pub control_period_us: u64,
     /// Length of an image when `prog.header` is `none`, words; 0 for the whole area.
     pub headerless_words: u32,
 }
 
 impl NodeConfig {
-    /// A board with the default profile.
+    /// Creates settings with the default profile.
     pub const fn new(flash_number: u16) -> Self {
         Self {
             flash_number,
@@ -49,7 +49,7 @@ pub struct Counters {
     pub errors_dropped: u32,
     /// Debug texts that were not sent (D-38).
     pub texts_dropped: u32,
-    /// Transfers of the outputs left out because the one before was not finished (D-33).
+    /// Transfers of the outputs that were left out because the previous transfer was not finished (D-33).
     pub so_skipped: u32,
     /// Frames that the controller gave up.
     pub not_sent: u32,

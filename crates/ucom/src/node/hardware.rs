@@ -23,11 +23,11 @@ impl Area {
 /// State of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashState {
-    /// The last operation succeeded, or there was none.
+    /// The last operation succeeded, or no operation has been started yet.
     Ready,
     /// An operation is in progress.
     Busy,
-    /// The last operation failed; so it stays until the next one starts.
+    /// The last operation failed. The flash stays in this state until the next operation starts.
     Failed,
 }
 
@@ -40,9 +40,9 @@ pub const RECORD_LEN: usize = 16;
 
 /// Flash of the board, and the RAM that an exloader may be loaded into.
 ///
-/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node starts
-/// none while another is in progress. Implementations MUST keep the validity record apart from the application area:
-/// erasing one leaves the other.
+/// `erase…` and `write…` start an operation and return at once; [`Flash::state`] shows when it is done. The node starts no operation
+/// while another is in progress. Implementations MUST keep the validity record apart from the application area: erasing one leaves the
+/// other intact.
 pub trait Flash {
     /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
@@ -71,7 +71,7 @@ pub trait Flash {
 
 /// The init pins of the chain (section 5 of the protocol).
 pub trait Pins {
-    /// Level of the incoming pin; strapped active on the first board.
+    /// Returns the level of the incoming pin, which is strapped active on the first board.
     fn init_in(&self) -> bool;
 
     /// Drives the outgoing pin. After power-up it MUST be inactive by itself.
@@ -80,13 +80,13 @@ pub trait Pins {
 
 /// Data that survive a power loss, and fixed data.
 pub trait Store {
-    /// ASTART.
+    /// Returns ASTART.
     fn autostart(&self) -> bool;
 
-    /// Keeps ASTART; called on changes only.
+    /// Keeps ASTART; called only if the value changes.
     fn set_autostart(&mut self, on: bool);
 
-    /// Description of the board in DSP_INFO, Latin-1.
+    /// Returns the description of the board for DSP_INFO, Latin-1.
     fn description(&self) -> &[u8];
 }
 
@@ -103,10 +103,10 @@ pub enum Text {
     Par(u16),
 }
 
-/// The program in the application area. Its methods are called only between [`Application::start`] and
-/// [`Application::stop`], but for [`Application::outputs`] with `false`.
+/// The program in the application area. Its methods are called only between [`Application::start`] and [`Application::stop`]. The
+/// exception is [`Application::outputs`] with `false`.
 pub trait Application {
-    /// The exloader starts the program.
+    /// Starts the program.
     fn start(&mut self, now_us: u64);
 
     /// Ends the program; its outputs MUST be safe when this returns.
@@ -124,22 +124,22 @@ pub trait Application {
     /// Returns the initial value of an input, which holds until the input is set.
     fn initial_ci(&self, index: u16) -> u16;
 
-    /// Returns the buffer for received inputs, one word for each input. They count from [`Application::latch_ci`] on.
+    /// Returns the buffer for received inputs, one word for each input. Its words take effect at [`Application::latch_ci`].
     fn ci(&mut self) -> &mut [u16];
 
     /// Makes the inputs in [`Application::ci`] take effect together.
     fn latch_ci(&mut self);
 
-    /// Returns the buffer for received parameters; they count from the next control cycle on (D-35).
+    /// Returns the buffer for received parameters. Its words take effect with the next control cycle (D-35).
     fn par(&mut self) -> &mut [u16];
 
     /// Takes a snapshot of the outputs for [`Application::so`].
     fn sample_so(&mut self);
 
-    /// The outputs of the last snapshot; as many as there are outputs.
+    /// Returns the outputs of the last snapshot, one word for each output.
     fn so(&self) -> &[u16];
 
-    /// The control loop starts or ends.
+    /// Reports that the control loop starts or ends.
     fn run(&mut self, now_us: u64, running: bool);
 
     /// Runs a control cycle; called only while the loop runs.
@@ -153,7 +153,7 @@ pub trait Application {
         None
     }
 
-    /// Forgets that text: it was sent, or is not wanted.
+    /// Removes that text: it was sent, or nobody requests texts.
     fn debug_done(&mut self) {}
 }
 

@@ -48,7 +48,7 @@ impl Jobs {
         }
     }
 
-    /// A request during its own answer is served after it: strings are never mixed (D-14).
+    /// Requests DSP_INFO. A request during its own answer is served after that, so strings are never mixed (D-14).
     pub fn ask_info(&mut self) {
         self.info_again = self.info.is_some();
         self.info = self.info.or(Some(Place::First));

@@ -111,7 +111,7 @@ pub struct Node<F, P, S, A> {
 }
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// A board at power-up.
+    /// Creates a board at power-up.
     pub fn new(config: NodeConfig, flash: F, pins: P, store: S, application: A, now_us: u64) -> Self {
         let mut node = Self {
             flash,
@@ -148,7 +148,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         node
     }
 
-    /// Reboots the board as after a crash, watchdog reset or brown-out. It sends one report unasked (D-26).
+    /// Reboots the board as after a crash, watchdog reset or brown-out. The board sends one report unasked (D-26).
     pub fn restart(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, true);
@@ -160,8 +160,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.reboot(self.now_us, false);
     }
 
-    /// Returns the next frame for the bus; `None` while no frame is due or the frame before has not left. A frame that is
-    /// not confirmed by [`Node::sent`] or [`Node::not_sent`] blocks the frames after it, as in a controller.
+    /// Returns the next frame for the bus; `None` while no frame is due or the previous frame has not left. A frame that is not confirmed
+    /// by [`Node::sent`] or [`Node::not_sent`] blocks the frames after it, as in a controller.
     pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
         self.advance(now_us);
         if self.outbox.in_flight.is_some() || self.boot_until.is_some() {
@@ -172,7 +172,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Some(frame)
     }
 
-    /// The frame of the last [`Node::poll`] has left the controller; other frames are ignored.
+    /// Confirms that the frame of the last [`Node::poll`] has left the controller. Other frames are ignored.
     pub fn sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -192,8 +192,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// The controller gave the frame of the last [`Node::poll`] up (bus-off). An INITACK is offered again, other
-    /// frames are lost; DSP_ERROR 6 follows when the bus works again.
+    /// Reports that the controller gave up the frame of the last [`Node::poll`] (bus-off). An INITACK is offered again; other frames are
+    /// lost. DSP_ERROR 6 follows when the bus works again.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.outbox.in_flight != Some(*frame) {
@@ -209,7 +209,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// The controller's receive buffer overran: frames were lost (DSP_ERROR 8).
+    /// Reports that the controller's receive buffer overran: frames were lost (DSP_ERROR 8).
     pub fn overrun(&mut self, now_us: u64) {
         self.advance(now_us);
         if self.boot_until.is_none() {
@@ -217,12 +217,12 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Returns the time until which the node does nothing by itself: call [`Node::poll`] then. A time in the past means at once.
+    /// Returns the time until which the node does nothing by itself: call [`Node::poll`] then. A time in the past means "at once".
     pub fn next_deadline(&self) -> u64 {
         self.deadline()
     }
 
-    /// Settings of the board.
+    /// Returns the settings of the board.
     pub const fn config(&self) -> &NodeConfig {
         &self.config
     }
@@ -232,12 +232,12 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         &self.counters
     }
 
-    /// The sequence number.
+    /// Returns the sequence number.
     pub const fn number(&self) -> Option<Sequence> {
         self.number
     }
 
-    /// The application in the flash.
+    /// Returns the record of the application in the flash.
     pub const fn record(&self) -> Option<Record> {
         self.record
     }
@@ -256,7 +256,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// The flags in MCA_ADMIN_DATA.
+    /// Returns the flags in MCA_ADMIN_DATA.
     pub const fn admin(&self) -> Admin {
         Admin {
             run: matches!(self.app, App::Running),

@@ -12,7 +12,7 @@ const REPORTS: usize = 4;
 /// Frames that wait.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outbox {
-    /// With the controller, not yet left.
+    /// Frame that is with the controller and has not left yet.
     pub in_flight: Option<Frame>,
     /// `true` if the controller gave up a frame; DSP_ERROR 6 follows the next frame that leaves.
     pub trouble: bool,
@@ -52,7 +52,7 @@ impl Outbox {
         }
     }
 
-    /// Answers of a transfer that no longer is.
+    /// Drops answers of a transfer that has ended.
     pub fn forget_transfer(&mut self) {
         self.block_taken = false;
         self.finished = false;
@@ -65,7 +65,7 @@ impl Outbox {
         self.admin_at = None;
     }
 
-    /// `false` when the queue is full.
+    /// Returns `false` if the queue is full.
     pub fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
         let place = self.errors.iter_mut().find(|place| place.is_none());
         place.map(|place| *place = Some((code, from))).is_some()

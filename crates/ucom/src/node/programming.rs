@@ -16,7 +16,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.record.is_some()
     }
 
-    /// The transfer failed: one error, then silence until PC_XRESET or PROG 0→1 (D-43).
+    /// Aborts the transfer: sends one error, then stays silent until PC_XRESET or PROG 0→1 (D-43).
     pub(super) fn abort(&mut self, code: ErrorCode) {
         self.programming.cancel(&self.config.profile);
         self.programming.discard = true;
@@ -24,13 +24,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.error(code);
     }
 
-    /// An eighth of a block.
+    /// Takes an eighth of a block.
     pub(super) fn program(&mut self, data: [u8; 8], is_broadcast: bool) {
         if self.programming.discard {
             return;
         }
         if !self.prog {
-            // A group update goes past the boards that are not in it (D-46).
+            // A group update passes boards that are not in it (D-46).
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -73,7 +73,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Work::Block(_) => return self.take_block(),
             _ => {}
         }
-        // No operation is started on a busy flash, whatever made it busy.
+        // No operation starts while the flash is busy, for any reason.
         let state = self.flash.state(now);
         if state == FlashState::Busy {
             return Ok(());
@@ -141,7 +141,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
     }
 
-    /// The header of a board whose images have none: its length is the configured one, at most that of the area.
+    /// Returns the header of a board whose images have no header: its length is the configured one, at most that of the area.
     fn header_by_itself(&self) -> Option<Header> {
         let cycle = self.programming.number;
         let memory = match (self.config.profile.prog_plan, cycle) {

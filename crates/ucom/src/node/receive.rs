@@ -9,7 +9,7 @@ use crate::message::{DecodeError, ToBoard};
 use crate::profile::AliveMode;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// A frame from the bus.
+    /// Takes a frame from the bus.
     pub fn receive(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.boot_until.is_some() {
@@ -28,7 +28,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// A frame as a driver receives it, of any format (D-02).
+    /// Takes a frame of any format, as a driver receives it (D-02).
     pub fn receive_any(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) -> Result<(), Foreign> {
         match Frame::received(id, format, data) {
             Ok(frame) => {
@@ -64,8 +64,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Sends DSP_ERROR 7 (D-12), but not for messages that would be ignored anyway, and not without a number: all such
-    /// boards would send it at once with one identifier (D-06).
+    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board would ignore anyway. A board without a number does not send it: all
+    /// such boards would send it at once with the same identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
         let served = matches!(self.app, App::Up | App::Running);
@@ -115,7 +115,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// PC_INIT(n): the next board of the chain takes the number (section 5.2).
+    /// Handles PC_INIT(n): the next board of the chain takes the number (section 5.2).
     fn init(&mut self, number: Sequence) {
         match self.number {
             Some(own) if own == number => self.outbox.ack = true,

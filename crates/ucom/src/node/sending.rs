@@ -12,27 +12,27 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
 
-    /// DSP_REPORT, as many milliseconds from now as the UCoM id (D-07).
+    /// Queues DSP_REPORT, due after as many milliseconds as the UCoM id (D-07).
     pub(super) fn report(&mut self) {
         let wait = u32::from(self.config.flash_number & 0xFF);
         self.outbox.push_report(self.after_ms(wait));
     }
 
-    /// Queues MCA_ADMIN_DATA as an answer: not at once, because the PC's frame with this identifier must have left the
-    /// bus (D-05). An unasked report that is due goes with it: one frame is enough for both.
+    /// Queues MCA_ADMIN_DATA as an answer. The answer is not due at once, because the PC's frame with this identifier must have left the
+    /// bus (D-05). A due unasked report needs no frame of its own: this answer replaces it.
     pub(super) fn answer_admin(&mut self) {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// Queues MCA_ADMIN_DATA unasked: after a random time, because the PC may be about to send the same identifier (D-05).
-    /// A pending answer carries it, too.
+    /// Queues MCA_ADMIN_DATA unasked. This frame is due after a random time, because the PC may be about to send the same identifier
+    /// (D-05). A pending answer replaces it.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);
         self.outbox.admin_at.get_or_insert(due);
     }
 
-    /// The next frame: single ones by urgency, then the answers of several frames.
+    /// Returns the next frame: first single frames by urgency, then answers of several frames.
     pub(super) fn next_frame(&mut self) -> Option<Frame> {
         let profile = self.config.profile;
         if let Some(number) = self.taking.or(self.number)

@@ -5,7 +5,7 @@ use crate::error_code::ErrorCode;
 use crate::status::Status;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// The status byte.
+    /// Returns the status byte.
     pub fn status(&self) -> Status {
         let started = self.app != App::Stopped;
         Status::default()
@@ -19,7 +19,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             .with(Status::IPINIT, self.pins.init_in())
     }
 
-    /// PC_RESET and its relatives: outputs safe, everything forgotten, back in the exloader.
+    /// Handles PC_RESET and similar resets: makes outputs safe, forgets everything, returns to the exloader.
     pub(super) fn reboot(&mut self, now_us: u64, report: bool) {
         self.stop_application();
         self.forget_number();
@@ -33,7 +33,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// The exloader listens; the state of the flash counts now.
+    /// Begins to listen in the exloader. The state of the flash counts from now on.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());
@@ -57,7 +57,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.pins.set_init_out(active);
     }
 
-    /// INITACK has left the controller: now the board has its number (D-24).
+    /// Takes the number, because INITACK has left the controller (D-24).
     pub(super) fn numbered(&mut self) {
         let Some(number) = self.taking.take() else { return };
         self.number = Some(number);
@@ -117,7 +117,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.drive_init_out(new.has(Status::OPINIT));
     }
 
-    /// PC_START, MSTART 0→1 or autostart: the exloader starts the application (D-30).
+    /// Starts the application from the exloader: PC_START, MSTART 0→1 or autostart (D-30).
     pub(super) fn start(&mut self) {
         self.autostart_at = None;
         match self.app {

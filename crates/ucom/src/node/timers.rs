@@ -4,12 +4,12 @@ use super::{App, Application, Flash, FlashState, Node, Pins, Store};
 use crate::error_code::ErrorCode;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Now and some milliseconds.
+    /// Returns the time some milliseconds from now.
     pub(super) fn after_ms(&self, ms: u32) -> u64 {
         self.now_us.saturating_add(u64::from(ms) * 1000)
     }
 
-    /// A number from 1 to `most`.
+    /// Returns a random number from 1 to `most`.
     pub(super) fn random(&mut self, most: u32) -> u32 {
         // xorshift32, Marsaglia 2003.
         self.random ^= self.random << 13;
@@ -29,7 +29,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Time goes on to `now_us`; never back.
+    /// Advances the time to `now_us`, never backwards.
     pub(super) fn advance(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         let now = self.now_us;

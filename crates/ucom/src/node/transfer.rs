@@ -56,7 +56,7 @@ pub(super) struct Programming {
     /// 1 or 2.
     pub number: u16,
     pub cycle: Option<Cycle>,
-    /// Header of the first cycle once that is over.
+    /// Header of the first cycle, once that cycle has ended.
     pub first: Option<Header>,
     /// After an error frames are dropped silently (D-43).
     pub discard: bool,
@@ -81,7 +81,7 @@ impl Programming {
         *self = Self::new(profile);
     }
 
-    /// Drops the transfer; an error keeps the board silent nevertheless.
+    /// Drops the transfer. After an error the board stays silent nevertheless.
     pub fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }
@@ -90,7 +90,7 @@ impl Programming {
         self.discard
     }
 
-    /// DSP_READY has left: the next block may come.
+    /// Allows the next block, because DSP_READY has left.
     pub fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;
@@ -104,7 +104,7 @@ impl Programming {
             Work::None | Work::Answer => u64::MAX,
             Work::Block(at) => at,
             Work::Verify(_) => 0,
-            // The flash is asked again soon.
+            // The flash state is read again soon.
             _ => now_us.saturating_add(500),
         }
     }

@@ -33,7 +33,7 @@ pub struct Key {
 }
 
 impl Key {
-    /// The value in a profile, to be printed.
+    /// Returns the value in a profile, for display.
     pub fn value<'a>(&'a self, profile: &'a Profile) -> impl fmt::Display + 'a {
         struct Shown<'a>(&'a Key, &'a Profile);
         impl fmt::Display for Shown<'_> {

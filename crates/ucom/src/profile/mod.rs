@@ -65,8 +65,7 @@ impl Profile {
         }
     }
 
-    /// The number that reaches boards without one, and that they use themselves: the broadcast number, else 0
-    /// (D-04, D-06).
+    /// Returns the number that reaches boards without a number, and that these use themselves: the broadcast number, else 0 (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
         match self.broadcast_number() {
             Some(number) => number,
@@ -83,7 +82,7 @@ impl Profile {
         number.number() as u32 >= self.addr_first && !broadcast
     }
 
-    /// The numbers that boards can have, in the order of the chain.
+    /// Returns the numbers that boards can have, in the order of the chain.
     pub fn board_numbers(&self) -> impl Iterator<Item = Sequence> + use<> {
         let profile = *self;
         Sequence::all().filter(move |number| profile.is_board(*number))
@@ -94,12 +93,12 @@ impl Profile {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }
 
-    /// `string.max`, never above the 512 that the table allows.
+    /// Returns `string.max`, never above the 512 that the table allows.
     pub const fn string_limit(&self) -> usize {
         if self.string_max > 512 { 512 } else { self.string_max as usize }
     }
 
-    /// `string.gap` in microseconds.
+    /// Returns `string.gap` in microseconds.
     pub const fn string_gap_us(&self) -> u64 {
         self.string_gap as u64 * 1000
     }

@@ -4,9 +4,9 @@ use core::fmt;
 
 /// A value of a key as text, both ways.
 pub trait Value: Sized {
-    /// The value of a text.
+    /// Reads the value of a text.
     fn read(text: &str) -> Option<Self>;
-    /// The text of a value.
+    /// Writes the text of a value.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
@@ -21,7 +21,7 @@ macro_rules! words {
             /// All values.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// The word that files use.
+            /// Returns the word that files use.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }
@@ -56,7 +56,7 @@ words! {
 }
 
 impl Endian {
-    /// The two bytes of a word.
+    /// Returns the two bytes of a word.
     pub const fn bytes(self, word: u16) -> [u8; 2] {
         match self {
             Self::Little => word.to_le_bytes(),
@@ -64,7 +64,7 @@ impl Endian {
         }
     }
 
-    /// The word of two bytes.
+    /// Returns the word of two bytes.
     pub const fn word(self, bytes: [u8; 2]) -> u16 {
         match self {
             Self::Little => u16::from_le_bytes(bytes),
@@ -132,11 +132,11 @@ words! {
 }
 
 words! {
-    /// To whom the PC's heartbeat goes (D-04, D-50).
+    /// Receivers of the PC's heartbeat (D-04, D-50).
     pub enum AliveMode {
         /// A single broadcast frame.
         Broadcast = "broadcast",
-        /// A frame to each board; boards do not count broadcast ones.
+        /// A frame to each board; boards do not count broadcast heartbeats.
         Unicast = "unicast",
         /// Both.
         Both = "both",
@@ -144,7 +144,7 @@ words! {
 }
 
 words! {
-    /// Reaction of the PC if a board's heartbeat stays away (D-51).
+    /// Reaction of the PC if a board's heartbeat is missing (D-51).
     pub enum OnLost {
         /// An event, nothing else.
         Report = "report",

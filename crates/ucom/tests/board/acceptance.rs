@@ -1,4 +1,4 @@
-//! The acceptance table of the board side, D-T1 to D-T16, D-T20 and D-T21, in both byte orders where words are on the wire.
+//! The acceptance table of the board side, D-T1 to D-T16, D-T20 and D-T21. Rows with words on the wire run in both byte orders.
 
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -32,7 +32,7 @@ fn d_t2_report_without_reset() {
     }
 }
 
-/// D-T3, D-06: silence of a board without number.
+/// D-T3, D-06: a board without a number is silent.
 #[test]
 fn d_t3_unnumbered_boards_are_silent() {
     let mut bus = Bus::one();
@@ -49,7 +49,7 @@ fn d_t3_unnumbered_boards_are_silent() {
     assert_eq!(bus.boards[0].status(), Status(0x11));
 }
 
-/// D-T4: numbers follow the wire.
+/// D-T4: boards get their numbers in the order of the wire.
 #[test]
 fn d_t4_numbers_follow_the_wire() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -62,7 +62,7 @@ fn d_t4_numbers_follow_the_wire() {
     assert_eq!(numbers, [Some(1), Some(2), None, None, None]);
 }
 
-/// D-T5, D-24: the same request again is acknowledged again, and changes nothing.
+/// D-T5, D-24: a repeated request is acknowledged again and changes nothing.
 #[test]
 fn d_t5_init_again() {
     let mut bus = Bus::new(&FIVE, Profile::default());
@@ -75,7 +75,7 @@ fn d_t5_init_again() {
     assert_eq!(after, before);
 }
 
-/// D-T6, D-22: the formula, literally.
+/// D-T6, D-22: PC_SETSTATUS applies the formula literally.
 #[test]
 fn d_t6_set_status_is_literal() {
     let mut bus = Bus::initialised();
@@ -94,7 +94,7 @@ fn d_t7_mirror_bits_stay() {
         bus.send(text);
         assert_eq!(bus.status(1), 0x1B, "{text}");
     }
-    // The same while the loop runs.
+    // Nor while the loop runs.
     let mut bus = Bus::running();
     for text in ["1C1#2000", "1C1#1010", "1C1#0010"] {
         bus.send(text);
@@ -102,7 +102,7 @@ fn d_t7_mirror_bits_stay() {
     }
 }
 
-/// D-T8, D-20, D-23: the walk of the status byte.
+/// D-T8, D-20, D-23: the status byte through all states.
 #[test]
 fn d_t8_status_walk() {
     let mut bus = Bus::one();
@@ -136,7 +136,7 @@ fn d_t9_start() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T10, D-36, D-12: dimensions, then one string for each; a request with data is none.
+/// D-T10, D-36, D-12: dimensions, then one string for each. A frame with data does not count as a request.
 #[test]
 fn d_t10_io_description() {
     let mut bus = Bus::started();
@@ -184,7 +184,7 @@ fn d_t11_initial_inputs() {
     }
 }
 
-/// D-T12, D-34: inputs beyond the last one.
+/// D-T12, D-34: inputs beyond the last input.
 #[test]
 fn d_t12_inputs_beyond_the_dimension() {
     let mut bus = Bus::started();
@@ -198,7 +198,7 @@ fn d_t12_inputs_beyond_the_dimension() {
     assert_eq!(bus.boards[0].application.par, [0, 0, 7]);
 }
 
-/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start starts it again.
+/// D-T13, D-50: without the PC's heartbeat the board stops, and only a start command starts it again.
 #[test]
 fn d_t13_pc_lost() {
     let mut bus = Bus::started();
@@ -235,7 +235,7 @@ fn d_t13_pc_lost() {
     assert!(bus.take().iter().any(|frame| frame.id() == 0x381));
 }
 
-/// D-T14, D-50: one missing heartbeat is nothing, three are the end.
+/// D-T14, D-50: one missing heartbeat has no effect, three stop the board.
 #[test]
 fn d_t14_alive_for_a_minute() {
     let mut bus = Bus::started();
@@ -252,7 +252,7 @@ fn d_t14_alive_for_a_minute() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-T15, D-37, D-12: flags that are no flags; a frame that is too short.
+/// D-T15, D-37, D-12: flags other than 0 and 1, and a frame that is too short.
 #[test]
 fn d_t15_bad_flags() {
     let mut bus = Bus::started();
@@ -281,9 +281,9 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
-    // Once for each number: the same number again starts nothing.
+    // Once for each number: the same number again does not start the application.
     assert_eq!(chain(&[("680#", 600), ("1C1#8000", 10), ("281#", 10)]).0, 0x59);
-    // Not before its time, and with error 11 when there is nothing to start.
+    // Not before its time, and with error 11 if the board has no application.
     let mut bus = Bus::one();
     bus.boards[0].store.autostart = true;
     bus.send("281#");
@@ -298,7 +298,7 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(bus.boards[0].status(), Status(0x59));
 }
 
-/// D-T20, D-24, D-06: a second request while the acknowledgement is still waiting.
+/// D-T20, D-24, D-06: a second request while the acknowledgement still waits.
 #[test]
 fn d_t20_init_while_the_acknowledgement_waits() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());

@@ -26,7 +26,7 @@ fn d_t17_update() {
     assert_eq!(bus.ask("301#", 50)[0], frames("501#")[0]);
 }
 
-/// D-T18, D-43, D-41: each mistake once, and silence after it.
+/// D-T18, D-43, D-41: each mistake once, then silence.
 #[test]
 fn d_t18_mistakes_in_a_transfer() {
     let image = image();
@@ -145,7 +145,7 @@ fn d_t18_mistakes_in_a_transfer() {
     }
 }
 
-/// D-T19, D-46: a group update goes past boards that are not in it.
+/// D-T19, D-46: a group update passes boards that are not in it.
 #[test]
 fn d_t19_group_update() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());

@@ -5,7 +5,7 @@ use ucom::{Frame, FromBoard, Profile, Status, StringAssembler};
 
 use super::bus::{Bus, MS, frames};
 
-/// Debug texts in what was received.
+/// Returns the debug texts among received frames.
 fn texts(received: &[Frame]) -> Vec<String> {
     let profile = Profile::default();
     let mut assembler = StringAssembler::<512>::new();
@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: answers on shared identifiers come 2 ms after the request, unasked ones after 1 to 8 ms, and not all
-/// boards at the same time.
+/// D-05: answers on shared identifiers come 2 ms after the request, unasked messages after 1 to 8 ms, and boards do not send all at the
+/// same time.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -63,7 +63,7 @@ fn d33_outputs() {
     }
 }
 
-/// D-33: on a bus that cannot take them outputs are left out, never queued without bound.
+/// D-33: on a bus that cannot take them, outputs are left out and never queued without bound.
 #[test]
 fn d33_outputs_on_a_blocked_bus() {
     let mut bus = Bus::running();
@@ -76,7 +76,7 @@ fn d33_outputs_on_a_blocked_bus() {
     assert!(bus.take().len() <= 6);
 }
 
-/// D-34, D-50: a start begins with the initial inputs, whatever was set before.
+/// D-34, D-50: a start sets the initial inputs, even if inputs were set before.
 #[test]
 fn d34_initial_inputs_at_the_start() {
     let mut bus = Bus::initialised();
@@ -107,7 +107,7 @@ fn d34_latch_last() {
     assert_eq!(bus.boards[0].application.latched_ci, [1, 2, 3, 4]);
 }
 
-/// D-38: texts only when wanted, at most 20 in any second.
+/// D-38: texts are sent only if requested, at most 20 in any second.
 #[test]
 fn d38_debug_texts() {
     let mut bus = Bus::started();
@@ -135,7 +135,7 @@ fn d38_debug_texts() {
     assert!(bus.boards[0].counters().texts_dropped > 300);
 }
 
-/// D-50: the loss of the PC is reported in words when texts are wanted; the debug flags stay.
+/// D-50: the loss of the PC is reported as a text if texts are requested. The debug flags stay.
 #[test]
 fn d50_text_when_the_pc_is_lost() {
     let mut bus = Bus::started();
@@ -146,7 +146,7 @@ fn d50_text_when_the_pc_is_lost() {
     assert!(received.contains(&frames("601#00000100")[0]));
 }
 
-/// A board's heartbeat, every second while the application is up, and only then (D-51 is what the PC makes of it).
+/// A board sends its heartbeat every second while the application is up, and only then. D-51 is the reaction of the PC.
 #[test]
 fn d51_heartbeat_of_the_board() {
     let mut bus = Bus::started();
@@ -157,7 +157,7 @@ fn d51_heartbeat_of_the_board() {
     assert_eq!(bus.take(), []);
 }
 
-/// Section 9: the same code at most ten times a second; others are not held up by it.
+/// Section 9: a board sends the same code at most ten times a second. Other codes are not delayed.
 #[test]
 fn d34_error_rate() {
     let mut bus = Bus::started();
@@ -174,7 +174,7 @@ fn d34_error_rate() {
     assert_eq!(bus.boards[0].counters().errors_dropped, 90);
 }
 
-/// D-14: a request during its own answer is answered after it; strings are not mixed.
+/// D-14: a request during its own answer is answered after that answer. Strings are not mixed.
 #[test]
 fn d14_requests_during_their_answers() {
     let mut bus = Bus::started();
@@ -206,7 +206,7 @@ fn d35_control_cycles() {
     assert_eq!(bus.boards[0].application.steps, steps);
 }
 
-/// Errors 6 and 8 come from the controller.
+/// The controller causes errors 6 and 8.
 #[test]
 fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
@@ -221,7 +221,7 @@ fn controller_troubles_are_reported() {
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
 
-/// Only the frame that is with the controller can leave it or be given up.
+/// Only the frame that is with the controller can leave it or be given up by it.
 #[test]
 fn other_frames_than_the_one_on_its_way_are_ignored() {
     let mut bus = Bus::initialised();
@@ -237,13 +237,13 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.sent(now, &acknowledge);
     assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
     assert_eq!(board.counters().not_sent, 0);
-    // Now it has left, and leaves no second time.
+    // The frame has left now, and does not leave a second time.
     board.sent(now, &acknowledge);
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
 
-/// D-38: a program that is not up yet is not asked for texts; its texts until then are not dropped.
+/// D-38: the board does not read texts of a program that is not up yet, and does not drop them.
 #[test]
 fn d38_texts_of_a_program_that_is_not_up() {
     let mut bus = Bus::initialised();
@@ -258,8 +258,7 @@ fn d38_texts_of_a_program_that_is_not_up() {
     assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
 }
 
-/// D-37: outputs are enabled by the change of the flag: what the program has made safe by itself stays so when the PC
-/// repeats its flags.
+/// D-37: a change of the flag enables outputs. Outputs that the program has made safe by itself stay safe when the PC repeats its flags.
 #[test]
 fn d37_repeated_flags_enable_nothing() {
     let mut bus = Bus::started();
@@ -273,12 +272,12 @@ fn d37_repeated_flags_enable_nothing() {
     assert!(bus.boards[0].application.active, "0 and 1 again");
 }
 
-/// What [`ucom::node::Application`] promises: a program that was not started, or has been stopped, is not stopped again.
+/// Contract of [`ucom::node::Application`]: a program that was not started, or has been stopped, is not stopped again.
 #[test]
 fn a_program_is_stopped_once() {
     for text in ["000#", "041#", "1C1#0800", "1C1#0404"] {
         let mut bus = Bus::initialised();
-        // Only a stop would change it.
+        // Only a stop would change the flag.
         bus.boards[0].application.running = true;
         bus.send(text);
         assert!(bus.boards[0].application.running, "{text}");
@@ -289,7 +288,7 @@ fn a_program_is_stopped_once() {
     assert_eq!(bus.boards[0].application.started_us, None);
 }
 
-/// D-50: a start while the loop runs is no heartbeat of the PC.
+/// D-50: a start while the loop runs does not count as a heartbeat of the PC.
 #[test]
 fn d50_a_repeated_start_is_no_heartbeat() {
     let mut bus = Bus::running();
@@ -302,7 +301,7 @@ fn d50_a_repeated_start_is_no_heartbeat() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-14, D-36: the end of the application ends its dumps, not what the board sends about itself.
+/// D-14, D-36: the end of the application ends its dumps, but not the board's own description.
 #[test]
 fn d14_info_survives_the_application() {
     let mut bus = Bus::started();
@@ -321,7 +320,7 @@ fn d14_info_survives_the_application() {
     assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
-/// D-14, D-36: a second request during a dump of the inputs is served once, after it; without inputs there is nothing to serve.
+/// D-14, D-36: a second request during a dump of the inputs is served once, after the dump. Without inputs there is nothing to serve.
 #[test]
 fn d14_dump_of_inputs_twice() {
     for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {

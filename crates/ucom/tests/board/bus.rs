@@ -8,26 +8,26 @@ pub type Board = Node<MemoryFlash, WirePins, MemoryStore, MemoryApplication>;
 
 pub const MS: u64 = 1000;
 
-/// Boards, and what is on the bus with them.
+/// Boards and the frames on their bus.
 pub struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
-    /// What the boards sent and when, since the last look.
+    /// Frames from the boards and their times, since the last `take`.
     pub received: Vec<(u64, Frame)>,
     /// Every DSP_ERROR so far.
     pub errors: Vec<Frame>,
     /// Frames that the bus holds back: their boards wait for `sent`.
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
-    /// Frames to boards counted from 0; this one is lost.
+    /// Number of the frame to boards that is lost, counted from 0.
     pub lose_to_boards: Option<usize>,
     pub frames_to_boards: usize,
-    /// Frames from boards counted from 0; this one is lost (the board saw it leave).
+    /// Number of the frame from boards that is lost, counted from 0; the board saw it leave.
     pub lose_from_boards: Option<usize>,
     pub frames_from_boards: usize,
 }
 
-/// Worst-case duration of a classic frame at 1 Mbit/s, µs.
+/// Returns the worst-case duration of a classic frame at 1 Mbit/s, µs.
 pub fn duration(frame: &Frame) -> u64 {
     55 + 10 * u64::from(frame.dlc())
 }
@@ -76,14 +76,14 @@ impl Bus {
         Self::new(&[0x21], Profile::default())
     }
 
-    /// One board with number 1 and its pin on, nothing in `received`.
+    /// Returns a bus with a board that has number 1 and its pin on; `received` is empty.
     pub fn initialised() -> Self {
         let mut bus = Self::one();
         bus.number(1);
         bus
     }
 
-    /// One board whose application is up.
+    /// Returns a bus with a board whose application is up.
     pub fn started() -> Self {
         let mut bus = Self::initialised();
         bus.send("301#");
@@ -92,7 +92,7 @@ impl Bus {
         bus
     }
 
-    /// One board whose control loop runs.
+    /// Returns a bus with a board whose control loop runs.
     pub fn running() -> Self {
         let mut bus = Self::started();
         bus.send("541#");
@@ -110,7 +110,7 @@ impl Bus {
         assert_eq!(self.take(), frames(&format!("{:03X}#{number:02X}", 0x0C0 + u16::from(number))));
     }
 
-    /// A frame of the PC, put on the bus now.
+    /// Puts a frame of the PC on the bus now.
     pub fn send(&mut self, text: &str) {
         self.send_frame(&text.parse().unwrap_or_else(|e| panic!("{text}: {e}")));
     }
@@ -135,11 +135,11 @@ impl Bus {
 
     pub fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Steps that end without a frame; far more than there are reasons to wake up.
+        // Steps that ended without a frame. The limit below is far above the number of reasons to wake up.
         let mut quiet = 0;
         loop {
             let now = self.now;
-            // Arbitration: every board offers a frame, the lowest identifier goes first, the rest wait.
+            // Arbitration: every board offers a frame, the lowest identifier goes first, the other frames wait.
             let mut offers: Vec<(u16, usize, Frame)> = Vec::new();
             for (i, board) in self.boards.iter_mut().enumerate() {
                 if let Some(frame) = board.poll(now) {
@@ -183,7 +183,7 @@ impl Bus {
         self.check();
     }
 
-    /// What was held back leaves now.
+    /// Lets the held frames leave now.
     pub fn release(&mut self) {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
@@ -192,7 +192,7 @@ impl Bus {
         }
     }
 
-    /// The invariants of the status byte (D-20), always.
+    /// Checks the invariants of the status byte (D-20).
     pub fn check(&self) {
         for board in &self.boards {
             let status = board.status();
@@ -200,12 +200,12 @@ impl Bus {
         }
     }
 
-    /// What was received since the last look.
+    /// Returns the frames received since the last `take`.
     pub fn take(&mut self) -> Vec<Frame> {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
-    /// Sends, waits and returns what was received from the sending on.
+    /// Sends a frame, waits, and returns the frames received since the sending.
     pub fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
         self.received.clear();
         self.send(text);
@@ -213,7 +213,7 @@ impl Bus {
         self.take()
     }
 
-    /// DSP_INFO of board `n`; `None` without an answer.
+    /// Returns DSP_INFO of board `n`; `None` if the board does not answer.
     pub fn info(&mut self, n: u8) -> Option<BoardInfo> {
         let id = 0x140 + u16::from(n);
         let endian = self.boards[0].config().profile.endian;
@@ -222,12 +222,12 @@ impl Bus {
         BoardInfo::parse(&first.payload(), endian)
     }
 
-    /// Status byte of board `n` by PC_INFO.
+    /// Returns the status byte of board `n`, read with PC_INFO.
     pub fn status(&mut self, n: u8) -> u8 {
         self.info(n).unwrap_or_else(|| panic!("board {n} does not answer")).status.0
     }
 
-    /// Sends a block in frames 200 µs apart and waits for an answer of board 1; returns what came.
+    /// Sends a block in frames 200 µs apart and waits for an answer of board 1. Returns the received frames.
     pub fn block(&mut self, block: &[u8; 64], wait_ms: u64) -> Vec<Frame> {
         self.received.clear();
         for data in block.chunks_exact(8) {
@@ -249,12 +249,12 @@ pub fn frames(text: &str) -> Vec<Frame> {
     text.split_whitespace().map(|frame| frame.parse().unwrap()).collect()
 }
 
-/// The image of the golden vectors: 1000 bytes.
+/// Returns the image of the golden vectors: 1000 bytes.
 pub fn image() -> Vec<u8> {
     (0..1000).map(|i| (37 * i + 11) as u8).collect()
 }
 
-/// The header of an image for any board.
+/// Returns the header of an image for any board.
 pub fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     Header {
         cycle,
@@ -267,7 +267,7 @@ pub fn header(image: &[u8], cycle: u16, profile: &Profile) -> Header {
     }
 }
 
-/// All blocks of both cycles, headers included.
+/// Returns all blocks of both cycles, headers included.
 pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     let mut all = Vec::new();
     for cycle in 1..=2 {
@@ -277,7 +277,7 @@ pub fn blocks(image: &[u8], profile: &Profile) -> Vec<[u8; 64]> {
     all
 }
 
-/// By identifier.
+/// Sorts frames by identifier.
 pub fn sorted(mut received: Vec<Frame>) -> Vec<Frame> {
     received.sort_by_key(Frame::id);
     received

@@ -1,4 +1,4 @@
-//! Boards that read the description differently: what their profile keys make of them.
+//! Boards that read the description differently, and the effect of their profile keys.
 
 use ucom::profile::{AliveMode, Broadcast, Endian, ReportMode};
 use ucom::{Profile, Sequence, Status};
@@ -21,7 +21,7 @@ fn d07_report_modes() {
     assert_eq!(bus.ask("240#", 100), frames("401#21 400#42"));
 }
 
-/// Section 5.3: what a board that raises its pin by itself does to a PC that repeats PC_INIT blindly.
+/// Section 5.3: duplicate numbers when a board raises its pin by itself and the PC repeats PC_INIT blindly.
 #[test]
 fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
@@ -42,7 +42,7 @@ fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     assert_eq!(numbers(true, true), [1, 2, 2]);
 }
 
-/// D-23: a board that forgets its number at PC_XRESET can be given it again.
+/// D-23: a board that forgets its number at PC_XRESET can get it again.
 #[test]
 fn d23_xreset_forgets_the_number() {
     let mut bus = Bus::new(&[0x21], with(|p| p.xreset_keeps_init = false));
@@ -104,7 +104,7 @@ fn d04_other_addresses() {
     assert_eq!(bus.ask("241#", 300), frames("441#21"));
 }
 
-/// D-04, D-50: which heartbeat counts.
+/// D-04, D-50: the heartbeat that counts.
 #[test]
 fn d50_unicast_heartbeat() {
     let runs = |mode, text: &str| {
@@ -137,7 +137,7 @@ fn d12_strict_lengths() {
     assert_eq!(bus.ask("201#0000000000000000", 20).len(), 4);
 }
 
-/// D-02: frames of others are counted, and nothing comes of them.
+/// D-02: foreign frames are counted and have no effect.
 #[test]
 fn d02_foreign_frames() {
     let mut bus = Bus::initialised();
@@ -163,7 +163,7 @@ fn d02_foreign_frames() {
     assert_eq!(bus.take(), []);
 }
 
-/// D-04: what boards send concerns no board, whatever its number; it is not even counted.
+/// D-04: a board ignores frames that boards send, with any number, and does not even count them.
 #[test]
 fn d04_boards_do_not_listen_to_boards() {
     let mut bus = Bus::initialised();
@@ -179,7 +179,7 @@ fn d04_boards_do_not_listen_to_boards() {
     assert_eq!((board.status(), board.poll(now)), (Status(0x1B), None));
 }
 
-/// What a board's state does not allow is met with silence, and counted.
+/// A message that the board's state does not allow is counted and not answered.
 #[test]
 fn ignored_messages_are_counted() {
     let mut bus = Bus::initialised();

@@ -1,4 +1,4 @@
-//! What the board asks of its lasting memory.
+//! Use of the board's lasting memory.
 
 use ucom::Frame;
 use ucom::node::{Node, NodeConfig, Store};
@@ -6,7 +6,7 @@ use ucom_sim::memory::{MemoryFlash, WirePins};
 
 use super::bus::application;
 
-/// ASTART, and how often it was kept.
+/// ASTART, and how often it was written.
 #[derive(Default)]
 struct Counted {
     autostart: bool,
@@ -28,7 +28,7 @@ impl Store for Counted {
     }
 }
 
-/// D-22, and what [`Store::set_autostart`] promises: lasting memory wears, so it is written on changes only.
+/// D-22 and the contract of [`Store::set_autostart`]: lasting memory wears, so it is written only if the value changes.
 #[test]
 fn d22_autostart_is_kept_on_changes_only() {
     let pins = WirePins::chain(1).remove(0);
@@ -46,7 +46,7 @@ fn d22_autostart_is_kept_on_changes_only() {
         ("1C1#0200", true, 1),
         ("1C1#4000", false, 2),
         ("1C1#4000", false, 2),
-        // Without the number, too.
+        // Also without a number.
         ("1C1#0840", true, 3),
     ] {
         board.receive(now, &text.parse::<Frame>().unwrap());

@@ -5,7 +5,7 @@ use ucom::{Frame, Profile};
 
 use super::bus::{Board, Bus};
 
-/// splitmix64, so that a seed makes a run.
+/// splitmix64: the same seed gives the same run.
 struct Random(u64);
 
 impl Random {
@@ -22,8 +22,8 @@ impl Random {
     }
 }
 
-/// D-20: whatever comes, whenever, the status byte never contradicts itself, numbers stay apart, outputs are
-/// active only while the loop runs, and what a board sends is of the protocol.
+/// D-20: any frame at any time. The status byte never contradicts itself, no two boards get one number, outputs are active only while the
+/// loop runs, and boards send only frames of the protocol.
 #[test]
 fn d20_a_million_random_frames() {
     let seed = std::env::var("UCOM_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(2026);
@@ -32,7 +32,7 @@ fn d20_a_million_random_frames() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());
     let mut seen = std::collections::BTreeMap::new();
     for i in 0..1_000_000u32 {
-        // Mostly frames that mean something: rare ones alone never get a board out of S1.
+        // Mostly frames with a meaning: random identifiers alone never get a board out of S1.
         let function = if random.below(8) == 0 { random.below(32) } else { random.below(28) };
         let sequence = if random.below(8) == 0 { random.below(64) } else { random.below(4) };
         let (len, data) = match random.below(3) {
@@ -41,7 +41,7 @@ fn d20_a_million_random_frames() {
             _ => (0, 0),
         };
         let id = (function << 6 | sequence) as u16 & 0x7FF;
-        // A reset each now and then would keep everything in S1.
+        // Frequent resets would keep all boards in S1.
         if id >> 6 == 0 && random.below(50) != 0 {
             continue;
         }
@@ -80,7 +80,7 @@ fn d20_a_million_random_frames() {
     }
 }
 
-/// The state of a board fits into 4 KiB beside its flash and its application's buffers.
+/// The state of a board fits into 4 KiB, without its flash and its application's buffers.
 #[test]
 fn size_of_a_board() {
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};

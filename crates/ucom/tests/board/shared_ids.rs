@@ -1,11 +1,11 @@
-//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes on the way.
+//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes during transmission.
 
 use proptest::prelude::*;
 use ucom::Profile;
 
 use super::bus::{Bus, MS, frames};
 
-/// What can happen to a board that has reasons to send its flags or its descriptions.
+/// Event for a board that has reasons to send its flags or its descriptions.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Wait(u64),
@@ -31,8 +31,7 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
 }
 
 proptest! {
-    /// D-05: whatever a board has to send, on a shared identifier it begins no earlier than 2 ms after the PC's last frame
-    /// there.
+    /// D-05: on a shared identifier a board begins to send no earlier than 2 ms after the PC's last frame there.
     #[test]
     fn d05_never_within_2_ms_of_a_request(acts in acts()) {
         let mut bus = Bus::started();
@@ -51,7 +50,7 @@ proptest! {
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // The dimensions begin a dump; the rest of one that is under way follows at once (D-14).
+            // The dimensions begin a dump; the remainder of a dump in progress follows at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
@@ -62,7 +61,7 @@ proptest! {
     }
 }
 
-/// D-14: an answer whose text has become shorter meanwhile ends, and what was asked for after it is served.
+/// D-14: an answer whose text has become shorter meanwhile ends, and the requests that came after it are served.
 #[test]
 fn d14_an_answer_ends_when_its_text_changes() {
     let long = "a description of more than one package, so that it can end early".to_owned();
@@ -75,7 +74,7 @@ fn d14_an_answer_ends_when_its_text_changes() {
                 bus.boards[0].store.description = long.clone().into_bytes();
                 bus.boards[0].application.texts.application = long.clone().into_bytes();
                 bus.send(request);
-                // So many frames of the answer leave, then the text is another.
+                // After `after` frames of the answer have left, the text changes.
                 while bus.received.iter().filter(|(_, f)| f.id() == id).count() < after {
                     bus.run_us(50);
                 }
@@ -100,8 +99,8 @@ fn d14_an_answer_ends_when_its_text_changes() {
     }
 }
 
-/// D-06, D-12: a board without a number reports no wrong lengths, however strict it is: all such boards would send
-/// it at once with one identifier. Nor does it answer.
+/// D-06, D-12: a board without a number reports no wrong lengths, even if it is strict, and does not answer. All such boards would send
+/// the report at once with the same identifier.
 #[test]
 fn d06_d12_no_error_without_a_number() {
     let profile = Profile { dlc_strict: true, ..Profile::default() };
@@ -112,7 +111,7 @@ fn d06_d12_no_error_without_a_number() {
         assert_eq!(bus.ask(text, 300), [], "{text}");
         bus.number(1);
         let expected = match text {
-            // The one with the number reports it for itself.
+            // The board with a number reports it.
             "000#00" | "240#00" | "281#00" | "200#00" | "000#0000000000000000" => "081#07",
             _ => "",
         };

@@ -5,7 +5,7 @@ use ucom::{Frame, Profile, Sequence, Status};
 
 use super::bus::{Bus, blocks, frames, image};
 
-/// The columns of the table; S3x and S4 are distinguished from their neighbours.
+/// The columns of the table. Conditions tell S3x and S4 from their neighbours.
 const STATES: [Phase; 7] = [
     Phase::Uninitialised,
     Phase::Idle,
@@ -16,7 +16,7 @@ const STATES: [Phase; 7] = [
     Phase::Running,
 ];
 
-/// Board 1 (flash number 0x21) in a state, with nothing waiting on the bus.
+/// Returns board 1 (flash number 0x21) in a state, with nothing waiting on the bus.
 fn in_state(phase: Phase) -> Bus {
     let mut bus = match phase {
         Phase::Uninitialised => Bus::one(),
@@ -42,21 +42,21 @@ fn in_state(phase: Phase) -> Bus {
     bus
 }
 
-/// What came of an event.
+/// Result of an event.
 struct Seen {
     phase: Phase,
-    /// What was sent within 9 ms, before the first transfer of the outputs.
+    /// Frames sent within 9 ms, before the first transfer of the outputs.
     sent: Vec<Frame>,
 }
 
 fn event(phase: Phase, text: &str) -> Seen {
     let mut bus = in_state(phase);
-    // In S6 the outputs go out every 10 ms; they are no answers.
+    // In S6 the outputs go out every 10 ms; they are not answers.
     let sent = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
     Seen { phase: bus.boards[0].phase(), sent }
 }
 
-/// `expected` gives for each state the state after the event and what is sent.
+/// Checks a row of the table. `expected` gives for each state the state after the event and the frames sent.
 fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
     for phase in STATES {
         let seen = event(phase, text);
@@ -145,7 +145,7 @@ fn d22_set_status_prog_in_every_state() {
         Programming | Aborted => (Idle, ""),
         other => (other, ""),
     });
-    // PROG 0→1 is what an aborted transfer needs.
+    // PROG 0→1 ends the silence after an aborted transfer.
     let mut bus = in_state(Aborted);
     bus.send("1C1#0400");
     bus.send("1C1#0404");
@@ -187,7 +187,7 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: what is too short is reported, but for what would be ignored anyway.
+/// D-12, D-06: a frame that is too short is reported, unless the board would ignore the message anyway.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -201,7 +201,7 @@ fn d12_short_frames_in_every_state() {
     }
 }
 
-/// D-12: the same with `dlc.strict` for what has no data.
+/// D-12: with `dlc.strict` surplus data are reported as well.
 #[test]
 fn d12_long_frames_when_lengths_are_strict() {
     for (text, idle, ready) in [

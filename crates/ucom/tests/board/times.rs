@@ -1,4 +1,4 @@
-//! Exact times of one board: nothing happens a microsecond early, and the board asks to be woken when it happens.
+//! Exact times of one board: nothing happens a microsecond early, and the board requests a wake-up for that moment.
 
 use ucom::Frame;
 use ucom::node::{Phase, Store};
@@ -9,12 +9,12 @@ fn frame(text: &str) -> Frame {
     text.parse().unwrap()
 }
 
-/// The board of a bus, and the time.
+/// Returns the board of a bus, and the time.
 fn board(mut bus: Bus) -> (Board, u64) {
     (bus.boards.remove(0), bus.now)
 }
 
-/// Lets what is offered leave at once; returns it.
+/// Confirms offered frames at once and returns them.
 fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     let mut left = Vec::new();
     while let Some(frame) = board.poll(now) {
@@ -25,7 +25,7 @@ fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     left
 }
 
-/// D-07: a board listens when its boot is over, not earlier.
+/// D-07: a board listens when its boot has ended, not earlier.
 #[test]
 fn d07_boot_time() {
     for after in ["power-up", "PC_RESET"] {
@@ -46,7 +46,7 @@ fn d07_boot_time() {
     }
 }
 
-/// A board that does not listen yet asks the busy flash every millisecond.
+/// A board that does not listen yet reads the state of the busy flash every millisecond.
 #[test]
 fn boot_waits_for_the_flash() {
     let (mut board, now) = board(Bus::initialised());
@@ -85,7 +85,7 @@ fn d43_pause_inside_a_block() {
     assert_eq!(board.next_deadline(), u64::MAX);
 }
 
-/// D-42: a whole block is looked at when its time is over.
+/// D-42: a whole block is processed when its time has passed.
 #[test]
 fn d42_block_time() {
     let (mut board, now) = board(Bus::initialised());
@@ -124,7 +124,7 @@ fn d25_hold_off() {
     assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
-/// D-33, D-35, D-50, D-51: the beats of a running board, and the end without the PC's heartbeat.
+/// D-33, D-35, D-50, D-51: the beats of a running board, and the stop without the PC's heartbeat.
 #[test]
 fn d33_d35_d50_d51_beats() {
     let (mut board, start) = board(Bus::started());
@@ -135,21 +135,21 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(board.next_deadline(), alive + 1000 * MS);
     let now = alive;
     board.receive(now, &frame("541#"));
-    // Its answer comes 2 ms later; the first control cycle is before it.
+    // The answer to the start comes 2 ms later, after the first control cycle.
     assert_eq!(board.next_deadline(), now + MS);
     assert_eq!((flush(&mut board, now + MS - 1), board.application.steps), (vec![], 0));
     assert_eq!((flush(&mut board, now + MS), board.application.steps), (vec![], 1));
     assert_eq!(flush(&mut board, now + 2 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 2 * MS), frames("601#01000000"));
     assert_eq!(board.application.steps, 2);
-    // Cycles that were missed are left out, and the beat stays.
+    // Missed cycles are left out, and the beat stays.
     assert_eq!((flush(&mut board, now + 7 * MS + 300), board.application.steps), (vec![], 3));
     assert_eq!(board.next_deadline(), now + 8 * MS);
     assert_eq!(flush(&mut board, now + 10 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // No frame shows that the PC is there.
+    // No frame shows that the PC is present.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);
@@ -163,12 +163,12 @@ fn d50_heartbeat_of_the_pc() {
     board.receive(now, &frame("680#"));
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
-    // At that very time it is too late.
+    // A heartbeat at exactly that time is too late.
     board.receive(now + 1500 * MS, &frame("680#"));
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// What comes up while a frame is with the controller goes at once when that has left: the board does not sleep over it.
+/// A frame that becomes due while another is with the controller is offered at once when that has left: the board does not sleep.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -216,7 +216,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
         assert!(board.next_deadline() <= now, "{what}: {} at {now}", board.next_deadline());
         assert_eq!(board.poll(now), Some(frame(expected)), "{what}");
     }
-    // The acknowledge itself, behind an error.
+    // The acknowledgement itself, after an error.
     let mut bus = Bus::initialised();
     bus.hold = |_| true;
     bus.send("1C1#00");
@@ -238,7 +238,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     }
 }
 
-/// D-36: after the last package of a dump the board has nothing to do, whatever the number of inputs.
+/// D-36: after the last package of a dump the board has nothing to do, for any number of inputs.
 #[test]
 fn d36_a_dump_ends_with_its_last_package() {
     for (dimension, packages) in [(0, 0), (1, 1), (2, 1), (3, 1), (4, 2), (6, 2), (7, 3)] {
@@ -263,7 +263,7 @@ fn d36_a_dump_ends_with_its_last_package() {
     }
 }
 
-/// D-14: the packages of an answer follow one another without a pause, and after the last there is nothing to do at once.
+/// D-14: the packages of an answer follow one another without a pause, and after the last package nothing is due at once.
 #[test]
 fn d14_packages_follow_back_to_back() {
     type Case = (&'static str, fn() -> Bus, &'static str, u16, usize);
@@ -306,8 +306,8 @@ fn d14_packages_follow_back_to_back() {
     }
 }
 
-/// D-42, D-44: what follows the last block of an update step by step: each short, the flash is asked every 500 µs, and reading
-/// back goes on without a pause, 1024 bytes at a time.
+/// D-42, D-44: the steps after the last block of an update. Each step is short, and the flash is polled every 500 µs. Reading back goes
+/// on without a pause, 1024 bytes at a time.
 #[test]
 fn d44_steps_after_the_last_block() {
     let mut bus = Bus::initialised();
@@ -333,7 +333,7 @@ fn d44_steps_after_the_last_block() {
         }
     };
     assert_eq!(finished, frame("101#"));
-    // Look at the block, its write, three pieces read back, and the record begun and done.
+    // The block is processed and written, three pieces are read back, and the record is begun and done.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 

@@ -1,4 +1,4 @@
-//! Updates with trouble: power loss at each flash operation, each frame lost once, failing flash; other plans.
+//! Updates with faults: power loss at each flash operation, each frame lost once, failing flash; other plans.
 
 use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
@@ -6,12 +6,12 @@ use ucom::{Checksum, Memory, Profile, Status};
 
 use super::bus::{Bus, GOLDEN, blocks, frames, header, image};
 
-/// 200 bytes: four data blocks, the last one short.
+/// Returns 200 bytes: four data blocks, the last one short.
 pub fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
-/// Sends everything as a PC without eyes would, waiting for an answer to each block; `true` when FINISHED came.
+/// Sends all blocks blindly, waiting for an answer after each block. Returns `true` if FINISHED came.
 pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
@@ -26,7 +26,7 @@ pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     finished
 }
 
-/// Whether what the board calls valid is a whole image: the old one or the new one.
+/// Checks that the record of a valid application belongs to a whole image: the old one or the new one.
 pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
@@ -37,7 +37,7 @@ pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     }
 }
 
-/// D-45, D-46: the power goes in the middle of each flash operation in turn.
+/// D-45, D-46: power loss in the middle of each flash operation in turn.
 #[test]
 fn d45_power_loss_at_every_flash_operation() {
     let image = small();
@@ -59,7 +59,7 @@ fn d45_power_loss_at_every_flash_operation() {
         assert_eq!(bus.boards[0].status(), Status(0x11), "cut {cut}: S1");
         assert_no_half_image(&bus, &image, &format!("cut {cut}"));
         assert!(!bus.boards[0].has_application(), "cut {cut}");
-        // And it can be programmed again.
+        // The board can be programmed again.
         bus.take();
         bus.number(1);
         assert!(update(&mut bus, &all), "again after cut {cut}");
@@ -99,7 +99,7 @@ fn d43_every_frame_lost_once() {
     for lost in first..whole.frames_to_boards {
         let mut bus = Bus::initialised();
         bus.lose_to_boards = Some(lost);
-        // Without PC_XRESET nothing is taken at all; without a data frame the checks fail.
+        // Without PC_XRESET the board takes no block; without a data frame the checks fail.
         assert!(!update(&mut bus, &all), "lost {}", lost - first);
         bus.run(1000);
         assert_no_half_image(&bus, &image, &format!("lost {}", lost - first));
@@ -118,7 +118,7 @@ fn d43_every_frame_lost_once() {
     }
 }
 
-/// Error 3, and whose application is then valid.
+/// Error 3, and the application that is valid afterwards.
 #[test]
 fn d45_failing_flash() {
     let all = blocks(&small(), &Profile::default());
@@ -134,7 +134,7 @@ fn d45_failing_flash() {
     }
 }
 
-/// D-43: the block is in use until READY has left the controller.
+/// D-43: the block buffer is in use until READY has left the controller.
 #[test]
 fn d43_frame_before_ready_has_left() {
     let mut bus = Bus::initialised();
@@ -147,7 +147,7 @@ fn d43_frame_before_ready_has_left() {
     assert_eq!(bus.take(), frames("181# 081#04"));
 }
 
-/// D-44: what is in the flash must have the Program ID, not only what came.
+/// D-44: the flash itself must have the Program ID, not only the received data.
 #[test]
 fn d44_flash_is_read_back() {
     let image = small();
@@ -213,7 +213,7 @@ fn d40_exloader_then_application() {
     assert_eq!(bus.boards[0].flash.bytes(Memory::Ram)[..120], exloader);
     assert_no_half_image(&bus, &image, "");
     assert_eq!(bus.boards[0].record().unwrap().program_id, second.program_id);
-    // An exloader does not go to flash.
+    // An exloader is not written to flash.
     bus.send("041#");
     assert_eq!(bus.block(&header(&image, 1, &profile).build(Endian::Little), 5), frames("081#02"));
 }
@@ -222,7 +222,7 @@ pub fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 
-/// D-40: the plan pmem-xmem: two memories, one application, valid when both are there.
+/// D-40: the plan pmem-xmem: two memories, one application, valid when both are written.
 #[test]
 fn d40_program_then_data_memory() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
@@ -250,7 +250,7 @@ fn d40_program_then_data_memory() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, first.program_id);
 }
 
-/// D-41: without header blocks the board knows the length by itself, and finds the Program ID by itself.
+/// D-41: without header blocks the board knows the length and computes the Program ID by itself.
 #[test]
 fn d41_no_header() {
     let profile = Profile { prog_header: HeaderForm::None, ..Profile::default() };
@@ -277,7 +277,7 @@ fn d41_no_header() {
     assert_no_half_image(&bus, &image, "");
     let id = ucom::checksum(Checksum::Crc16, Endian::Little, &image);
     assert_eq!(bus.boards[0].record().unwrap().program_id, id);
-    // Two cycles that differ are noticed.
+    // A difference between the two cycles is detected.
     bus.send("041#");
     let mut other = image.clone();
     other[3] ^= 1;
@@ -308,7 +308,7 @@ fn d44_update_in_other_profiles() {
     }
 }
 
-/// D-40: raw, two different files as their headers require; the first is only checked.
+/// D-40: the plan raw takes two different files as their headers require; the first is only checked.
 #[test]
 fn d40_raw_takes_two_files() {
     let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };
@@ -326,7 +326,7 @@ fn d40_raw_takes_two_files() {
     assert_no_half_image(&bus, &two, "");
 }
 
-/// D-43: reordered frames of a block (adapters with several mailboxes do that) are found by the checksum.
+/// D-43: the checksum detects reordered frames of a block, as adapters with several mailboxes send them.
 #[test]
 fn d43_reordered_frames_are_refused() {
     let image = small();

@@ -8,7 +8,7 @@ use ucom_sim::memory::MemoryFlash;
 use super::bus::{Board, Bus, blocks, frames, header, image};
 use super::update::{data as data_blocks, small, update};
 
-/// One board with number 1 whose images have no header blocks and are as long as `small`.
+/// A board with number 1 whose images have no header blocks and are as long as `small`.
 fn headerless(plan: Plan) -> Bus {
     headerless_in(MemoryFlash::default(), plan, 100)
 }
@@ -24,7 +24,7 @@ fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     bus
 }
 
-/// D-40, D-41: without header blocks each plan knows by itself where its cycles go, and whose Program ID counts.
+/// D-40, D-41: without header blocks each plan determines the memories of its cycles and the image whose Program ID counts.
 #[test]
 fn d41_no_header_in_every_plan() {
     let (one, two) = ([0x5A; 200].to_vec(), small());
@@ -51,7 +51,7 @@ fn d41_no_header_in_every_plan() {
     }
 }
 
-/// D-41: an image without header is as long as the board is configured to have it, never longer than the area, and starts where that does.
+/// D-41: an image without a header has the configured length, limited to that of the area, and starts at the area's start.
 #[test]
 fn d41_no_header_fills_the_area() {
     let image: Vec<u8> = (0..128).collect();
@@ -70,7 +70,7 @@ fn d41_no_header_fills_the_area() {
     }
 }
 
-/// D-44: with the checksum `none` the number in the header is taken as it is, and shown.
+/// D-44: with the checksum `none` the board takes the number in the header as it is, and shows it.
 #[test]
 fn d44_program_id_as_the_header_says() {
     let profile = Profile { prog_checksum: Checksum::None, ..Profile::default() };
@@ -103,7 +103,7 @@ fn d43_silence_lasts_until_programming_is_enabled_again() {
     assert_eq!(bus.block(&all[0], 5), frames("181#"));
 }
 
-/// D-40, D-41: which headers a board takes in the first cycle, plan by plan, and with which error it refuses the others.
+/// D-40, D-41: for each plan, headers that a board takes in the first cycle, and the error code for a refused header.
 #[test]
 fn d41_headers_of_the_first_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -136,7 +136,7 @@ fn d41_headers_of_the_first_cycle() {
     }
 }
 
-/// D-40, D-41: the same for the second cycle, after a good first one.
+/// D-40, D-41: likewise for the second cycle, after a good first cycle.
 #[test]
 fn d41_headers_of_the_second_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -167,7 +167,7 @@ fn d41_headers_of_the_second_cycle() {
     }
 }
 
-/// A board that has taken the first of these blocks, and whose READY has not left.
+/// A board that has taken the first block, and whose READY has not left; the blocks.
 fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     let all = blocks(&small(), &Profile::default());
     let mut bus = Bus::initialised();
@@ -177,14 +177,14 @@ fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     (bus, all)
 }
 
-/// The frames of a block, all at one moment.
+/// Delivers the frames of a block, all at one moment.
 fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
     for data in block.chunks_exact(8) {
         bus.boards[0].receive(bus.now, &ucom::Frame::new(0x2C1, data).unwrap());
     }
 }
 
-/// D-43: a READY that the controller gave up is over, too: the block buffer is free, and the PC may send again.
+/// D-43: a READY that the controller gave up frees the block buffer, too, and the PC may send again.
 #[test]
 fn d43_ready_that_was_given_up() {
     let (mut bus, all) = ready_held();
@@ -198,8 +198,8 @@ fn d43_ready_that_was_given_up() {
     assert_eq!(bus.block(&all[2], 10), frames("181#"));
 }
 
-/// D-43: the READY of a transfer that was given up leaves while the first block of the next is looked at, and takes nothing
-/// from it.
+/// D-43: the READY of a cancelled transfer leaves while the first block of the next transfer is processed. The board takes that block
+/// nevertheless.
 #[test]
 fn d43_ready_of_the_transfer_before() {
     let (mut bus, all) = ready_held();
@@ -211,7 +211,7 @@ fn d43_ready_of_the_transfer_before() {
     assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
 }
 
-/// D-42: without header blocks, too, a block is taken as soon as its time is over.
+/// D-42: a block without header is also taken as soon as its time has passed.
 #[test]
 fn d42_block_time_without_header() {
     let mut bus = headerless(Plan::VerifyWrite);
@@ -221,7 +221,7 @@ fn d42_block_time_without_header() {
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 
-/// D-23, D-42: a READY that still waits when its transfer is given up is not sent: it would be taken for one of the next.
+/// D-23, D-42: a READY that still waits when its transfer is cancelled is not sent: the PC would take it for one of the next transfer.
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {
     let all = blocks(&small(), &Profile::default());

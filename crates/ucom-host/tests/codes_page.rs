@@ -1,4 +1,4 @@
-//! The part of docs/codes.md about boards has the words of `ucom explain`. `UPDATE_DOCS=1` writes it again.
+//! Compares the part of docs/codes.md about boards with the words of `ucom explain`. `UPDATE_DOCS=1` writes that part again.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! The bodies of the fuzz targets over the inputs that are kept, over some made by hand, and over some at random.
+//! Runs the bodies of the fuzz targets on the kept inputs, on some made by hand, and on random ones.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};

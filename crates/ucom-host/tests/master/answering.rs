@@ -1,10 +1,10 @@
-//! A member that is made for one test and answers by a rule of its own.
+//! A member for one test that answers by a rule of its own.
 
 use ucom::Frame;
 
 use super::bench::{Member, frame};
 
-/// Gives the answers to a frame. They are due 300 µs after it, each 1 µs after the one before.
+/// Answers a frame by a rule. The first answer is due 300 µs after the frame, each further answer 1 µs after the previous one.
 pub struct Answering<A> {
     answers: A,
     out: Vec<(u64, Frame)>,

@@ -11,13 +11,13 @@ pub use super::script::Script;
 /// Microseconds of a millisecond.
 pub const MS: u64 = 1000;
 
-/// Somebody on the bus beside the master.
+/// Participant on the bus other than the master.
 pub trait Member {
     fn poll(&mut self, now: u64) -> Option<Frame>;
     fn sent(&mut self, now: u64, frame: &Frame);
     fn receive(&mut self, now: u64, frame: &Frame);
     fn deadline(&self) -> u64;
-    /// The board behind it.
+    /// The board that answers for this member, if any.
     fn board(&mut self) -> Option<&mut TestNode> {
         None
     }
@@ -47,20 +47,20 @@ pub fn frame(text: &str) -> Frame {
     text.parse().unwrap_or_else(|e| panic!("{text}: {e}"))
 }
 
-/// What happens to one frame on its way.
+/// Fault of one frame during transmission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     Lost,
     Doubled,
-    /// It arrives after the next one.
+    /// The frame arrives after the next frame.
     Swapped,
-    /// ms.
+    /// Delay, ms.
     Delayed(u64),
-    /// A bit of the data, or of the identifier where there are none.
+    /// A bit of the data, or of the identifier if the frame has no data.
     Corrupted(u8),
 }
 
-/// Who sent a frame.
+/// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum From {
     Master,
@@ -76,15 +76,15 @@ pub struct Bench {
     pub events: Vec<(u64, Event)>,
     /// Frame number and its fault.
     pub fault: Option<(usize, Fault)>,
-    /// Frames with these beginnings are lost, each so often; `<` is the master, `>` a board.
+    /// Beginnings of frames that are lost, and how many of each; `<` is the master, `>` a board.
     pub lose: Vec<(&'static str, u32)>,
-    /// Nothing arrives any more at members or at the master.
+    /// Members that are cut off: no frame reaches them, and none of their frames arrives.
     pub cut: Vec<usize>,
     pending_master: Option<Frame>,
     pending: Vec<Option<Frame>>,
     held: Option<(From, Frame)>,
     delayed: Vec<(u64, From, Frame)>,
-    /// The driver is dead (killed tool).
+    /// The driver is dead, as after the tool was killed.
     pub dead: bool,
 }
 
@@ -108,7 +108,7 @@ impl Bench {
         }
     }
 
-    /// One more on the bus.
+    /// Adds a member to the bus.
     pub fn join(&mut self, member: Box<dyn Member>) {
         self.members.push(member);
         self.pending.push(None);
@@ -118,7 +118,7 @@ impl Bench {
         Self::new(Profile::default(), vec![Box::new(script)])
     }
 
-    /// A chain of real boards with an application each.
+    /// A chain of real boards, each with an application.
     pub fn chain(flash_ids: &[u16]) -> Self {
         Self::chain_with(flash_ids, Profile::default())
     }
@@ -130,7 +130,7 @@ impl Bench {
         Self::new(profile, boards.collect())
     }
 
-    /// One frame over the bus, or a step in time; `false`: nothing happens before `limit`.
+    /// Transfers one frame over the bus, or advances the time by a step; `false` if nothing happens before `limit`.
     fn step(&mut self, limit: u64) -> bool {
         self.deliver_delayed();
         if self.pending_master.is_none() && !self.dead {
@@ -228,14 +228,14 @@ impl Bench {
         while self.now < until && self.step(until) {}
     }
 
-    /// Lets time pass until this is so.
+    /// Lets time pass until `done` returns `true`.
     pub fn until(&mut self, done: impl Fn(&Self) -> bool) {
         while !done(self) {
             self.run(1);
         }
     }
 
-    /// Starts a procedure and waits for its end; panics when it takes more than `limit_s` of virtual time.
+    /// Starts a procedure and waits for its end. Panics if it takes more than `limit_s` of virtual time.
     pub fn go(&mut self, request: Request, limit_s: u64) -> Result<Outcome, ucom_host::master::Error> {
         let id = self.master.start(self.now, request).expect("nothing else is under way");
         self.wait(id, limit_s)
@@ -260,7 +260,7 @@ impl Bench {
         }
     }
 
-    /// What the master sent, as text.
+    /// Frames that the master sent, as text.
     pub fn sent(&self) -> Vec<String> {
         self.log.iter().filter(|(_, from, _)| *from == From::Master).map(|(.., f)| f.to_string()).collect()
     }
@@ -279,7 +279,7 @@ impl Bench {
         self.times_of(text).len()
     }
 
-    /// How many frames that begin so were on the bus, whoever sent them.
+    /// Number of frames from any sender that begin with `start`.
     pub fn beginning(&self, start: &str) -> usize {
         self.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
     }
@@ -289,7 +289,7 @@ impl Bench {
     }
 }
 
-/// One bit is wrong: behind a gateway that has computed a new check.
+/// Returns the frame with one wrong bit, as a gateway sends it that computes a new check.
 fn corrupted(frame: &Frame, bit: u8) -> Frame {
     if frame.dlc() == 0 {
         return Frame::new(frame.id() ^ 1 << (bit % 11), &[]).unwrap();
@@ -305,7 +305,7 @@ pub const CI: [&str; 2] = ["target velocity", "current limit"];
 pub const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
 pub const PAR: [&str; 3] = ["P", "I", "D"];
 
-/// The program that every board of the bench has: an id and a date.
+/// Program ID and date of the program that every board of the bench has.
 pub const OLD: (u16, u16) = (0x1234, 0x386E);
 
 pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {

@@ -1,4 +1,4 @@
-//! A competing master's heartbeats for single boards (D-08), and single boards that are reset.
+//! Heartbeats of a competing master for single boards (D-08), and resets of single boards.
 
 use super::bench::Exit;
 use ucom::Profile;
@@ -15,8 +15,8 @@ fn has_competing_master(bench: &Bench) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
 }
 
-/// D-08: before the first intrusive command a heartbeat under a board's number is the board's own if that is started,
-/// another PC's if it is not; a board that does not answer decides nothing.
+/// D-08: a heartbeat under a board's number before the first intrusive command. The heartbeat is the board's own if the board is started,
+/// and another PC's if it is not. A board that does not answer decides nothing.
 #[test]
 fn d08_whose_heartbeat_is_it() {
     for (status, refused) in [(Some("8B"), false), (Some("AB"), false), (Some("1B"), true), (None, false)] {
@@ -36,8 +36,8 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: while this PC is master, another one's heartbeats for a board that is not started are reported; they do not make
-/// anybody wait for more of them, and a board that is started by us is not mistaken for a PC.
+/// D-08, D-51: this PC is master and another PC sends heartbeats for a board that is not started. The master reports them, and does not
+/// expect more of them. It does not take a board that it has started itself for a PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -54,7 +54,7 @@ fn d08_d51_heartbeats_of_another_pc() {
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
 }
 
-/// D-25: a board that starts its application by itself is no competing master, nor is one that is stopped and started.
+/// D-25: a board that starts its application by itself does not count as a competing master, nor does one that is stopped and started.
 #[test]
 fn d08_d25_no_board_is_mistaken_for_a_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -77,7 +77,7 @@ fn reset(board: u8) -> Request {
     Request::Reset { board: Some(board), force: false }
 }
 
-/// The reset of one board: it must be there before, and without its number after that. Nothing is sent to nobody.
+/// The reset of one board: the board must answer before, and have no number afterwards. The master sends no reset to a missing board.
 #[test]
 fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -89,7 +89,7 @@ fn a_single_reset_is_checked() {
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
-    // Whatever single frame of it is lost: done, or the board still has its number and that is reported.
+    // After the loss of any single frame either the reset is done, or the board still has its number and the error reports that.
     let mut whole = initialised(&[0x21, 0x42, 0x63]);
     let from = whole.log.len();
     whole.go(reset(2), 10).unwrap();
@@ -109,7 +109,7 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // It reset, but nothing of it is received any more.
+    // The board has reset, but none of its frames arrive any more.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();
@@ -119,7 +119,7 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// The driver is behind: what it has not handed over yet is not taken for silence, and heartbeats go out all the same.
+/// A driver that lags: the master does not take frames that it has not delivered yet for silence, and still sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());
@@ -135,7 +135,7 @@ fn d50_a_driver_that_is_behind() {
     assert_eq!((alive, asked), (6, 1), "the question is not repeated");
     master.handle(3_000 * MS, Ok(frame("141#2100011B34126E38")));
     master.handle(3_000 * MS, Ok(frame("141#0000")));
-    // Nobody else answers until the time for it has passed.
+    // The question is not repeated before its timeout.
     for ms in 3_000..3_200 {
         while let Some(sent) = master.poll(ms * MS) {
             assert_ne!(sent, frame("201#"), "the question is not repeated");

@@ -1,4 +1,4 @@
-//! The conformance tests: boards of this crate pass them all, and each mistake is found by the test that is meant for it.
+//! The conformance tests: boards of this crate pass all of them, and each mistake is found by its own test.
 
 use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +14,7 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, TestNode, frame, image, node};
 
-/// Everything that is allowed.
+/// Options that allow everything.
 pub fn all() -> ConformanceOptions {
     let program = ConformanceProgram {
         board: 1,
@@ -42,7 +42,7 @@ fn failed(report: &ConformanceReport) -> Vec<String> {
     failed.map(|t| format!("{} {:?} {:?}", t.id, t.board, t.verdict)).collect()
 }
 
-/// Every test, in both byte orders; only what needs a special bus is left out.
+/// Runs every test in both byte orders. Only tests that need a special bus are left out.
 #[test]
 fn boards_of_this_crate_pass_every_test() {
     for endian in [Endian::Little, Endian::Big] {
@@ -52,7 +52,7 @@ fn boards_of_this_crate_pass_every_test() {
         assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
         let skipped: Vec<&str> =
             report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
-        // Nothing is started when the asking tests come.
+        // No application runs yet when the tests that only send questions come.
         assert_eq!(
             skipped,
             ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
@@ -68,7 +68,7 @@ fn boards_of_this_crate_pass_every_test() {
     }
 }
 
-/// What is not allowed does not happen: the frames of a run without options.
+/// Actions that are not allowed do not happen: the frames of a run without options.
 #[test]
 fn without_options_only_harmless_frames_leave() {
     let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
@@ -79,10 +79,10 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // PC_INFO, PC_REPORT, a number that the board has already, dumps; heartbeats go on as `start` began them.
+        // PC_INFO, PC_REPORT, a number that the board already has, dumps; heartbeats continue because of `start`.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
-            // A number is given only to a board that has just reported it.
+            // PC_INIT goes only to a board that has just reported that number.
             assert_eq!(last, u16::from(Function::Info.number()) << 6 | frame.id() & 31, "{frame}");
         }
         if function != 26 {
@@ -117,7 +117,7 @@ struct Flawed {
     count: usize,
 }
 
-/// What becomes of a frame that the board receives or sends.
+/// Frames that replace a frame that the board receives or sends.
 #[derive(Clone, Copy)]
 struct Mistake {
     receives: fn(&TestNode, &Frame) -> Vec<Frame>,
@@ -191,7 +191,7 @@ fn with(mistake: Mistake) -> Bench {
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
         ("D-T1", sends(|_, f, _| if f.id() == 0x441 { vec![*f, *f] } else { vec![*f] })),
-        // Every second report does not come.
+        // Every second report is missing.
         ("D-T2", sends(|_, f, n| if f.id() == 0x441 && n % 2 == 0 { vec![] } else { vec![*f] })),
         // A request without a number is answered with an error.
         (
@@ -204,7 +204,7 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T4",
             receives(|_, f| {
-                // The chain must be numbered before; it is the second time that fails.
+                // The chain must be numbered before, so only the second request is lost.
                 static RECEIVED: AtomicUsize = AtomicUsize::new(0);
                 let raised = f.to_string() == "1C1#0202";
                 if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
@@ -213,7 +213,7 @@ fn each_mistake_is_found_by_its_test() {
         ("D-T5", receives(|b, f| if b.number().is_some() && f.id() == 0x281 { vec![] } else { vec![*f] })),
         // The value is masked.
         ("D-T6", receives(|_, f| if f.to_string() == "1C1#0040" { vec![] } else { vec![*f] })),
-        // MSTART goes with EXLRUN.
+        // MSTART follows EXLRUN.
         (
             "D-T7",
             receives(|_, f| if f.to_string() == "1C1#1000" { vec![frame("1C1#4040")] } else { vec![*f] }),
@@ -259,7 +259,7 @@ fn each_mistake_is_found_by_its_test() {
     ];
     for (id, mistake) in mistakes {
         let mut bench = with(mistake);
-        // A board that does not follow the numbers is numbered by hand.
+        // A chain with a board that does not take its number is numbered by hand.
         if bench.go(Request::Init(InitOptions::default()), 60).is_err() {
             panic!("{id}: no numbers");
         }

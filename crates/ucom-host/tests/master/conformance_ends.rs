@@ -1,5 +1,5 @@
-//! The conformance tests leave boards as they were found: at their end, when they are cancelled, when a board is gone. And
-//! what they refuse.
+//! The conformance tests leave boards as they were found: at their end, after a cancel, and when a board disconnects. Also requests that
+//! they refuse.
 
 use super::bench::Exit;
 use ucom::{Function, Status};
@@ -32,7 +32,7 @@ fn chain() -> Bench {
     bench
 }
 
-/// What must be as before: number, flash number, and ASTART, MSTART, MCARUN, PROG.
+/// Returns what must be as before: a board's flash number and its bits ASTART, MSTART, MCARUN and PROG.
 fn state(bench: &mut Bench, board: u8) -> (u16, Status) {
     let seen = info(bench, board).info;
     let bits = Status::ASTART | Status::MSTART | Status::MCARUN | Status::PROG;
@@ -47,7 +47,7 @@ fn done(bench: &Bench, id: ProcedureId) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::Done { id: which, .. } if *which == id))
 }
 
-/// Goes on until so many frames were on the bus or the procedure has ended.
+/// Runs until `frames` frames were on the bus or the procedure has ended.
 fn until(bench: &mut Bench, id: ProcedureId, frames: usize) {
     while bench.log.len() < frames && !done(bench, id) {
         bench.run(1);
@@ -65,8 +65,8 @@ fn report(bench: &mut Bench, id: ProcedureId) -> ConformanceReport {
     }
 }
 
-/// Cancelled at moments all over the tests: ASTART, MSTART, MCARUN, PROG and the numbers are as before, the report is there,
-/// and a board that was erased is named.
+/// Cancels at moments all over the tests: ASTART, MSTART, MCARUN, PROG and the numbers are as before. The report is complete and names a
+/// board that was erased.
 #[test]
 fn cancelled_tests_leave_the_boards_as_they_were() {
     let mut bench = chain();
@@ -87,7 +87,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let result = bench.wait(id, 200);
         let report = match result {
             Ok(Outcome::Conformance(report)) => report,
-            // Before the first test nothing was changed.
+            // Before the first test nothing has changed.
             Err(Error::Master(MasterError::Cancelled)) => {
                 assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment}");
                 continue;
@@ -104,13 +104,14 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let named = report.left.iter().any(|l| l.starts_with("board 1 has no program now"));
         assert_eq!(named, programless, "moment {moment}: {:?}", report.left);
         assert_eq!(report.left.len(), usize::from(named), "moment {moment}: {:?}", report.left);
-        // What may be coming up by itself has come up by then.
+        // By now a board that starts by itself is up.
         bench.run(4_000);
         assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment} {:?}", report.tests.last());
     }
 }
 
-/// A board that is gone in the middle: exit 3, the rest is skipped with the reason, the other boards are as before.
+/// A board disconnects during the tests: exit code 3, the remaining tests are skipped with the reason, and the other boards are as
+/// before.
 #[test]
 fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     let mut bench = chain();
@@ -134,7 +135,7 @@ fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     assert_eq!(states(&mut bench, &[1, 3]), before);
 }
 
-/// A board without its number: a new address assignment would test another board than the one that is meant, so nothing is done.
+/// A board has no number: a new address assignment could test another board than the named one, so the request is refused.
 #[test]
 fn address_assignment_is_refused_when_a_board_has_no_number() {
     let mut bench = chain();
@@ -149,7 +150,7 @@ fn address_assignment_is_refused_when_a_board_has_no_number() {
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
 }
 
-/// Only the board that is named is programmed, its header has its flash number and the image's address.
+/// Only the named board is programmed. Its header has its flash number and the image's address.
 #[test]
 fn programs_the_board_that_is_named_alone() {
     let mut bench = chain();
@@ -177,7 +178,7 @@ fn programs_the_board_that_is_named_alone() {
         }
     }
     assert_eq!((&header[8..12], &header[20..22]), (&[0x40, 0, 1, 0][..], &[0x21, 0][..]));
-    // U-2: a board that runs, tested or not.
+    // U-2: any board that runs, even one outside the test.
     let run = RunOptions { boards: vec![RunBoard { board: 2, ..Default::default() }], ..Default::default() };
     bench.go(Request::Run(run), 20).unwrap();
     let tested = ConformanceOptions { boards: vec![1], ..options(0x21) };

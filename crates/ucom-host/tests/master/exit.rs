@@ -1,4 +1,4 @@
-//! The exit code that the command `ucom` makes of what the master reports.
+//! Exit codes of the command `ucom` for the reports of the master.
 
 use ucom_host::master::conformance::ConformanceReport;
 use ucom_host::master::update::UpdateReport;

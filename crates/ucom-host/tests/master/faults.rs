@@ -1,5 +1,5 @@
-//! Faults on every single frame of scan, init and process data: success or a named error, never a wrong number, never a
-//! hang (every wait is bounded in virtual time).
+//! Faults on every single frame of scan, init and process data: the result is success or a named error, never a wrong number and never a
+//! hang. Every wait is bounded in virtual time.
 
 use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
@@ -8,7 +8,7 @@ use super::chain::initialised;
 
 const IDS: [u16; 3] = [0x21, 0x42, 0x63];
 
-/// Every kind for frame `at`; the bit that is damaged follows from the frame's number.
+/// Every kind of fault for frame `at`; the frame's number determines the damaged bit.
 pub fn kinds(at: usize) -> [Fault; 6] {
     let bit = (at * 7 + 3) as u8;
     [
@@ -21,7 +21,7 @@ pub fn kinds(at: usize) -> [Fault; 6] {
     ]
 }
 
-/// No two boards have one number, and the report shows what the boards are.
+/// Checks that no two boards have one number.
 fn check_numbers(bench: &mut Bench, what: &str) {
     let numbers: Vec<_> = (0..IDS.len()).filter_map(|i| bench.board(i).number()).collect();
     let mut unique = numbers.clone();
@@ -51,7 +51,7 @@ fn every_frame_of_an_init_disturbed() {
                 complete += 1;
             } else {
                 named += 1;
-                // One frame that was merely lost, doubled or late never leaves a chain incomplete.
+                // A single frame that was only lost, doubled or late never leaves a chain incomplete.
                 assert!(matches!(fault, Fault::Corrupted(_)), "{what}: {:?}", report.findings);
             }
         }
@@ -82,14 +82,14 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // A request that became a reset: then the boards have no numbers, and the scan reports it.
+                // A request was damaged into a reset: the boards have no numbers, and the scan reports it.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }
     }
 }
 
-/// From the exloader to running outputs: descriptions are right or not accepted.
+/// From the exloader to running outputs: a description is right or is not accepted.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

@@ -1,4 +1,4 @@
-//! What the fuzzers found, and what they keep, on the stable toolchain.
+//! Inputs that the fuzzers found or keep, run with the stable toolchain.
 
 use std::path::Path;
 
@@ -8,14 +8,14 @@ fn kept(target: &str, body: fn(&[u8])) {
         for file in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let bytes = std::fs::read(file.path()).unwrap();
             body(&bytes);
-            // Texts are short: each cut short, and each without one of its bytes.
+            // Texts are short: try each prefix, and each text without one of its bytes.
             for at in 0..bytes.len().min(600) {
                 body(&bytes[..at]);
                 body(&[&bytes[..at], &bytes[at + 1..]].concat());
             }
         }
     }
-    // The same bytes in every run.
+    // The random bytes are equal in every run.
     let mut state = 0x2545_F491_u32;
     let mut next = || {
         state ^= state << 13;

@@ -1,16 +1,16 @@
-//! A board as a table of frames that takes program data.
+//! A board that takes program data, as a table of frames.
 
 use ucom::Frame;
 
 use super::bench::{Bench, MS, Member};
 
-/// A board as a table: takes every block; the last rule defines what ends the update.
+/// A board as a table. The board takes every block; the last rule defines the end of the update.
 pub struct Loader {
-    /// `DSP_INFO` before and after.
+    /// Program ID and date in `DSP_INFO` before and after the update.
     pub info: [&'static str; 2],
-    /// Its flash number as it is sent, by resets so far and whether the transfer was cancelled since.
+    /// Flash number that the board sends, by resets so far and whether the transfer was cancelled since.
     pub flash: fn(usize, bool) -> &'static str,
-    /// Its status when all blocks have come.
+    /// Status of the board when all blocks have come.
     pub done_status: u8,
     pub blocks: usize,
     pub cancelled: bool,
@@ -19,9 +19,9 @@ pub struct Loader {
     pub resets: usize,
     /// Delay of READY, ms, by block.
     pub delay: fn(usize) -> u64,
-    /// Answer to a block instead of READY; empty: none.
+    /// Answer to a block instead of READY; an empty text means no answer.
     pub special: fn(usize, usize) -> Option<&'static str>,
-    /// After this frame the board complains at once and takes no more.
+    /// Frame after which the board sends an error at once and takes no more.
     pub refuses_at: Option<usize>,
     pub out: Vec<(u64, Frame)>,
     pub waiting: bool,

@@ -1,4 +1,4 @@
-//! Losses of chosen frames, several at once: what a single fault does not reach.
+//! Losses of several chosen frames at once, which a single fault does not cover.
 
 use ucom::Profile;
 use ucom::node::Phase;
@@ -16,8 +16,8 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledge is lost and so is the beginning of DSP_INFO: what still comes under the number shows that it
-/// is taken. Boards that raise their pin by themselves would take it twice.
+/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The frames that still come under the number show that a board
+/// has taken it. Boards that raise their pin by themselves would take the number twice.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };
@@ -28,7 +28,7 @@ fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     assert_eq!(numbers, [Some(1), Some(2), Some(3)], "{result:?}");
 }
 
-/// D-46, U-4: PC_XRESET has no answer; while the application still runs it is sent again.
+/// D-46, U-4: PC_XRESET has no answer. The master sends it again while the application still runs.
 #[test]
 fn d46_a_lost_xreset_is_repeated() {
     let mut bench = initialised(&[0x21]);
@@ -39,7 +39,7 @@ fn d46_a_lost_xreset_is_repeated() {
     assert_eq!(report.boards[0].attempts, 1);
 }
 
-/// A board whose answers do not arrive is stopped all the same.
+/// A board whose answers do not arrive is stopped nevertheless.
 #[test]
 fn a_stop_does_not_depend_on_answers() {
     for lost in ["> 141#", "> 601#"] {
@@ -53,7 +53,7 @@ fn a_stop_does_not_depend_on_answers() {
     }
 }
 
-/// D-51: the stop of all is one frame, and that can be lost, too.
+/// D-51: the stop of all boards is one frame, which can be lost as well.
 #[test]
 fn d51_a_lost_stop_is_repeated() {
     let mut bench = running(&[1, 2], &[0x21, 0x42]);

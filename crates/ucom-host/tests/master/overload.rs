@@ -1,4 +1,4 @@
-//! Started with force on a bus that cannot carry all inputs: heartbeats go out all the same, and what is sent is fresh.
+//! Boards that were started with force on a bus that cannot carry all inputs: heartbeats keep their time, and inputs are fresh.
 
 use std::collections::VecDeque;
 
@@ -9,7 +9,7 @@ use super::bench::{Bench, CI, MS, frame};
 
 const BOARDS: u8 = 8;
 
-/// Eight boards at work whose inputs alone are 108 % of the bus.
+/// Eight running boards whose inputs alone need 108 % of the bus.
 fn overloaded() -> Bench {
     let profile = Profile { ci_period: 1, so_period: 1000, ..Profile::default() };
     let ids: Vec<u16> = (1..=BOARDS.into()).collect();
@@ -21,7 +21,7 @@ fn overloaded() -> Bench {
     bench
 }
 
-/// D-34, D-50: inputs that wait are not queued again, so a change reaches its board soon however long the load lasts, and
+/// D-34, D-50: inputs that wait are not queued again. A change therefore reaches its board soon, even after a long overload, and
 /// heartbeats keep their time.
 #[test]
 fn d34_d50_inputs_that_wait_are_never_stale() {
@@ -46,8 +46,8 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     }
 }
 
-/// D-50: behind the master there are more queues, as a socket's. What is handed to them is no more than the bus carries, or
-/// heartbeats would wait there behind inputs.
+/// D-50: below the master there are more queues, such as a socket's. The master hands them no more inputs than the bus carries; otherwise
+/// heartbeats would wait after inputs in those queues.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
@@ -84,7 +84,7 @@ fn d50_no_more_inputs_than_the_bus_carries() {
     assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
-/// D-34: a driver that gets rid of one frame in 20 ms has at most one package of each board's inputs waiting, as it is then.
+/// D-34: with a driver that sends one frame in 20 ms, at most one package of each board's inputs waits, with the latest values.
 #[test]
 fn d34_a_slow_driver_has_a_short_queue() {
     let mut bench = overloaded();

@@ -14,7 +14,7 @@ use super::bench::{Bench, image};
 use super::chain::initialised;
 use super::update::options;
 
-/// P-20: boards with other readings give them away; the profile found is theirs.
+/// P-20: the answers of boards with other profiles reveal these, and the probe finds the right profile.
 #[test]
 fn p20_probe_finds_the_profile() {
     let others = [
@@ -39,7 +39,7 @@ fn p20_probe_finds_the_profile() {
     ];
     for profile in others {
         let mut bench = Bench::chain_with(&[0x21, 0x42, 0x63], profile);
-        // The tool starts from the defaults.
+        // The tool begins with the defaults.
         bench.master = ucom_host::master::Master::new(Profile::default());
         let probe = Request::Probe(ProbeOptions { init: true, ..Default::default() });
         let Ok(Outcome::Probe(report)) = bench.go(probe, 120) else { panic!() };
@@ -48,7 +48,7 @@ fn p20_probe_finds_the_profile() {
     }
 }
 
-/// D-10: with the wrong byte order the order is what is named, and `probe`; not the wire, the load or the flash numbers.
+/// D-10: with a wrong byte order the error names the byte order and `probe`, not the wire, the load or the flash numbers.
 #[test]
 fn d10_a_wrong_byte_order_is_named() {
     for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
@@ -73,7 +73,7 @@ fn d10_a_wrong_byte_order_is_named() {
             problems[0].what.contains("byte order") && problems[0].next.to_string().contains("ucom probe"),
             "{problems:?}"
         );
-        // `update` is refused while the board has its old program; `info` shows the numbers, and reports that they are wrong.
+        // `update` is refused while the board has its old program. `info` shows the numbers and reports that they are wrong.
         let before = bench.log.len();
         let Ok(Outcome::Update(report)) = bench.go(Request::Update(options(&[1], 128)), 60) else { panic!() };
         let Some(UpdateFailure::Refused(error)) = &report.boards[0].failure else { panic!("{report:?}") };
@@ -86,12 +86,12 @@ fn d10_a_wrong_byte_order_is_named() {
         bench.go(Request::Info { board: 1 }, 60).unwrap();
         let noted = |(_, event): &(_, Event)| matches!(event, Event::Note { text, .. } if text.contains("wrong byte order"));
         assert!(bench.events[received..].iter().any(noted));
-        // `io`: an application that runs is needed to describe itself.
+        // `io`: a running application is needed for the description.
         bench.go(Request::Start { board: 1, force: false }, 60).unwrap();
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
         assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
     }
-    // What only fits by chance is not taken for it.
+    // A flash number that only by chance equals its swapped form does not count as a wrong byte order.
     let mut bench = Bench::chain(&[0x2121, 0x42]);
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
 }
@@ -128,7 +128,7 @@ fn probe_of_checksum_and_heartbeats() {
     assert!(!bench.board(0).application.running);
 }
 
-/// However a probe ends, the session reads the protocol as before, and no board runs that did not.
+/// After any end of a probe the session reads the protocol as before, and no board runs that did not run before.
 #[test]
 fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -145,11 +145,11 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     assert_eq!(report.profile.prog_checksum, Checksum::Sum16, "{}", report.table());
     assert_eq!(bench.master.profile(), Profile::default());
     assert!(!bench.board(0).application.running && !bench.board(0).status().has(Status::MSTART));
-    // One that was started is left so.
+    // A board that was started stays started.
     bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
     bench.go(Request::Probe(alive.clone()), 120).unwrap();
     assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
-    // Cancelled while everything is read raw, and while a control loop runs under other heartbeats.
+    // Cancelled while everything is read raw, and while a control loop runs with other heartbeats.
     for until in ["<201#", "<541#"] {
         let mut bench = numbered();
         let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();
@@ -166,7 +166,7 @@ fn sent(from: super::bench::From, frame: &ucom::Frame) -> String {
     format!("{}{frame}", if from == super::bench::From::Master { '<' } else { '>' })
 }
 
-/// A control loop is not ended by a measurement that nobody expects to end it.
+/// A probe that would end a running control loop is refused, unless forced.
 #[test]
 fn a_probe_that_would_end_control_loops_is_refused() {
     for asked in [

@@ -1,4 +1,4 @@
-//! One board gets its number back (5.4): never two boards with one number and a success, whatever is lost.
+//! Repair of one board's number (5.4): after any losses, never a success with two boards that have one number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
@@ -9,7 +9,7 @@ use super::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
-/// A chain of four; these boards have rebooted, the pins of the others are still on.
+/// A chain of four in which these boards have rebooted; the pins of the other boards are still on.
 fn rebooted(boards: &[u8]) -> Bench {
     let mut bench = initialised(&FLASH);
     for board in boards {
@@ -27,7 +27,7 @@ fn numbers(bench: &mut Bench) -> Vec<u8> {
     (0..FLASH.len()).map(|i| bench.board(i).number().map_or(0, |n| n.number())).collect()
 }
 
-/// The result of the repair of board 2 must be true: a success means that this board has the number and no other.
+/// Checks that the result of the repair of board 2 is true: a success means that this board has the number and no other board has it.
 fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     let numbers = numbers(bench);
     match result {
@@ -38,19 +38,19 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // Not received, or its neighbour keeps its pin on: nothing is claimed.
+        // The board did not receive the number, or its neighbour keeps its pin on: the error claims nothing.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
 
-/// D-21: with two boards without a number, each behind a raised pin, only the one that is meant takes it.
+/// D-21: with two boards without a number, each after a raised pin, only the named board takes the number.
 #[test]
 fn d21_a_number_goes_to_one_board_only() {
     let mut bench = rebooted(&[2, 4]);
     let result = repair(&mut bench, 2);
     assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
     is_sound(&mut bench, &result, "nothing lost");
-    // The pins are on again: the other one gets its number, too, and a board that is well is only asked.
+    // The pins are on again: the other board gets its number, too. A board without a fault only gets questions.
     assert!(repair(&mut bench, 4).is_ok());
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
     let before = (bench.count("281#"), bench.count("1C1#0200"));
@@ -58,7 +58,7 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The first board's incoming pin is always active: without its number no other number can be given.
+/// The first board's incoming pin is always active: while it has no number, no other number can be given.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
@@ -90,7 +90,7 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Many frames lost at once: those that lower the other board's pin, its answers, those of the board that is meant.
+/// Many frames lost at once: those that lower the other board's pin, that board's answers, and those of the named board.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;
@@ -119,13 +119,13 @@ fn d21_no_losses_give_a_number_twice() {
     assert!(shared > 0, "a pin that stays on silently is found out by its consequence");
 }
 
-/// U-4: the repair of an update takes the same way.
+/// U-4: the repair during an update uses the same steps.
 #[test]
 fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);
     let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
     bench.until(|b| b.count("042#") > 0);
-    // It reboots in the moment of XRESET.
+    // The other board without a number reboots at the moment of XRESET.
     let reset = super::bench::frame("002#");
     let now = bench.now;
     bench.members[1].receive(now, &reset);

@@ -1,4 +1,4 @@
-//! Anything on the bus, and boards of the other byte order.
+//! Random frames on the bus, and boards with other profiles.
 
 use proptest::prelude::*;
 use ucom::profile::{AliveMode, Endian};
@@ -10,13 +10,13 @@ use super::bench::{Bench, CI, PAR, SO};
 use super::update::{check_program, options, update};
 
 proptest! {
-    /// Any frames at any time into any procedure: no panic, no wait without end, exactly one end.
+    /// Random frames at any time during any procedure: no panic, no endless wait, exactly one end.
     #[test]
     fn any_frames_into_any_procedure(data in prop::collection::vec(any::<u8>(), 0..400)) {
         ucom_host::master::fuzzing::frames(&data);
     }
 
-    /// The same with identifiers of boards 1 to 3 and lengths that fit, so that answers get far.
+    /// Likewise with identifiers of boards 1 to 3 and valid lengths, so that answers are followed further.
     #[test]
     fn likely_frames_into_any_procedure(
         choice: u8,
@@ -32,7 +32,7 @@ proptest! {
     }
 }
 
-/// Init, update and run with boards of other readings: the profile is all that must change.
+/// Init, update and run with boards of other profiles: only the master's profile must change.
 #[test]
 fn other_profiles() {
     let profiles = [

@@ -57,7 +57,7 @@ fn start_order() {
     assert_eq!((board.application.latched_ci.as_slice(), board.application.par[0]), (&[1500, 9][..], 120));
 }
 
-/// D-34: a change goes out at once; D-35: the shadow is assumed, and unknown after a restart.
+/// D-34: a change is sent at once. D-35: the shadow holds assumed values, and is unknown after a restart.
 #[test]
 fn d34_d35_inputs_and_parameters() {
     let mut bench = running(&[0x21], &[1]);
@@ -76,7 +76,7 @@ fn d34_d35_inputs_and_parameters() {
     assert_eq!(bench.master.parameters(1), [ParValue::Unknown; 3]);
 }
 
-/// D-36: the description is read once from each board since its application started, P-14: with heartbeats meanwhile.
+/// D-36: the description of each board is read once after its application has started. P-14: heartbeats continue meanwhile.
 #[test]
 fn d36_p14_descriptions_are_cached() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -99,14 +99,14 @@ fn d36_p14_descriptions_are_cached() {
     assert_eq!(bench.count("582#"), 2);
     let alive = bench.times_of("680#");
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))));
-    // A board without a running application: refused with the command that helps.
+    // A board without a running application: refused, and the error names the command that helps.
     let mut bench = initialised(&[0x21]);
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::NoApplication { board: 1, valid: true }));
     assert!(error.hint().contains("ucom start 1"));
 }
 
-/// D-36: names that were kept under a board's program and are of another application are found out before the loop runs.
+/// D-36: names that were kept for a board's program but belong to another application are detected before the loop runs.
 #[test]
 fn d36_kept_names_of_another_application_start_nothing() {
     let mut bench = initialised(&[0x21]);
@@ -123,11 +123,11 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
-    // Now they are the board's own.
+    // Now the names are the board's own.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
-/// D-14: a dump whose totals do not fit is read again, at most three times.
+/// D-14: a dump with wrong totals is read again, at most three times.
 #[test]
 fn d14_dump_is_accepted_only_if_the_totals_fit() {
     let good = ["581#010000000000", "581#0100", "581#6865616420", "581#0100", "581#737065656400"];
@@ -171,7 +171,7 @@ fn p6_nothing_is_mixed_up() {
         "8:582#706F73",
     ];
     let mut bytes: Vec<String> = dump.iter().map(|t| t.to_string()).collect();
-    // A string's packages but the last have 8 bytes.
+    // All packages of a string except the last have 8 bytes.
     bytes[2] = "3:582#6865616420706120".into();
     let dump: Vec<&str> = bytes.iter().map(String::as_str).collect();
     let mut script = Script::default()
@@ -196,7 +196,7 @@ fn p6_nothing_is_mixed_up() {
     );
 }
 
-/// D-37: flags by read-modify-write, outputs never without the loop.
+/// D-37: flags are changed by read-modify-write, and outputs are never active without the loop.
 #[test]
 fn d37_flags() {
     let mut bench = running(&[0x21], &[1]);
@@ -215,7 +215,7 @@ fn d37_flags() {
     assert!(!bench.board(0).application.running);
 }
 
-/// Stop in reverse: outputs, loop, application; the status walks AB, 8B, 1B.
+/// Stops in reverse order: outputs, loop, application. The status goes through AB, 8B, 1B.
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
@@ -234,7 +234,7 @@ fn stop_in_reverse() {
     assert!(!lost, "an application that was stopped on purpose is not lost");
 }
 
-/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat, the policy's frames leave within 100 ms.
+/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat, and the policy's frames leave within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
     for (on_lost, frame) in [
@@ -263,7 +263,7 @@ fn p15_d51_lost_boards() {
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
-        // Inputs of the lost board are no longer repeated.
+        // The master stops repeating inputs of the lost board.
         let repeated = bench.log.iter().rfind(|(.., f)| f.id() == 0x342).unwrap().0;
         assert!(repeated <= lost + MS, "{on_lost:?}");
         assert_eq!(bench.board(0).application.running, on_lost != OnLost::StopAll);
@@ -274,7 +274,7 @@ fn p15_d51_lost_boards() {
     }
 }
 
-/// A monitor that is no master sends nothing when a board is lost.
+/// A monitor without the role of master sends nothing when a board is lost.
 #[test]
 fn only_a_master_stops_boards() {
     let script = (0..5).fold(Script::default(), |s, i| s.at(i * 1000, "681#"));
@@ -311,7 +311,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // From a heartbeat on.
+    // Begins at a heartbeat.
     let alive = bench.count("680#");
     bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();
@@ -356,7 +356,7 @@ fn d33_snapshots() {
     assert!((9..=11).contains(&(snapshots.count() + 1)));
 }
 
-/// One procedure at a time works with a board; another board may be worked with meanwhile.
+/// Only one procedure at a time works with a board. A procedure for another board may run meanwhile.
 #[test]
 fn one_procedure_a_board() {
     let mut bench = initialised(&[0x21, 0x42]);

@@ -6,10 +6,10 @@ use ucom::Frame;
 
 use super::bench::{MS, Member, frame};
 
-/// A peer that knows nothing but a table of frames.
+/// A peer that consists of a table of frames.
 #[derive(Default)]
 pub struct Script {
-    /// What is answered, and after how many ms.
+    /// Answers, and their delays in ms.
     rules: Vec<Rule>,
     due: BTreeMap<(u64, u64), Frame>,
     serial: u64,
@@ -18,9 +18,9 @@ pub struct Script {
 
 struct Rule {
     ask: Frame,
-    /// How often it still applies.
+    /// Remaining uses of the rule.
     uses: u32,
-    /// Requests that are let pass before.
+    /// Requests that pass before the rule applies.
     skip: u32,
     answers: Vec<(u64, Frame)>,
 }
@@ -31,7 +31,7 @@ impl Script {
         self.rule(ask, 0, u32::MAX, answers)
     }
 
-    /// Only the first time.
+    /// Answers only the first request.
     pub fn once(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, 1, answers)
     }
@@ -45,7 +45,7 @@ impl Script {
         self
     }
 
-    /// Sends by itself at a time, ms.
+    /// Sends a frame by itself at a time, ms.
     pub fn at(mut self, ms: u64, text: &str) -> Self {
         self.serial += 1;
         self.due.insert((ms * MS, self.serial), frame(text));

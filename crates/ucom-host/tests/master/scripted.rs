@@ -1,4 +1,4 @@
-//! Rows of the acceptance table where the other side is a table of frames and nothing else.
+//! Rows of the acceptance table in which the other side is only a table of frames.
 
 use super::bench::Exit;
 use ucom_host::master::{
@@ -7,7 +7,7 @@ use ucom_host::master::{
 
 use super::bench::{Bench, Script};
 
-/// Boards 1 to n of the golden chain as a table.
+/// Boards 1 to n of the golden chain, as a table of frames.
 fn golden(boards: usize) -> Script {
     let reports = &["441#21", "482#42", "4C3#63"][..boards];
     let mut script = Script::default().on("000#", reports).on("240#", reports);
@@ -68,7 +68,7 @@ fn p2_init_of_the_golden_chain() {
     assert!(end <= 1_000_000, "{end} us");
 }
 
-/// P-2: nobody there.
+/// P-2: no board answers.
 #[test]
 fn p2_init_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -78,7 +78,7 @@ fn p2_init_of_nobody() {
     assert_eq!(report.exit(), 3);
 }
 
-/// P-3: INITACK is lost: PC_INFO is asked before any repetition of PC_INIT.
+/// P-3: INITACK is lost. The master sends PC_INFO before any repetition of PC_INIT.
 #[test]
 fn p3_lost_ack_asks_info_first() {
     let script = Script::default()
@@ -91,12 +91,12 @@ fn p3_lost_ack_asks_info_first() {
     let report = init(&mut bench);
     assert!(report.is_ok(), "{:?}", report.findings);
     assert_eq!(bench.count("281#"), 1, "{:?}", bench.sent());
-    // Nobody answers at all: between two PC_INIT there is always a PC_INFO.
+    // No board answers at all: between two PC_INIT there is always a PC_INFO.
     let sent: Vec<String> = bench.sent().into_iter().filter(|t| t == "282#" || t == "202#").collect();
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }
 
-/// P-4, D-24: identifier and data of INITACK disagree: refused, not guessed.
+/// P-4, D-24: identifier and data of INITACK disagree: the number is refused, not guessed.
 #[test]
 fn p4_d24_ack_mismatch_is_refused() {
     for ack in ["0C1#02", "0C2#01"] {
@@ -116,7 +116,7 @@ fn p4_d24_ack_mismatch_is_refused() {
     }
 }
 
-/// P-16, D-26: a report that nobody asked for means "rebooted"; one that was asked for does not.
+/// P-16, D-26: an unrequested report means "rebooted"; a requested report does not.
 #[test]
 fn p16_spontaneous_report() {
     let mut bench = Bench::script(golden(1).at(9_000, "441#21"));
@@ -136,7 +136,7 @@ fn p16_spontaneous_report() {
     assert_eq!(*event, expected);
 }
 
-/// P-17, D-08: frames of another master: refused, unless forced; a running board's own heartbeats are none.
+/// P-17, D-08: frames of another master: the command is refused, unless forced. A running board's own heartbeats do not count.
 #[test]
 fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
@@ -159,7 +159,7 @@ fn p17_d08_second_master() {
     assert!(bench.log.iter().find(|(_, f, _)| *f == super::bench::From::Master).unwrap().0 >= 600_000);
 }
 
-/// P-18: an error code that nobody knows is shown as its number.
+/// P-18: an unknown error code is shown as its number.
 #[test]
 fn p18_unknown_error_code() {
     let mut bench = Bench::script(Script::default().at(10, "081#2A"));
@@ -170,7 +170,7 @@ fn p18_unknown_error_code() {
     assert_eq!(code.number(), 0x2A);
 }
 
-/// D-T21: two boards whose reports look alike: more boards than reports.
+/// D-T21: two boards whose reports look alike: the scan finds more boards than reports.
 #[test]
 fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
@@ -189,7 +189,7 @@ fn dt21_two_boards_with_one_flash_id() {
     assert!(report.findings.contains(&same), "{:?}", report.findings);
 }
 
-/// A board that reported and was never reached: the init wire is broken behind the last one.
+/// A board reported but was never reached: the init wire after the last board is broken.
 #[test]
 fn init_names_a_broken_wire() {
     let script = Script::default()
@@ -204,7 +204,7 @@ fn init_names_a_broken_wire() {
     assert!(report.findings[0].to_string().contains("0x42 after position 1"));
 }
 
-/// D-07: other readings of the reports are taken by their data byte.
+/// D-07: reports in other modes are identified by their data byte.
 #[test]
 fn d07_reports_by_data_byte() {
     let script = Script::default().on("240#", &["401#21", "441#21", "481#21", "4C1#21"]);
@@ -216,7 +216,7 @@ fn d07_reports_by_data_byte() {
     assert!(report.findings.contains(&ScanFinding::Disagrees { ucom_id: 0x21 }));
 }
 
-/// D-14: before a request is repeated the truncated answer must have run dry, or old and new packages mix.
+/// D-14: before the master repeats a request, it waits until the truncated answer has ended. Otherwise old and new packages would mix.
 #[test]
 fn d14_a_truncated_answer_runs_dry() {
     let info = "141#2100011B34126E38";

@@ -1,4 +1,4 @@
-//! Two boards with one number (D-24): a named error in whatever is asked of that number, before anything is changed.
+//! Two boards with one number (D-24): every request to that number fails with a named error, before anything is changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};
@@ -13,14 +13,14 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, Script, image, node};
 
-/// Two boards that both think that they are the first of the chain.
+/// Two boards that are both wired as the first of the chain.
 fn strapped(flash: [u16; 2]) -> Bench {
     let board =
         |flash| Box::new(node(flash, WirePins::chain(1).remove(0), Profile::default())) as Box<dyn Member>;
     Bench::new(Profile::default(), flash.map(board).into_iter().collect())
 }
 
-/// Both have number 1, from a PC that has gone; more of what it sent, by ms.
+/// Two boards with number 1, given by a PC that has disconnected. `more` holds further frames of that PC, by ms.
 fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
     let mut bench = strapped(flash);
     let script =
@@ -39,7 +39,7 @@ fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
     *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
-/// Everything that names the board, or changes all of them.
+/// Requests that name the board, or change all boards.
 fn requests() -> Vec<Request> {
     let (board, force) = (1, false);
     let target = UpdateTarget { board, flash_number: Some(0x21) };
@@ -69,7 +69,7 @@ fn requests() -> Vec<Request> {
     ]
 }
 
-/// Questions and heartbeats.
+/// Returns `true` for questions and heartbeats.
 fn changes_nothing(frame: &str) -> bool {
     let id = u16::from_str_radix(&frame[..3], 16).unwrap();
     matches!(id >> 6, 8 | 9 | 22 | 23) || frame == "680#"
@@ -112,7 +112,7 @@ fn d24_nothing_is_done_to_two_boards_that_cannot_be_told_apart() {
     refuses([0x21, 0x21]);
 }
 
-/// The second one answers late, when the first is done.
+/// The second answer comes late, after the first has ended.
 #[test]
 fn d24_the_second_answer_may_come_late() {
     let answers = |ms: u64| {
@@ -133,7 +133,7 @@ fn d24_the_second_answer_may_come_late() {
     }
 }
 
-/// It shows only when the board is read back: still named, and the application that was started is stopped.
+/// The second board shows only when the board is read back. The error still names it, and the started application is stopped.
 #[test]
 fn d24_it_is_named_when_it_shows_on_the_way() {
     let one = |flash: &str, status: &str| {
@@ -155,8 +155,9 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
     assert_eq!((bench.count("541#"), bench.count("1C1#8000") > 0), (0, true), "{:?}", bench.sent());
 }
 
-/// A second board takes the number while the first one is programmed, at any place: it complains of program data, or is
-/// flashed with the first one. Either way the reason is named, no board is left in programming, and no success is claimed.
+/// A second board takes the number at any step while the first is programmed. The second either sends an error about program data, or is
+/// flashed together with the first. In both cases the report names the reason, no board stays in programming mode, and no success is
+/// claimed.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
@@ -200,7 +201,7 @@ fn program_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| f.to_string().starts_with("2C1#")).count()
 }
 
-/// A stop is neither delayed nor refused; both boards stand, and it is reported.
+/// A stop is neither delayed nor refused. Both boards stop, and the shared number is reported.
 #[test]
 fn d24_a_stop_stops_both() {
     let mut bench =
@@ -218,7 +219,7 @@ fn d24_a_stop_stops_both() {
     assert!(bench.events.iter().any(reported));
 }
 
-/// Turning outputs off is a stop, too.
+/// A request that turns outputs off counts as a stop, too.
 #[test]
 fn d24_outputs_are_turned_off_on_both() {
     let mut bench =
@@ -228,7 +229,7 @@ fn d24_outputs_are_turned_off_on_both() {
     assert!((0..2).all(|i| !bench.board(i).application.running));
 }
 
-/// An init that gives one number to two boards takes it back from both and reports it.
+/// An init that gives one number to two boards takes the number back from both and reports it.
 #[test]
 fn d24_an_init_leaves_no_number_to_two_boards() {
     let mut bench = strapped([0x21, 0x42]);
@@ -237,7 +238,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
         Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
-    // And it is how a chain that was numbered wrongly gets well again.
+    // A chain that was numbered wrongly: the shared number is detected.
     let mut bench = Bench::chain(&[0x21, 0x42]);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
     bench.members[1] = Box::new(node(0x42, WirePins::chain(1).remove(0), Profile::default()));
@@ -246,7 +247,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
     assert!(bench.go(Request::Info { board: 1 }, 10).is_err_and(|e| is_shared(&e, [0x21, 0x42])));
 }
 
-/// A scan lists what else is there, and names both instead of a board without a number.
+/// A scan lists the other findings, and names both boards instead of a board without a number.
 #[test]
 fn d24_a_scan_names_both() {
     let mut bench = sharing([0x21, 0x42], &[]);
@@ -257,7 +258,7 @@ fn d24_a_scan_names_both() {
     assert!(shared.to_string().contains("flash numbers 0x0021 and 0x0042"), "{shared}");
 }
 
-/// What a gateway doubles, or damages once, is not another board.
+/// A frame that a gateway doubles, or damages once, does not count as another board.
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {

@@ -1,4 +1,4 @@
-//! A run that does not come about leaves every board as it was found.
+//! A run that fails to start leaves every board as it was found.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -13,7 +13,7 @@ use super::bench::{Bench, MS};
 use super::chain::initialised;
 
 const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
-/// What the boards of [`found`] do before the run, in their order.
+/// Phase and outputs of the boards of [`found`] before the run, in their order.
 const FOUND: [(Phase, bool); 4] =
     [(Phase::Idle, false), (Phase::Ready, false), (Phase::Running, false), (Phase::Running, true)];
 
@@ -22,7 +22,7 @@ fn run(boards: &[u8], active: bool, force: bool) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active, force })
 }
 
-/// Four boards: idle, started, running with safe outputs, running with active ones.
+/// Four boards: idle, started, running with safe outputs, running with active outputs.
 fn found(profile: Profile) -> Bench {
     let mut bench = Bench::chain_with(&IDS, profile);
     bench.go(Request::Init(InitOptions::default()), 20).unwrap();
@@ -37,15 +37,15 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
     [0, 1, 2, 3].map(|i| (bench.board(i).phase(), bench.board(i).application.active))
 }
 
-/// P-19: too much load is refused, and nothing is left started that was not; where the descriptions are known, nothing is
-/// even started.
+/// P-19: a start with too much load is refused, and boards that were not started before are not left started. If the descriptions are
+/// known, the master does not even start a board.
 #[test]
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // The boards have one program, whose description is known.
+    // The boards have one program, and its description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);
@@ -58,12 +58,12 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // The names of board 4 are those of board 1, once that has been asked.
+        // Board 4 has the names of board 1, once board 1 has been read.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }
 
-/// Whatever board does not answer to whatever step: the others are as they were found.
+/// For every board and step: a board does not answer to the step, and the other boards are as they were found.
 #[test]
 fn a_run_that_fails_is_undone() {
     let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];
@@ -78,7 +78,7 @@ fn a_run_that_fails_is_undone() {
             for board in (0..4).filter(|board| *board != silent) {
                 assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
             }
-            // Its own state could not be read, but it is never left with active outputs that it did not have.
+            // The state of the silent board could not be read. The board is never left with active outputs if they were safe before.
             assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
         }
     }
@@ -109,8 +109,8 @@ fn a_run_that_is_cancelled_is_undone() {
     }
 }
 
-/// D-51: a board is lost while others are still being started: none is started after that, and all are as they were found.
-/// Where a loss is only to be reported, the others go on.
+/// D-51: a board is lost while others are still being started. With `StopAll` no further loop is started; with `Report` the start goes
+/// on. In both cases the boards that were idle before are idle again.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {
@@ -133,7 +133,7 @@ fn d51_a_board_lost_while_others_start() {
                 assert_eq!(result, Err(Error::Running(RunningError::Lost { board: 1 })));
                 assert_eq!(started, [0; 3]);
             }
-            // It ends with board 1, which does not answer.
+            // The run ends with an error of board 1, which does not answer.
             _ => {
                 assert!(
                     matches!(result, Err(Error::Exchange(ExchangeError::NoAnswer { board: 1, .. }))),
@@ -148,7 +148,7 @@ fn d51_a_board_lost_while_others_start() {
     }
 }
 
-/// Once a run has failed nothing of it is under way any more.
+/// After a failed run none of its work is in progress any more.
 #[test]
 fn after_a_failed_run_boards_are_free() {
     let mut bench = initialised(&IDS);

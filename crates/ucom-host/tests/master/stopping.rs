@@ -1,4 +1,4 @@
-//! What is to stop stops: on a bus that loses frames and reports errors, and when a board has only been commanded to start.
+//! A stop works on a bus that loses frames and reports errors, and on a board that has only been commanded to start.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -16,13 +16,13 @@ fn run(boards: &[u8]) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
 }
 
-/// From now on board 1 reports error 7 (CAN_RECEIVE) again and again: what a bad bus looks like.
+/// From now on board 1 reports error 7 (CAN_RECEIVE) again and again, as on a bad bus.
 fn bad_bus(bench: &mut Bench) {
     let from = bench.now / MS;
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
 }
 
-/// Section 9 (codes 6 to 8: log): an error beside a lost ADMIN_DATA does not end the tries.
+/// Section 9 (codes 6 to 8: log): an error report together with a lost ADMIN_DATA does not end the attempts.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     for lost in ["< 601#00000000", "< 601#01000000"] {
@@ -34,7 +34,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
         assert!(result.is_ok(), "{lost}: {result:?}");
         assert!(!bench.board(0).application.running, "{lost}");
     }
-    // When nothing comes of all tries the error is reported.
+    // When all attempts have failed, the error is reported.
     let mut bench = initialised(&[0x21]);
     bench.go(run(&[1]), 30).unwrap();
     bad_bus(&mut bench);
@@ -47,7 +47,7 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     assert_eq!(bench.count("601#00000000"), 3);
 }
 
-/// Section 9, D-30: a start waits for its board while that reports errors of the bus; error 11 ends it at once.
+/// Section 9, D-30: a start waits for its board although the board reports errors of the bus. Error 11 ends the start at once.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_start() {
     let mut bench = initialised(&[0x21]);
@@ -71,7 +71,7 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
         let mut bench = initialised(&[0x21]);
         bench.go(run(&[1]), 30).unwrap();
-        // Three are those that wait for an answer.
+        // Three stops wait for an answer and are lost here.
         bench.lose = vec![("> 141#", 1000), ("< 601#", 3)];
         let result = bench.go(Request::Stop { board: 1, level, force: true }, 30);
         assert!(result.is_err(), "{level:?}");
@@ -80,17 +80,17 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     }
 }
 
-/// Ctrl-C while a board starts whose status does not show it yet: it is not taken for stopped.
+/// Ctrl-C while a board starts and its status does not show it yet: the board does not count as stopped.
 #[test]
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // It shows that it is started one second after the command; it stops when it is commanded to stop after that.
+        // The board shows the start one second after the command. It stops when it receives a stop after that.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();
         let was_run = matches!(request, Request::Run(_));
-        // Asked before it is commanded to start, at the stop and when the stop is read back; then it is up.
+        // Three questions come before the status changes: before the start, at the stop, and when the stop is read back.
         let script = Script::default().rule("201#", 0, 3, &idle).on("201#", &started);
         let mut bench = Bench::script(script.on("601#00000000", &["601#00000000"]));
         bench.run(2_000);
@@ -102,7 +102,7 @@ fn a_board_that_is_still_starting_is_stopped() {
         let result = bench.wait(id, 60);
         assert_eq!(result, Err(Error::Master(MasterError::Cancelled)));
         if !was_run {
-            // A start leaves it to its caller to stop what it began.
+            // The caller of a start must stop the board that it started.
             bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();
         }
         let stops = bench.times_of("1C1#8000");
@@ -115,7 +115,7 @@ fn a_board_that_is_still_starting_is_stopped() {
     }
 }
 
-/// A board that takes its time to start is idle again after Ctrl-C, whenever that comes.
+/// A board that starts slowly is idle again after Ctrl-C at any moment.
 #[test]
 fn slow_boards_are_idle_after_a_cancelled_run() {
     for at in (0..1_000).step_by(90) {
@@ -131,7 +131,7 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// The broadcast stop leaves before anything else, and three times; of some boards, only to these.
+/// A stop of all boards begins with a broadcast, sent three times. A stop of some boards goes only to these.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -156,7 +156,7 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: whether a board runs is asked twice: one answer can be lost, and its outputs, too.
+/// U-2: the master asks twice whether a board runs, because one answer can be lost, and its outputs as well.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -167,7 +167,7 @@ fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     assert_eq!(bench.count("041#"), 0);
 }
 
-/// A board that runs keeps the inputs that another PC gave it, unless the user gives it some.
+/// A running board keeps the inputs that another PC set, unless the user sets some.
 #[test]
 fn a_board_that_runs_is_not_given_initial_inputs() {
     for given in [false, true] {

@@ -1,4 +1,4 @@
-//! Firmware updates of real boards of this crate and of tables of frames.
+//! Firmware updates of the boards of this crate, and of tables of frames.
 
 use super::bench::Exit;
 use ucom::{BoardInfo, Memory};
@@ -29,7 +29,7 @@ pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
     }
 }
 
-/// These options with flash records of what an update of the same image has left.
+/// These options with the flash records that an update with the same image left.
 pub fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
     let image = &options.image;
     let record = |info: &BoardInfo| FlashRecord::new(&image.bytes, image.address_words, info);
@@ -42,7 +42,7 @@ pub fn outcomes(report: &UpdateReport) -> Vec<&str> {
     report.boards.iter().map(|b| b.outcome.name()).collect()
 }
 
-/// What a board holds must be the old program, the new one, or none: never half of one.
+/// Checks that a board holds the old program, the new one, or none: never half of one.
 pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
     let record = bench.board(board).record();
     let bytes = bench.board(board).flash.bytes(Memory::Program).to_vec();
@@ -59,7 +59,7 @@ pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) 
     }
 }
 
-/// The board shows the program: it was written, or it was there and no flash record says more.
+/// The board shows the program: it was written, or it was there before and no flash record proves more.
 fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }
@@ -83,7 +83,7 @@ fn golden_update() {
     assert_eq!(sent.iter().rfind(|t| t.starts_with("141#2100")).unwrap(), "141#2100011B3F4BC13A");
     assert_eq!(sent.iter().filter(|t| *t == "041#").count(), 1);
     assert_eq!(check_program(&mut bench, 0, 1000), (0x4B3F, DATE));
-    // Again: up to date, and nothing but questions.
+    // Again: up to date, and only questions are sent.
     let before = bench.log.len();
     let report = update(&mut bench, recorded(options(&[1], 1000), &report));
     assert_eq!((report.boards[0].outcome, report.boards[0].verified), (UpdateOutcome::UpToDate, true));
@@ -92,7 +92,7 @@ fn golden_update() {
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
-/// P-7: no frame of a block before READY of the one before it; P-14: heartbeats every 500 ±50 ms meanwhile.
+/// P-7: no frame of a block before READY of the previous block. P-14: heartbeats every 500 ±50 ms meanwhile.
 #[test]
 fn p7_p14_flow_control_and_heartbeats() {
     let mut bench = initialised(&[0x21]);
@@ -129,7 +129,7 @@ fn p8_slow_boards_are_waited_for() {
     );
 }
 
-/// P-9, U-9: DSP_PROGFINISHED lost: PC_INFO reports that it is done.
+/// P-9, U-9: DSP_PROGFINISHED is lost. PC_INFO shows that the update is done.
 #[test]
 fn p9_lost_finished_is_a_success() {
     let mut bench = loader(Loader { special: |_, block| (block == 33).then_some(""), ..Loader::new(34) });
@@ -142,7 +142,7 @@ fn p9_lost_finished_is_a_success() {
     assert_eq!(bench.count("041#"), 1);
 }
 
-/// P-10, U-10: the board reports success and shows the old program: a failure.
+/// P-10, U-10: the board reports success but shows the old program: a failure.
 #[test]
 fn p10_success_must_be_read_back() {
     let mut bench = loader(Loader { info: ["34126E38"; 2], ..Loader::new(34) });
@@ -152,7 +152,7 @@ fn p10_success_must_be_read_back() {
     assert_eq!(report.exit(), 5);
 }
 
-/// P-11, U-7: errors 2 and 5 make one attempt, the others three, each begun with XRESET.
+/// P-11, U-7: errors 2 and 5 end after one attempt, other errors after three. Each attempt begins with XRESET.
 #[test]
 fn p11_attempts_by_error() {
     type Case = (fn(usize, usize) -> Option<&'static str>, usize, u8);
@@ -177,14 +177,14 @@ fn p11_attempts_by_error() {
             "case {i}"
         );
     }
-    // Healed by the second attempt.
+    // The second attempt succeeds.
     let special = |reset, block| (reset == 1 && block == 16).then_some("081#01");
     let mut bench = loader(Loader { special, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
 }
 
-/// An error in the middle of a block is an answer, too: no waiting for READY, no further attempt.
+/// An error in the middle of a block counts as an answer: no wait for READY, no further attempt.
 #[test]
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
@@ -194,7 +194,7 @@ fn errors_in_the_middle_of_a_block_count() {
     assert!(report.boards[0].failure.as_ref().is_some_and(code));
 }
 
-/// An overrun makes the next attempt leave more time between frames.
+/// After an overrun the next attempt leaves more time between frames.
 #[test]
 fn overrun_widens_the_gap() {
     let special = |reset, block| (reset == 1 && block == 2).then_some("081#04");
@@ -209,7 +209,7 @@ fn overrun_widens_the_gap() {
     assert!(first.iter().all(|gap| *gap >= 200));
 }
 
-/// P-5, U-1: another flash number than the user named, or another number in the answer: refused before XRESET.
+/// P-5, U-1: refused before XRESET if the flash number is not the named one, or the answer has another number.
 #[test]
 fn p5_the_board_must_be_the_one_that_is_meant() {
     let mut bench = loader(Loader::new(34));
@@ -226,7 +226,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
-/// Nobody there: exit code 3, and nothing intrusive was sent.
+/// No board answers: exit code 3, and nothing intrusive was sent.
 #[test]
 fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -237,10 +237,10 @@ fn update_of_nobody() {
     );
 }
 
-/// P-12: cancel in the middle of a block: the transfer is cleared, the board is usable, the report shows what is left.
+/// P-12: a cancel in the middle of a block clears the transfer. The board is usable, and the report shows its state.
 #[test]
 fn p12_cancel() {
-    // Frames of PC_PROG after which the user gives up: in cycle 1, in cycle 2.
+    // Frames of PC_PROG after which the user cancels: in cycle 1, in cycle 2.
     for (frames, erased) in [(3, false), (12, false), (3 * 8 + 11, true)] {
         let mut bench = initialised(&[0x21]);
         let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
@@ -280,7 +280,7 @@ fn p13_killed_tool() {
     }
 }
 
-/// U-2: refused while a board runs; forced it is done.
+/// U-2: refused while a board runs, unless forced.
 #[test]
 fn u2_running_boards() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -294,7 +294,7 @@ fn u2_running_boards() {
     assert_eq!(update(&mut bench, forced).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-3, U-10: an update session skips boards that are done; `start` ends with the application running.
+/// U-3, U-10: an update session skips boards that are done. With `start` the application runs at the end.
 #[test]
 fn update_session_skips_and_starts() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -306,7 +306,7 @@ fn update_session_skips_and_starts() {
     assert_eq!(report.exit(), 0);
 }
 
-/// Group update by broadcast: selected boards finish, the other one keeps its program.
+/// Group update by broadcast: selected boards finish, and the other board keeps its program.
 #[test]
 fn group_update() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -319,7 +319,7 @@ fn group_update() {
     assert_eq!(prog.count(), 48);
 }
 
-/// A dry run asks and changes nothing.
+/// A dry run reads the boards and changes nothing.
 #[test]
 fn dry_run() {
     let mut bench = Bench::chain(&[0x21]);
@@ -347,7 +347,7 @@ fn progress_is_of_both_cycles() {
     assert_eq!(bytes, (1..=34).map(|i| 64 * i).collect::<Vec<u64>>());
 }
 
-/// A fault on one frame of an update; what comes out is named and true.
+/// A fault on one frame of an update: the report names it and is true.
 #[test]
 fn every_frame_of_an_update_disturbed() {
     let (from, to) = {

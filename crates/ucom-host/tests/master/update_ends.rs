@@ -1,4 +1,4 @@
-//! Updates that do not go to their end: a bus that fails, a cancel, another board in the place of the one that is meant.
+//! Updates that do not reach their end: a bus that fails, a cancel, another board in place of the named one.
 
 use super::bench::Exit;
 use ucom::{Frame, Status};
@@ -15,7 +15,7 @@ use super::update::{check_program, options, outcomes, recorded, update};
 
 const DATE: u16 = 0x3AC1;
 
-/// Starts an update and lets it run until `stop`; then `end` ends it, and the report comes at once.
+/// Starts an update and lets it run until `stop`. Then `end` ends it, and the report comes at once.
 fn ended(
     bench: &mut Bench,
     options: UpdateOptions,
@@ -39,8 +39,8 @@ fn unplugged(bench: &mut Bench, id: ucom_host::master::ProcedureId) {
     bench.master.abandon(id, "the adapter is gone");
 }
 
-/// D-46: the bus fails at any frame of an update of two boards. The report comes at once, reports of no board more or less
-/// than it is, and the exit code is 5 as soon as something was erased.
+/// D-46: the bus fails at any frame of an update of two boards. The report comes at once and states each board's true state. The exit
+/// code is 5 as soon as something was erased.
 #[test]
 fn d46_a_bus_that_fails_leaves_a_report() {
     let (from, to) = {
@@ -90,7 +90,7 @@ fn d46_a_bus_that_fails_leaves_a_report() {
     assert_eq!(seen.into_iter().collect::<Vec<_>>(), all);
 }
 
-/// Nothing is sent any more by a procedure whose bus is gone, also when it was just being cancelled.
+/// A procedure whose bus has disconnected sends nothing more, even if it was just being cancelled.
 #[test]
 fn an_abandoned_update_sends_nothing() {
     for cancel_first in [false, true] {
@@ -108,7 +108,7 @@ fn an_abandoned_update_sends_nothing() {
         assert!(bench.sent()[sent..].iter().all(|t| t == "680#"), "{:?}", &bench.sent()[sent..]);
         assert!(!bench.master.is_busy());
     }
-    // Any other procedure ends with the error.
+    // Every other procedure ends with the error.
     let mut bench = initialised(&[0x21]);
     let id = bench.master.start(bench.now, Request::Scan).unwrap();
     bench.master.abandon(id, "the adapter is gone");
@@ -117,7 +117,8 @@ fn an_abandoned_update_sends_nothing() {
     assert!(error.to_string().contains("the adapter is gone"));
 }
 
-/// P-12: cancelled before the erase an update session ends with 4: boards that are done stay done, the others have what they had.
+/// P-12: an update session that is cancelled before the erase ends with exit code 4. Finished boards stay so, and the others keep their
+/// program.
 #[test]
 fn p12_a_cancelled_update_session() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -128,7 +129,7 @@ fn p12_a_cancelled_update_session() {
     assert_eq!((check_program(&mut bench, 1, 128), check_program(&mut bench, 2, 128)), (OLD, OLD));
 }
 
-/// A cancel while the new application is being started: the board is verified, and that is what the report shows.
+/// A cancel while the new application is being started: the board is verified, and the report shows that.
 #[test]
 fn p12_cancelled_while_it_starts() {
     let mut bench = initialised(&[0x21]);
@@ -138,7 +139,7 @@ fn p12_cancelled_while_it_starts() {
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Cancelled { left }));
     assert_eq!((report.boards[0].outcome, report.exit()), (left, 5));
     assert_eq!(check_program(&mut bench, 0, 128).1, DATE);
-    // It was stopped again; where its answers are lost nobody knows, and that is what is reported.
+    // The application was stopped again. If the board's answers are lost, its state is unknown, and the report says so.
     assert!(!bench.board(0).status().has(ucom::Status::MSTART));
     let mut bench = initialised(&[0x21]);
     let start = UpdateOptions { start: true, ..options(&[1], 128) };
@@ -171,14 +172,14 @@ fn a_board_that_is_up_to_date_is_started() {
     let report = update(&mut bench, start.clone());
     assert_eq!((outcomes(&report), report.exit()), (vec!["running", "running"], 0), "{report:?}");
     assert_eq!(bench.beginning("2C1#"), blocks);
-    // All are up to date and run: nothing is left to do.
+    // All boards are up to date and run: nothing remains to do.
     let sent = bench.beginning("301#");
     let mut all = recorded(start.clone(), &report);
     all.records.extend(start.records);
     assert_eq!((update(&mut bench, all).exit(), bench.beginning("301#")), (0, sent));
 }
 
-/// A board that answers and does not enable programming has reported, not gone silent: exit code 1.
+/// A board that answers but does not enable programming is not reported as silent: exit code 1.
 #[test]
 fn a_board_that_does_not_enable_programming_answers() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -189,7 +190,7 @@ fn a_board_that_does_not_enable_programming_answers() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::NotStarted, 1));
 }
 
-/// U-1 before every attempt: a board that was swapped since the last one gets no XRESET and no program data.
+/// U-1 before every attempt: a board that was swapped since the last attempt gets no XRESET and no program data.
 #[test]
 fn u1_a_board_that_is_swapped_between_attempts() {
     let swapped = |resets, cancelled| if resets == 1 && cancelled { "4200" } else { "2100" };
@@ -199,14 +200,14 @@ fn u1_a_board_that_is_swapped_between_attempts() {
     let wrong = Error::Identity(IdentityError::WrongBoard { board: 1, wanted: 0x21, found: 0x42 });
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::After(Box::new(wrong.clone()))));
     assert_eq!((bench.count("041#"), report.exit()), (1, 5), "{report:?}");
-    // In the very moment of XRESET: refused, taken out of programming, and nothing is written.
+    // Swapped at the moment of XRESET: refused, taken out of programming mode, and nothing is written.
     let mut bench = loader(Loader { flash: |n, _| if n == 0 { "2100" } else { "4200" }, ..Loader::new(34) });
     let report = update(&mut bench, options(&[1], 1000));
     assert_eq!(report.boards[0].failure, Some(UpdateFailure::Refused(Box::new(wrong))));
     assert_eq!((bench.beginning("2C1#"), bench.count("1C1#0400"), report.exit()), (0, 1, 4));
 }
 
-/// One damaged answer is not another board.
+/// A single damaged answer does not count as another board.
 #[test]
 fn one_damaged_answer_is_no_swapped_board() {
     let mut bench = initialised(&[0x21]);
@@ -225,7 +226,7 @@ fn one_damaged_answer_is_no_swapped_board() {
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::Verified, 0), "{report:?}");
 }
 
-/// A board that goes silent at XRESET, and another one that takes its number when it is given back (5.4).
+/// A board that goes silent at XRESET, and another board that takes its number when that is given back (5.4).
 fn impostor() -> impl Member {
     let (mut silent, mut other) = (false, false);
     Answering::new(move |frame| match frame {
@@ -247,7 +248,8 @@ fn impostor() -> impl Member {
     })
 }
 
-/// 5.4: another board took the number: refused with exit code 4, nothing is written, and it does not keep the number.
+/// 5.4: another board took the number: the update is refused with exit code 4, nothing is written, and that board does not keep the
+/// number.
 #[test]
 fn u4_repair_that_finds_another_board_is_refused() {
     let mut bench = Bench::new(Default::default(), vec![Box::new(impostor())]);
@@ -257,13 +259,13 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert_eq!((report.exit(), bench.beginning("2C1#")), (4, 0));
     assert_eq!(report.boards[0].outcome, UpdateOutcome::NotStarted);
     assert_eq!(bench.count("1C1#0800"), 3);
-    // Pin off before the number is given (5.4).
+    // The pin is switched off before the number is given (5.4).
     let sent = bench.sent();
     let place = |text: &str| sent.iter().position(|t| t == text).unwrap();
     assert!(place("1C1#0200") < place("281#"));
 }
 
-/// D-08: a dry run shows what would happen, so it looks for another PC, too; it still sends nothing but questions.
+/// D-08: a dry run also looks for another PC, because it shows what an update would do. It still sends only questions.
 #[test]
 fn d08_a_dry_run_looks_for_another_pc() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -277,14 +279,14 @@ fn d08_a_dry_run_looks_for_another_pc() {
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
-    // Without one: fine, and no heartbeats either.
+    // Without another PC: success, and still no heartbeats.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
 }
 
-/// A board that has the image already and was left in programming mode, as by a tool that was killed, does not stay in it; a dry
-/// run changes nothing.
+/// A board that has the image already and was left in programming mode, as by a killed tool, does not stay in that mode. A dry run
+/// changes nothing.
 #[test]
 fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let left = || {
@@ -307,7 +309,7 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     let report = update(&mut bench, UpdateOptions { dry_run: true, ..again });
     assert_eq!((report.boards[0].outcome, report.exit()), (UpdateOutcome::UpToDate, 0));
     assert!(bench.board(0).status().has(Status::PROG));
-    // It cannot be ended: that is reported.
+    // The mode cannot be ended: the failure is reported.
     let (mut bench, again) = left();
     bench.lose = vec![("< 1C1#", u32::MAX)];
     let report = update(&mut bench, again);
@@ -316,8 +318,8 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     assert_ne!(report.exit(), 0);
 }
 
-/// P-12: cancelled at any time while such boards are looked at and taken out of programming mode: none stays in it that is called
-/// up to date and not named. The same where the bus fails.
+/// P-12: cancelled at any time while such boards are read and taken out of programming mode. A board that stays in that mode and is
+/// reported as up to date is named. The same holds when the bus fails.
 #[test]
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {
@@ -326,7 +328,7 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
         for board in [1, 2] {
             bench.go(Request::XReset { board, force: false }, 20).unwrap();
         }
-        // A tool that starts anew listens for another PC before it sends what changes anything (D-08).
+        // A tool that has just started listens for another PC before it sends a command that changes anything (D-08).
         bench.master = Master::new(ucom::Profile::default());
         (bench, recorded(options(&[1, 2], 64), &report))
     };
@@ -349,7 +351,7 @@ fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
                     assert_eq!(code, Some("still-programming"), "after {after} µs: {result:?}");
                     named += 1;
                 } else {
-                    // It was not looked at yet.
+                    // This board was not read yet.
                     assert!(matches!(code, Some("cancelled" | "bus")), "after {after} µs: {result:?}");
                 }
             }

@@ -1,4 +1,4 @@
-//! What counts as up to date (D-62, U-3): the board's answer and the flash record together, and what neither covers.
+//! When a board counts as up to date (D-62, U-3): its answer and the flash record together, and cases that neither covers.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;
@@ -34,8 +34,7 @@ fn both(outcome: &'static str, verified: bool) -> Vec<(&'static str, bool)> {
     vec![(outcome, verified); 2]
 }
 
-/// D-62: what the record says besides what the board shows decides, one by one and as a group. Ten ways in which record and
-/// image part.
+/// D-62: the flash record decides in addition to the board's answer, one by one and as a group. Ten differences between record and image.
 #[test]
 fn d62_the_flash_record_decides() {
     type Change = fn(&mut UpdateOptions);
@@ -69,27 +68,27 @@ fn d62_the_flash_record_decides() {
             let expected = if is_sent { both("verified", true) } else { both("program-up-to-date", false) };
             assert_eq!((boards, code), (expected, if is_sent { 0 } else { 4 }), "{name} {mode:?}");
         }
-        // The same image at the same address, and the board shows what it showed then.
+        // With the same image at the same address the board answers as after that update.
         let (mut bench, mut options) = written();
         options.mode = mode;
         assert_eq!(again(&mut bench, options), (both("up-to-date", true), 0, false), "{mode:?}");
     }
 }
 
-/// D-62: what nobody has verified is never called verified, also where the user accepts it.
+/// D-62: a program that was never verified is not reported as verified, even if the user accepts it.
 #[test]
 fn d62_an_accepted_program_is_not_verified() {
     let (mut bench, options) = written();
     let unknown = UpdateOptions { records: Default::default(), ..options };
     let accepted = UpdateOptions { accept_unverified: true, ..unknown.clone() };
     assert_eq!(again(&mut bench, accepted.clone()), (both("program-up-to-date", false), 0, false));
-    // It is started only where the user accepts it.
+    // The application is started only if the user accepts the program.
     let start = UpdateOptions { start: true, ..unknown };
     assert_eq!(again(&mut bench, start), (both("program-up-to-date", false), 4, false));
     assert!(!bench.board(0).status().has(Status::MSTART));
     let start = UpdateOptions { start: true, ..accepted };
     assert_eq!(again(&mut bench, start.clone()), (both("running", false), 0, false));
-    // A start that fails does not make it verified either.
+    // A start that fails does not make the program verified either.
     bench
         .go(Request::Stop { board: 1, level: ucom_host::master::StopLevel::Application, force: true }, 20)
         .unwrap();
@@ -99,7 +98,7 @@ fn d62_an_accepted_program_is_not_verified() {
     assert_eq!((boards, code), (vec![("program-up-to-date", false)], 5));
 }
 
-/// D-62: the Program ID covers program memory only. Another image is written each time, whatever the records say.
+/// D-62: the Program ID covers program memory only. Another image for data memory is written each time, even if records exist.
 #[test]
 fn d62_data_memory_is_written_each_time() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
@@ -117,7 +116,7 @@ fn d62_data_memory_is_written_each_time() {
     }
 }
 
-/// U-3: the same program of another day is up to date, unless the date was asked for.
+/// U-3: the same program with another date is up to date, unless the user requires the date.
 #[test]
 fn u3_another_date_is_up_to_date() {
     let today = |options: UpdateOptions| UpdateOptions { date: DATE + 1, any_date: true, ..options };
@@ -137,13 +136,13 @@ fn u3_another_date_is_up_to_date() {
         words.as_deref(),
         Some("same Program ID, flashed 2009-06-01; content and address are not known")
     );
-    // The date that was asked for is written.
+    // The required date is written.
     let asked = UpdateOptions { any_date: false, ..today(options) };
     assert_eq!(again(&mut bench, asked), (both("verified", true), 0, true));
     assert_eq!(bench.board(0).record().map(|r| r.date), Some(DATE + 1));
 }
 
-/// D-62: the record is given up before a board is reset for programming, and made anew when the board has been read back.
+/// D-62: the record is dropped before a board is reset for programming, and written again after the board has been read back.
 #[test]
 fn d62_the_record_ends_before_anything_is_erased() {
     let mut bench = initialised(&[0x21]);

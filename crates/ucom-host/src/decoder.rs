@@ -1,4 +1,4 @@
-//! Frames in words. Answers of several frames are followed, so that a package of a string is distinguished from a head.
+//! Frames in words. The decoder follows answers of several frames, to distinguish a package of a string from a head.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use ucom::{
 
 /// A frame in words.
 pub struct Described {
-    /// Function, or why it is foreign.
+    /// Function, or the reason why the frame is foreign.
     pub name: String,
     /// `PC`, `board 3`, or both if the identifier does not show it.
     pub who: String,
@@ -26,7 +26,7 @@ pub struct Decoder {
     answers: BTreeMap<(Function, Sequence), Answer>,
 }
 
-/// An answer of several frames, as far as it has come.
+/// An answer of several frames, as far as received.
 struct Answer {
     strings: Box<StringAssembler>,
     /// Strings that are still to come; `None` before the head.
@@ -35,12 +35,12 @@ struct Answer {
 }
 
 impl Decoder {
-    /// Reads by this profile.
+    /// Creates a decoder for this profile.
     pub fn new(profile: Profile) -> Self {
         Self { profile, answers: BTreeMap::new() }
     }
 
-    /// A frame in words.
+    /// Returns a frame in words.
     pub fn describe(&mut self, now_us: u64, frame: &Result<Frame, Foreign>) -> Described {
         let frame = match frame {
             Ok(frame) => frame,
@@ -130,7 +130,7 @@ impl Decoder {
         }
     }
 
-    /// A frame of DSP_INFO, of the IO description, or of a debug text.
+    /// Describes a frame of DSP_INFO, of the IO description, or of a debug text.
     fn answer(&mut self, now_us: u64, function: Function, at: Sequence, frame: &Frame) -> (String, Value) {
         let profile = self.profile;
         let answer = self.answers.entry((function, at)).or_insert_with(|| Answer {

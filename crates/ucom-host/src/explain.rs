@@ -7,11 +7,11 @@ use ucom::ErrorCode;
 pub struct Word {
     /// Family of the word.
     pub family: &'static str,
-    /// As it is shown; the first is its name.
+    /// Displayed forms; the first one is the name.
     pub shown: Vec<String>,
     /// Meaning.
     pub meaning: String,
-    /// The next command or act.
+    /// Next command or action.
     pub next: String,
 }
 
@@ -24,7 +24,7 @@ const HEARTBEAT: &str = "heartbeat of a board";
 const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
-/// Status bits stand first, bit 7 before all others.
+/// Status bits come first, with bit 7 at the top.
 const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The application has been started by the exloader.", "ucom stop N ends it"),
     (
@@ -181,7 +181,7 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// The words that fit: exactly as shown (single letters by their case), in any case, or as a part.
+/// Returns the matching words: exactly as shown (single letters by their case), in any case, or as a part.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()

@@ -12,7 +12,7 @@ use ucom::BoardInfo;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlashRecord {
-    /// Flash number of the board that it was written to. A record that was copied to another board proves nothing.
+    /// Flash number of the board that got the image. A record that was copied to another board proves nothing.
     pub flash_number: u16,
     /// SHA-256 of the bytes in wire order.
     #[serde(deserialize_with = "hash")]
@@ -26,21 +26,21 @@ pub struct FlashRecord {
 }
 
 impl FlashRecord {
-    /// The record of an image that a board showed after it was written.
+    /// Creates the record of an image, with the answer of the board after the write.
     pub fn new(bytes: &[u8], address_words: u32, shown: &BoardInfo) -> Self {
         let BoardInfo { flash_number, program_id, date, .. } = *shown;
         Self { flash_number, sha256: hash_of(bytes), address: address_words, program_id, date }
     }
 
-    /// The image has the recorded bytes at the recorded address.
+    /// Returns `true` if the image has the recorded bytes and the recorded address.
     pub fn is_of(&self, bytes: &[u8], address_words: u32) -> bool {
         self.sha256 == hash_of(bytes) && self.address == address_words
     }
 
-    /// The record as an inline table of TOML.
+    /// Returns the record as an inline table of TOML.
     pub(super) fn to_toml(self) -> String {
         let hash = self.sha256.iter().fold(String::new(), |mut text, byte| {
-            // A string takes everything.
+            // Writing to a string never fails.
             let _ = write!(text, "{byte:02x}");
             text
         });
@@ -52,7 +52,7 @@ impl FlashRecord {
     }
 }
 
-/// Returns the hash by which records compare images.
+/// Returns the hash that identifies images in records.
 fn hash_of(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }

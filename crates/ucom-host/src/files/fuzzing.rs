@@ -1,4 +1,4 @@
-//! Body of the fuzz targets: every file reader on any bytes. A panic, or a broken promise, is a finding.
+//! Body of the fuzz targets: every file reader on any bytes. A panic or a violated property is a finding.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -12,7 +12,7 @@ use super::params::{ParamsFile, SavedBoard, SavedSignal, check_board, params_tex
 use super::recording::{CandumpWriter, FZI_HEADER, FziWriter, McapWriter, Recording, read_mcap};
 use super::signals::{BoardSignals, SignalTable, SignalValue};
 
-/// Images in every form; the first byte chooses.
+/// Reads images in every format; the first byte selects the format.
 pub fn image(data: &[u8]) {
     let Some((&choice, data)) = data.split_first() else { return };
     let format = [None, Some(Format::Bin), Some(Format::IntelHex), Some(Format::SRecord)];
@@ -30,9 +30,9 @@ pub fn image(data: &[u8]) {
     }
 }
 
-/// Recordings in every form; a recording that was read and written again in the same form is unchanged.
+/// Reads recordings in every format. A recording that was read and written again in the same format is unchanged.
 pub fn recording(data: &[u8]) {
-    // Text forms count microseconds, and a written recording is complete.
+    // Text formats count microseconds, and a written recording is complete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;
@@ -62,7 +62,7 @@ pub fn recording(data: &[u8]) {
     }
 }
 
-/// Inventories; an inventory that was read and written again as text is unchanged.
+/// Reads inventories. An inventory that was read and written again as text is unchanged.
 pub fn inventory(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     if let Ok(inventory) = Inventory::parse(text) {
@@ -70,7 +70,7 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Signal tables: for every signal, the displayed text of a word gives that word again, unless a limit forbids it.
+/// Reads signal tables. For every signal, the displayed text of a word gives that word again, unless a limit forbids it.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -84,9 +84,9 @@ pub fn edges(data: &[u8]) {
                         signal.text_with_unit(word).parse().expect("what is shown can be given");
                     let (again, text) = (signal.word(&given), signal.text(word));
                     let limited = signal.min.is_some() || signal.max.is_some();
-                    // Offsets that are far larger than the scale leave no digits for it.
+                    // An offset far larger than the scale leaves no digits for the scale.
                     let coarse = signal.offset.abs() > signal.scale.abs() * 1e9;
-                    // A scaled signal without a unit takes only words themselves.
+                    // A scaled signal without a unit accepts only the word itself.
                     let no_unit = signal.unit.is_empty() && (signal.scale != 1.0 || signal.offset != 0.0);
                     if no_unit && matches!(again, Err(super::signals::ValueError::NoUnit { .. })) {
                         continue;
@@ -102,7 +102,8 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Parameter files: a file that was read is checked against a board, and the valid values are written as a text that gives the same words.
+/// Reads parameter files. A file that was read is checked against a board. The valid values are written as a text that gives the same
+/// words.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };
@@ -138,7 +139,7 @@ pub fn params(data: &[u8]) {
     }
 }
 
-/// Text of a profile file.
+/// Reads the text of a profile file.
 pub fn profile(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else { return };
     if let Ok(profile) = Profile::from_toml(text) {

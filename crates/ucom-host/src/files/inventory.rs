@@ -1,4 +1,4 @@
-//! Inventory files: positions of the boards. Written after an init, read before updates of several boards.
+//! Inventory files: positions of the boards. An inventory is written after an init and read before updates of several boards.
 //!
 //! ```toml
 //! [[board]]
@@ -9,8 +9,8 @@
 //! program = { flash_number = 0x0021, sha256 = "…", address = 0x0, program_id = 0x4B3F, date = 0x3AC1 }
 //! ```
 //!
-//! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key alone: everything else in
-//! the file stays as it is, comments included.
+//! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key only. Everything else in the file
+//! stays as it is, comments included.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_whole};
 use serde::Deserialize;
@@ -75,7 +75,7 @@ pub enum InventoryError {
         /// System error.
         source: std::io::Error,
     },
-    /// Larger than any inventory.
+    /// The file is larger than any inventory.
     #[error("{}: {bytes} bytes are too many for an inventory (limit {MAX_BYTES})", path.display())]
     TooLarge {
         /// The file.
@@ -83,22 +83,22 @@ pub enum InventoryError {
         /// Its size.
         bytes: u64,
     },
-    /// Not TOML of this form; the text names the line.
+    /// The text is not TOML of this form; the message names the line.
     #[error("{0}")]
     Form(String),
-    /// A number that no board has.
+    /// Number that no board can have.
     #[error("board number {number} is above 31")]
     Number {
         /// The number.
         number: u8,
     },
-    /// Two boards at one place.
+    /// Two boards at one position.
     #[error("board {number} is given twice")]
     Twice {
         /// Board number.
         number: u8,
     },
-    /// Two places for one board.
+    /// Two positions for one board.
     #[error("flash number 0x{flash_number:04X} is given to boards {first} and {second}; it must be unique")]
     FlashTwice {
         /// The flash number.
@@ -121,7 +121,7 @@ pub enum IdentifyError {
         /// The file.
         path: PathBuf,
     },
-    /// The inventory does not have it.
+    /// The inventory does not list the board.
     #[error("board {board} is not in the inventory {}", path.display())]
     NotListed {
         /// The number.
@@ -162,7 +162,7 @@ impl Diagnose for IdentifyError {
     }
 }
 
-/// The flash number of a board by an inventory file.
+/// Returns the flash number of a board from an inventory file.
 ///
 /// # Errors
 /// The file does not exist, cannot be read, or does not list the board.
@@ -199,13 +199,13 @@ impl Inventory {
         })
     }
 
-    /// Writes a file, at once or not at all.
+    /// Writes a file atomically.
     pub fn write(&self, path: &Path) -> Result<(), InventoryError> {
         let io = |source| InventoryError::Io { path: path.into(), source };
         write_whole(path, self.to_toml().as_bytes()).map_err(io)
     }
 
-    /// Adds a board. Numbers above 31, a place taken and a flash number known already are refused.
+    /// Adds a board. Refuses numbers above 31, a position that is taken, and a flash number that is already known.
     pub fn insert(&mut self, board: InventoryBoard) -> Result<(), InventoryError> {
         let number = board.number;
         if number > 31 {
@@ -222,17 +222,17 @@ impl Inventory {
         Ok(())
     }
 
-    /// The board at a position.
+    /// Returns the board at a position.
     pub fn get(&self, number: u8) -> Option<&InventoryBoard> {
         self.boards.get(&number)
     }
 
-    /// All boards in the order of the chain.
+    /// Returns all boards in the order of the chain.
     pub fn boards(&self) -> impl Iterator<Item = &InventoryBoard> {
         self.boards.values()
     }
 
-    /// The boards of an init, with the names and flash records of an older inventory.
+    /// Returns the boards of an init, with the names and flash records of an older inventory.
     ///
     /// # Errors
     /// Two boards have one flash number.
@@ -311,7 +311,7 @@ impl Inventory {
         write_whole(path, document.to_string().as_bytes()).map_err(io)
     }
 
-    /// The file's text.
+    /// Returns the file's text.
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Boards of the chain, by position.\n");
         for board in self.boards.values() {
@@ -330,7 +330,7 @@ impl Inventory {
     }
 }
 
-/// A basic string of TOML.
+/// Returns a basic string of TOML.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

@@ -20,7 +20,7 @@ pub enum TextError {
         /// System error.
         source: std::io::Error,
     },
-    /// Larger than any file of its kind.
+    /// The file is larger than any file of its kind.
     #[error("{}: more than {MAX_BYTES} bytes are too many", path.display())]
     TooLarge {
         /// The file.
@@ -28,7 +28,7 @@ pub enum TextError {
     },
 }
 
-/// Reads a text; also from a source without a known length, as a pipe.
+/// Reads a text, also from a source without a known length, such as a pipe.
 pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     let io = |source| TextError::Io { path: path.into(), source };
     let mut text = String::new();
@@ -44,18 +44,18 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
 ///
 /// # Errors
 ///
-/// The system's error; the file is as it was then.
+/// Error of the system. The file is unchanged in this case.
 pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
     write_whole(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }
 
-/// A basic string of TOML, and a double-quoted scalar of YAML.
+/// Returns a basic string of TOML, which is also a double-quoted scalar of YAML.
 pub(crate) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            // YAML takes these for line ends or for no character at all.
+            // YAML treats these as line ends or does not allow them.
             c if c.is_control()
                 || matches!(c, '\u{2028}' | '\u{2029}' | '\u{FEFF}' | '\u{FFFE}' | '\u{FFFF}') =>
             {

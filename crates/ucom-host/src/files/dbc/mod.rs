@@ -17,7 +17,7 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 /// An input, output or parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSignal {
-    /// The signal's name; becomes an identifier.
+    /// Name of the signal; converted to an identifier.
     pub name: String,
     /// Meaning of its word (D-11).
     pub signal: Signal,
@@ -96,9 +96,9 @@ impl DbcSignal {
     }
 }
 
-/// The text of a DBC file for these boards, with the byte order of their words.
+/// Returns the text of a DBC file for these boards, with the byte order of their words.
 ///
-/// Boards with numbers above 31 are left out. The broadcasts of the PC are in it in any case.
+/// Boards with numbers above 31 are left out. The broadcasts of the PC are always included.
 pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     let mut boards: Vec<(&DbcBoard, Sequence)> = boards
         .iter()
@@ -188,7 +188,7 @@ fn fields(function: Function) -> Vec<DbcSignal> {
     }
 }
 
-/// The signals of a buffer: the offset selects, three words each.
+/// Returns the signals of a buffer: the offset selects three words each.
 fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
     let offset = DbcSignal { multiplex: " M".into(), ..DbcSignal::field("offset", 0, 16) };
     let mut fields = vec![offset];
@@ -208,7 +208,7 @@ fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
 }
 
 fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
-    // A message that boards without any signal never send needs no selector.
+    // Boards without signals never send the message, so it needs no selector.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,
@@ -222,7 +222,7 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // A broadcast is the PC's; under its own number a board sends most.
+        // A broadcast is from the PC; most frames under a board's own number are from that board.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

@@ -1,10 +1,10 @@
 //! Names of signals: unique C identifiers of at most 32 characters, made from free texts.
 
 use std::collections::BTreeSet;
-/// Longest name that every reader of DBC files takes.
+/// Longest name that every reader of DBC files accepts.
 const MAX: usize = 32;
 
-/// Words that a reader of DBC files or a C compiler takes for something else.
+/// Words with another meaning to a reader of DBC files or to a C compiler.
 const RESERVED: [&str; 44] = [
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
     "extern", "float", "for", "goto", "if", "int", "long", "register", "return", "short", "signed", "sizeof",
@@ -12,14 +12,14 @@ const RESERVED: [&str; 44] = [
     "BU_", "CM_", "BA_", "VAL_", "EV_", "NS_", "BS_", "VERSION", "inline", "restrict",
 ];
 
-/// Gives each text a name of its own.
+/// Gives each text a unique name.
 #[derive(Default)]
 pub(super) struct Names {
     used: BTreeSet<String>,
 }
 
 impl Names {
-    /// With names that are taken.
+    /// Creates names that differ from the taken ones.
     pub(super) fn without(taken: &[&str]) -> Self {
         Self { used: taken.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
@@ -43,7 +43,7 @@ impl Names {
     }
 }
 
-/// Letters, digits and underscores only; umlauts as two letters; empty when nothing is left.
+/// Returns letters, digits and underscores only, umlauts as two letters; empty if nothing is left.
 fn identifier(text: &str) -> String {
     let mut name = String::new();
     for c in text.chars() {

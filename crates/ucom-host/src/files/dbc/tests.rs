@@ -26,7 +26,7 @@ fn message(dbc: &Dbc, id: u16) -> &Message {
     dbc.messages.iter().find(|m| m.id == MessageId::Standard(id)).unwrap_or_else(|| panic!("no {id:03X}"))
 }
 
-/// A signal's value by the rules of the DBC form alone: bit by bit.
+/// Returns a signal's value by the rules of the DBC format alone, bit by bit.
 fn value(signal: &Signal, data: &[u8]) -> i64 {
     let bit = |n: u64| i64::from(data[n as usize / 8] >> (n % 8) & 1);
     let mut raw = 0_i64;
@@ -60,7 +60,7 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data by the names of their descriptions, the same numbers in both byte orders.
+/// P-21: process data have the names of their descriptions, and equal numbers in both byte orders.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];
@@ -81,7 +81,7 @@ fn p21_so_frames_decode_by_name() {
     }
 }
 
-/// D-11: type, scale, offset, unit and limits of the signal table are those of the DBC signals.
+/// D-11: type, scale, offset, unit and limits of the signal table appear in the DBC signals.
 #[test]
 fn d11_signals_carry_scale_offset_and_unit() {
     let table = "[[program]]\nprogram_id = 1\nso.angle = { scale = 0.01, unit = \"deg\", min = -60, max = 60 }\n\
@@ -107,7 +107,7 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
-/// Limits are written as short as they are: no digits that only calculating makes.
+/// Limits are written without digits that only come from the calculation.
 #[test]
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\

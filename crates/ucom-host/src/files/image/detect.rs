@@ -1,15 +1,15 @@
 //! Format of a file without a format option: records by their first line, raw bytes only if they cannot be text.
 //!
-//! A text that is taken for raw bytes is flashed, read back and called verified, and the board has no program any more. So raw
-//! bytes are only taken from a `.bin` without printable text. If an option asks for raw bytes, other names are taken as well,
-//! and a text from a `.bin`; records are never taken as raw bytes, not even damaged ones.
+//! If a text were read as raw bytes, it would be flashed, read back and called verified, and the board would have no program any more.
+//! Therefore raw bytes are only read from a `.bin` without printable text. With the option for raw bytes other names are accepted as
+//! well, and a text from a `.bin`. Records are never read as raw bytes, not even damaged records.
 
 use super::{Format, ImageError, segments::lines};
 use std::path::Path;
 
-/// Percentage of printable bytes from which a content is a text.
+/// Percentage of printable bytes from which a content counts as a text.
 const TEXT_PERCENT: usize = 90;
-/// Percentage of hexadecimal digits from which a line is or was a record.
+/// Percentage of hexadecimal digits from which a line counts as a record, whole or damaged.
 const HEX_PERCENT: usize = 80;
 const MARKED_PERCENT: usize = 50;
 /// Length of the part of a text that is shown, characters.
@@ -53,7 +53,7 @@ impl Format {
         }
     }
 
-    /// Raw bytes, because an option asks for them: never an executable or records, and a text only from a `.bin`.
+    /// Checks raw bytes that an option requests: never an executable or records, and a text only from a `.bin`.
     pub(super) fn raw(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         if content.starts_with(b"\x7fELF") {
             return Err(ImageError::Elf);
@@ -73,7 +73,7 @@ impl Format {
         }
     }
 
-    /// The form of files whose names end so.
+    /// Returns the format of files whose names end with this extension.
     fn by_extension(extension: &str) -> Option<Self> {
         match extension {
             "hex" | "ihex" | "ihx" | "h86" => Some(Self::IntelHex),
@@ -87,10 +87,10 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// Returns the place of the first line that is or may have been a record, as a text shows it: in any encoding, with
-/// characters missing or damaged. `None`: the content is not a text, or has no such line.
+/// Returns the place of the first line that is or may have been a record. The content may be a text in any encoding, with missing or
+/// damaged characters. `None`: the content is not a text, or has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
-    // Two bytes a character, padding and ends of old systems.
+    // Texts with two bytes per character, padding, and end marks of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
     let letters = MARKS.iter().find_map(|(mark, _)| letters.strip_prefix(*mark)).unwrap_or(&letters);
     let mut lines = lines(letters);
@@ -100,8 +100,8 @@ fn record_place(content: &[u8]) -> Option<String> {
     Some(format!("line {line}"))
 }
 
-/// Nearly all of the line are hexadecimal digits, as of the shortest records at least; of a line with the mark of a record half
-/// of them are.
+/// Returns `true` if nearly all characters of the line are hexadecimal digits, at least 8 as in the shortest records. For a line with the
+/// mark of a record half of them suffice.
 fn was_record(line: &[u8]) -> bool {
     let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
     let percent = match line {
@@ -125,14 +125,14 @@ fn record_form(content: &[u8]) -> Option<Format> {
     content.split(|b| matches!(b, b'\r' | b'\n')).find_map(line)
 }
 
-/// Nearly all of it can be printed, in one byte a character or in two.
+/// Returns `true` if nearly all of the content is printable, with one or two bytes per character.
 fn is_text(content: &[u8]) -> bool {
     let printed = |b: &&u8| b.is_ascii_graphic() || matches!(b, b' ' | b'\t' | b'\r' | b'\n');
     let share = |printed: usize, of: usize| of > 0 && printed * 100 >= of * TEXT_PERCENT;
     if share(content.iter().filter(printed).count(), content.len()) {
         return true;
     }
-    // UTF-8 letters beyond ASCII have bytes of their own, control characters have none.
+    // UTF-8 letters beyond ASCII have bytes of their own, control characters do not.
     let odd = |c: char| c.is_control() && !c.is_ascii_whitespace();
     if core::str::from_utf8(content).is_ok_and(|text| !text.is_empty() && !text.contains(odd)) {
         return true;

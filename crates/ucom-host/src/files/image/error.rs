@@ -35,13 +35,13 @@ pub enum ImageError {
         /// Encoding of the mark.
         mark: &'static str,
     },
-    /// Bytes that may be anything.
+    /// Bytes without a known format.
     #[error("{name}: no record of Intel HEX or S-record, and no `.bin`")]
     NotBin {
         /// The file.
         name: String,
     },
-    /// The file would be taken for raw bytes, but holds records, whole or damaged.
+    /// The file would be read as raw bytes, but holds records, whole or damaged.
     #[error(
         "{place}: a record of Intel HEX or S-record, or what is left of one; its characters are no program"
     )]
@@ -55,27 +55,27 @@ pub enum ImageError {
         /// Beginning of the text.
         starts: String,
     },
-    /// Raw bytes were requested, but the file has the name of a file of records.
+    /// Raw bytes were requested, but the name is that of a file of records.
     #[error("{name}: raw bytes were asked for, but the name is that of a file of records")]
     RawName {
         /// The file.
         name: String,
     },
-    /// The addresses do not fit in the usual unit, but they do in the other one.
+    /// The addresses do not fit in the usual unit, but they do in the other unit.
     #[error("{error}")]
     OtherUnit {
         /// Error in the usual unit.
         error: Box<Self>,
-        /// The other one.
+        /// Other unit.
         unit: AddressUnit,
     },
-    /// No such form.
+    /// The format does not exist.
     #[error("unknown image format `{name}`: one of bin, hex, srec")]
     UnknownFormat {
         /// Requested name.
         name: String,
     },
-    /// More than the limit.
+    /// Image or file larger than the limit.
     #[error("the image has {bytes} bytes, the limit is {limit}")]
     TooLarge {
         /// Size of the image or of the file.
@@ -128,32 +128,32 @@ pub enum LineProblem {
         /// The mark.
         expected: char,
     },
-    /// Not a hexadecimal digit.
+    /// A character is not a hexadecimal digit.
     #[error("not a hexadecimal digit")]
     Digit,
     /// The record has another length than it declares.
     #[error("the record declares {declared} bytes and has {has}")]
     Length {
-        /// By its length byte.
+        /// Number that the length byte declares.
         declared: usize,
-        /// In the line.
+        /// Number in the line.
         has: usize,
     },
     /// Wrong checksum.
     #[error("checksum is {has:02X}, should be {should:02X}")]
     Checksum {
-        /// In the line.
+        /// Checksum in the line.
         has: u8,
-        /// By the bytes.
+        /// Checksum of the bytes.
         should: u8,
     },
-    /// No such record.
+    /// The record type does not exist.
     #[error("record type {kind} is unknown")]
     Type {
         /// The number.
         kind: u8,
     },
-    /// A word that starts or ends in the middle.
+    /// Data that begin or end in the middle of a word.
     #[error("address 0x{address:X} and length {bytes} do not make whole words")]
     HalfWord {
         /// Address in the record's unit.
@@ -161,7 +161,7 @@ pub enum LineProblem {
         /// Data bytes.
         bytes: usize,
     },
-    /// An address that has another value already.
+    /// An address that already has another value.
     #[error("byte address 0x{address:X} is given twice with different values")]
     Overlap {
         /// First such address, bytes.
@@ -174,18 +174,18 @@ pub enum LineProblem {
         limit: usize,
         /// Lowest address, bytes.
         from: u64,
-        /// End of the highest, bytes.
+        /// End of the highest address, bytes.
         to: u64,
     },
-    /// More than one end.
+    /// Data after the end record.
     #[error("data after the end record")]
     AfterEnd,
     /// The count record disagrees.
     #[error("the count record declares {declared} data records, there are {has}")]
     Count {
-        /// By the record.
+        /// Number in the count record.
         declared: u32,
-        /// In the file.
+        /// Number in the file.
         has: u32,
     },
 }
@@ -193,9 +193,9 @@ pub enum LineProblem {
 /// Remedy for an [`ImageError`]. No remedy bypasses a check of the file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageAdvice {
-    /// The error says all.
+    /// The error itself says everything.
     None,
-    /// The file is damaged or not an image: make it again.
+    /// The file is damaged or not an image: create it again.
     MakeAgain,
     /// Bytes that are not text: `.bin` is the name of raw bytes, or an option takes them as raw.
     NameRaw,
@@ -203,9 +203,9 @@ pub enum ImageAdvice {
     Rename,
     /// Gaps between records can be filled.
     FillGaps,
-    /// The records follow each other if addresses count this unit.
+    /// The records follow one another if addresses count this unit.
     OtherUnit(AddressUnit),
-    /// Addresses overlap, are not at whole words, or go too far.
+    /// Addresses overlap, do not start at whole words, or are too high.
     Addresses,
 }
 
@@ -232,7 +232,7 @@ impl ImageError {
         }
     }
 
-    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or go too far: perhaps they count another unit.
+    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high: they may count another unit.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
         matches!(

@@ -1,10 +1,10 @@
-//! Firmware images: raw bytes, Intel HEX and Motorola S-records become the bytes that go on the wire; the characters of a
-//! file of records never do.
+//! Firmware images. Raw bytes, Intel HEX and Motorola S-records are converted to the bytes on the wire. The characters of a file of
+//! records are never sent.
 //!
-//! The loader counts addresses in 16-bit words, so every image starts at a word and is whole words long. S-records of the boards'
-//! tool chain count words as well; Intel HEX and all other formats count bytes. Files of the other kind are recognised by their
-//! records, if those leave gaps or overlap in one unit and follow each other without gaps in the other one. The unit of one or two
-//! records alone is not guessed; an option can always set the unit.
+//! The loader counts addresses in 16-bit words, so every image starts at a word and consists of whole words. S-records of the boards'
+//! tool chain count words as well; Intel HEX and all other formats count bytes. The reader detects files that count in the other unit by
+//! their records: these leave gaps or overlap in one unit and follow one another without gaps in the other. The unit of only one or two
+//! records is not guessed. An option can always set the unit.
 mod detect;
 mod error;
 mod hex;
@@ -22,10 +22,10 @@ use segments::Segments;
 /// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once,
-/// and after each entry in a table of interrupt vectors, whose records are short.
+/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once. It may also
+/// follow each entry of a table of interrupt vectors, whose records are short.
 const EVIDENCE: usize = 3;
-/// Bytes that they have on average at least; linkers write 16 and more.
+/// Minimum average length of these records, bytes; linkers write 16 and more.
 const EVIDENCE_BYTES: usize = 12;
 
 /// Form of an image file.
@@ -94,19 +94,19 @@ pub enum Gaps {
 /// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Form of the file; `None` decides by content and name. Raw bytes never hold records, and text only from a `.bin`
-    /// when the form is given.
+    /// Format of the file; `None` derives it from content and name. Raw bytes never hold records, and a text only counts as raw bytes if
+    /// it is from a `.bin` and the format is set.
     pub format: Option<Format>,
-    /// Unit of record addresses; `None`: words in S-records, bytes in Intel HEX, and the other unit if at least three records
-    /// follow each other in the other unit alone.
+    /// Unit of record addresses. `None`: words in S-records, bytes in Intel HEX. The other unit is used if at least three records follow
+    /// one another only in that unit.
     pub address_unit: Option<AddressUnit>,
     /// Gaps between records.
     pub gaps: Gaps,
-    /// Swaps the two bytes of each word: for tool chains that write the other order than the wire has.
+    /// Swaps the two bytes of each word, for tool chains that write another order than the wire has.
     pub swap_bytes: bool,
-    /// Load address in words: that of raw bytes (0 if `None`), and in place of the file's own otherwise.
+    /// Load address in words: for raw bytes 0 if `None`; otherwise it replaces the file's own address.
     pub load_address_words: Option<u32>,
-    /// Most bytes, gaps included.
+    /// Limit of the image length, gaps included, bytes.
     pub max_bytes: usize,
 }
 
@@ -123,7 +123,7 @@ impl Default for ImageOptions {
     }
 }
 
-/// Something about an image that its user should know.
+/// A property of an image that its user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageNote {
     /// A gap was filled with 0xFF.
@@ -133,14 +133,14 @@ pub enum ImageNote {
         /// Length, bytes.
         bytes: usize,
     },
-    /// The last word had one byte; 0xFF was added.
+    /// The last word had only one byte; 0xFF was added.
     LastWordPadded,
     /// The file has no end record, but the count record at its end has the right number of data records.
     EndedByCount {
         /// The data records.
         records: u32,
     },
-    /// The records follow each other only if their addresses count this unit, which is not the usual unit of their form.
+    /// The records follow one another only if their addresses count this unit, which is not the usual unit of their format.
     AddressesCount(AddressUnit),
 }
 
@@ -171,7 +171,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file's content; as a `.bin` if neither options nor content determine another format.
+    /// Reads a file's content, as raw bytes if neither options nor content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }
@@ -213,7 +213,7 @@ impl Image {
     /// Reads a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // A record takes at most 14 characters a byte (one byte in an S-record with 32-bit address and line end).
+        // A record takes at most 14 characters per byte (one byte in an S-record with 32-bit address and line end).
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {
@@ -229,7 +229,7 @@ impl Image {
         Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
     }
 
-    /// An image of records, in the unit of their form or in the one in which alone they follow each other.
+    /// Reads records in the usual unit of their format, or in the only unit in which they follow one another.
     fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
         let (usual, other) = match format {
             Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
@@ -260,7 +260,7 @@ impl Image {
                     Ok(image)
                 }
                 _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
-                // Too few records to be sure: the user decides.
+                // Too few records to be certain: the user decides.
                 Ok(_) if e.is_of_addresses() => {
                     Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
                 }
@@ -269,7 +269,7 @@ impl Image {
         }
     }
 
-    /// The bytes in wire order; an even number of them, at least two.
+    /// Returns the bytes in wire order, an even number of at least two.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -289,7 +289,7 @@ impl Image {
         (self.bytes.len() / 2) as u32
     }
 
-    /// Form of the file it came from, in words.
+    /// Returns the name of the file's format.
     pub fn format_name(&self) -> &'static str {
         match self.format {
             Format::Bin => "raw bytes",
@@ -298,12 +298,12 @@ impl Image {
         }
     }
 
-    /// Form of the file it came from.
+    /// Returns the format of the file.
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Returns the unit of its records' addresses; `None` for raw bytes, which have none.
+    /// Returns the unit of the records' addresses; `None` for raw bytes, which have no addresses.
     pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
         let detected = self.notes.iter().find_map(|note| match note {
             ImageNote::AddressesCount(unit) => Some(*unit),

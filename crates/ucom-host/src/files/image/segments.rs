@@ -1,9 +1,9 @@
-//! Data of records, put in order of address.
+//! Data of records, sorted by address.
 
 use super::{AddressUnit, Gaps, ImageError, ImageNote, LineProblem};
 use std::collections::BTreeMap;
 
-/// Runs of bytes by byte address; neighbours are one run.
+/// Runs of bytes by byte address; adjacent bytes form one run.
 pub(super) struct Segments {
     unit: AddressUnit,
     limit: usize,
@@ -35,7 +35,7 @@ impl Segments {
         }
         let mut rest = data;
         let mut at = start;
-        // Data that overlap earlier data must equal them.
+        // Data that overlap earlier data must be equal to them.
         let covering: Vec<u64> = self.covering(start, end);
         for run_start in covering {
             let Some(run) = self.runs.get(&run_start) else { continue };
@@ -93,7 +93,7 @@ impl Segments {
         let beyond = ImageError::AddressRange { address_words: u32::MAX, words: 0 };
         let Ok(address_words) = words(first) else { return Err(beyond) };
         if first % 2 == 1 {
-            // The other half of the first word belongs to no record.
+            // No record contains the other half of the first word.
             return Err(ImageError::Gap { address_words, bytes: 1 });
         }
         let mut bytes: Vec<u8> = Vec::new();
@@ -113,7 +113,7 @@ impl Segments {
     }
 }
 
-/// Two hexadecimal digits a byte; a problem comes with its column from 0.
+/// Reads two hexadecimal digits per byte; an error comes with its column from 0.
 pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> {
     if let Some(i) = digits.iter().position(|d| !d.is_ascii_hexdigit()) {
         return Err((i, LineProblem::Digit));
@@ -125,7 +125,7 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
     Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
 }
 
-/// Lines with their number from 1, without line ends and surrounding blanks; empty ones are left out.
+/// Returns lines with their numbers from 1, without line ends and surrounding blanks; empty lines are left out.
 pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     let lines = content.split(|b| *b == b'\n').enumerate();
     lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())

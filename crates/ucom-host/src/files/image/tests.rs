@@ -1,4 +1,4 @@
-//! References: records from the formats' own published examples, and encoders written here from the formats' rules.
+//! References: records from the published examples of the formats, and encoders written here from the rules of the formats.
 
 use proptest::prelude::*;
 use std::panic;
@@ -73,7 +73,7 @@ fn s_records_as_published_count_words_here() {
     );
 }
 
-/// Records that follow each other in one unit alone show which unit addresses count; one or two records are not enough.
+/// Records that follow one another in only one unit show the unit of the addresses; one or two records are not enough.
 #[test]
 fn the_unit_of_addresses_is_taken_from_the_records() {
     let bytes: Vec<u8> = (0..64).map(|i| i * 3 + 1).collect();
@@ -92,15 +92,15 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     let in_bytes = read(&file(4, 16, 16)).unwrap();
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
-    // A hole that is meant, or one unit or the other: it is not guessed.
+    // A hole may be intended, or the unit may differ: the reader does not guess.
     let other = |text: &str| match read(text) {
         Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
         other => panic!("{other:?}"),
     };
     assert_eq!(other(&file(2, 16, 16)), "16 bytes at word address 0x108 are in no record");
-    // A table of vectors: two words in each place of four.
+    // A table of vectors: two words, then a hole of two.
     assert_eq!(other(&file(16, 4, 4)), "4 bytes at word address 0x102 are in no record");
-    // Intel HEX whose addresses count words: their bytes lie over each other otherwise.
+    // Intel HEX whose addresses count words: in byte addresses the data would overlap.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
     let note = ImageNote::AddressesCount(AddressUnit::Word);
@@ -152,7 +152,7 @@ fn raw_bytes_are_whole_words() {
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text is never raw bytes, whatever its name; the error names its place.
+/// A text never counts as raw bytes, with any name; the error reports the place of the record.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -188,7 +188,7 @@ fn a_text_is_no_image() {
             assert!(read(name, text).is_err(), "{name}: {text:?}");
         }
     }
-    // By its name the file has records: their first mistake is reported.
+    // The name promises records: the first mistake in them is reported.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();
@@ -207,14 +207,14 @@ fn a_count_record_ends_a_file() {
     for kind in [5, 6] {
         let image = parse(&(s_line(0, 2, 0, b"name") + &whole + &count(kind, 4))).unwrap();
         assert_eq!((image.bytes().len(), image.notes()), (64, &[ImageNote::EndedByCount { records: 4 }][..]));
-        // With an end record there is nothing to note.
+        // With an end record there is no note.
         let image = parse(&(whole.clone() + &count(kind, 4) + &s_line(9, 2, 0, &[]))).unwrap();
         assert!(image.notes().is_empty());
         for wrong in [0, 1, 3, 5, 0x104] {
             let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
             assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
         }
-        // Cut after the count, or extended by records that it does not count: the file is not whole.
+        // Cut after the count, or extended by records that the count does not include: the file is not complete.
         for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
             let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
             assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
@@ -223,8 +223,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// Damaged files of records, of both forms: each is refused by its content, with and without the option for raw bytes,
-/// under any name, and the advice bypasses no check.
+/// Damaged files of records in both formats. Each is refused by its content, with and without the option for raw bytes, with any name.
+/// The advice bypasses no check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -295,7 +295,7 @@ fn characters_of_records_are_never_an_image() {
     }
 }
 
-/// Raw bytes on request: any name that is not one of records, and a text only from a `.bin`.
+/// Raw bytes on request: any name except that of a file of records, and a text only from a `.bin`.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();
@@ -332,7 +332,7 @@ fn raw_bytes_on_request_are_looked_at() {
 }
 
 proptest! {
-    /// Equal bytes in the three forms, records of any size in any order, give equal images.
+    /// Equal bytes in the three formats, in records of any size and order, give equal images.
     #[test]
     fn three_forms_are_one_image(
         words in prop::collection::vec(any::<[u8; 2]>(), 1..300),
@@ -359,7 +359,7 @@ proptest! {
         prop_assert_eq!((from_hex.address_words(), from_srec.address_words()), (base, base));
     }
 
-    /// Any bytes and any one damaged byte: an image or a named error, no panic.
+    /// Random bytes, and any single damaged byte, give an image or a named error, never a panic.
     #[test]
     fn anything_is_an_image_or_an_error(
         data in prop::collection::vec(any::<u8>(), 0..300),

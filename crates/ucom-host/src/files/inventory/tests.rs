@@ -61,14 +61,14 @@ fn d62_a_record_changes_one_key_of_the_file() {
         made.keep(&again);
         assert!(made.get(7).unwrap().record().is_some());
         assert!(made.without_records().get(7).unwrap().record().is_none());
-        // Removed, as often as it may be.
+        // Removed; a second removal has no effect.
         for _ in 0..2 {
             Inventory::set_record(&path, 0x21, None).unwrap();
             let left = std::fs::read_to_string(&path).unwrap();
             let plain = |text: &str| text.replace([' ', '\n'], "");
             assert_eq!(plain(&left), plain(text));
         }
-        // A board that is not listed: nothing is kept.
+        // No record is stored for a board that is not listed.
         Inventory::set_record(&path, 0x77, Some(record(0x77))).unwrap();
         assert!(!std::fs::read_to_string(&path).unwrap().contains("sha256"));
     }

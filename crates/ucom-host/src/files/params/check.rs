@@ -1,4 +1,4 @@
-//! Checks a file against the boards on the bus: reports every mistake with its place, before anything is sent.
+//! Checks a file against the boards on the bus: reports every mistake with its place before anything is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
@@ -7,7 +7,7 @@ use crate::master::io::{IoDescription, Kind};
 use std::collections::BTreeMap;
 use ucom::BoardInfo;
 
-/// A board as it is.
+/// Identity of a board on the bus.
 #[derive(Clone, Copy, Debug)]
 pub struct ParamsTarget<'a> {
     /// Answer to PC_INFO.
@@ -27,14 +27,14 @@ pub struct ParamsWord {
     pub word: u16,
     /// The value in the signal's unit, with the unit.
     pub text: String,
-    /// `0.04 → 0.0` if the value lies between two words.
+    /// `0.04 → 0.0` if the value lies between two words; `None` otherwise.
     pub rounded: Option<String>,
 }
 
-/// Mistake of a file.
+/// Mistake in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
-    /// Where in the file.
+    /// Place in the file.
     pub place: Place,
     /// Board number.
     pub board: u8,
@@ -65,38 +65,38 @@ pub enum ParamsProblemKind {
     /// Another board has this number.
     #[error("its flash number is 0x{found:04X}, the file is for 0x{wanted:04X}")]
     WrongFlash {
-        /// The file's.
+        /// Flash number in the file.
         wanted: u16,
-        /// The board's.
+        /// Flash number of the board.
         found: u16,
     },
-    /// The inventory has another name for it.
+    /// The inventory has another name for the board.
     #[error("the file is for `{wanted}`, the inventory calls it {}", found.as_ref().map_or("nothing".into(), |f| format!("`{f}`")))]
     WrongName {
-        /// The file's.
+        /// Name in the file.
         wanted: String,
-        /// The inventory's.
+        /// Name in the inventory.
         found: Option<String>,
     },
-    /// Another program is on it.
+    /// The board has another program.
     #[error("its program is {}, the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
     WrongProgram {
-        /// The file's.
+        /// Program ID in the file.
         wanted: u16,
-        /// The board's; `None`: it has no application.
+        /// Program ID of the board; `None`: it has no application.
         found: Option<u16>,
     },
     /// No signal has this name.
     #[error("{0}")]
     NoSignal(SignalError),
-    /// Two entries mean the same signal.
+    /// Two entries for one signal.
     #[error("{kind} `{name}` is given twice, first in line {first}")]
     Twice {
         /// `CI` or `PAR`.
         kind: &'static str,
         /// Name in the file.
         name: String,
-        /// Line of the first.
+        /// Line of the first entry.
         first: u32,
     },
     /// The value does not fit.
@@ -135,7 +135,7 @@ pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<Par
     problems
 }
 
-/// The words for a board whose description is known: first inputs, then parameters; or every mistake.
+/// Returns the words for a board whose description is known, first inputs, then parameters; or every mistake.
 pub fn check_board(
     board: &ParamsBoard,
     description: &IoDescription,

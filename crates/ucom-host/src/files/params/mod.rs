@@ -1,7 +1,7 @@
-//! Parameter files: the parameters and first inputs that boards shall have. YAML, written to be edited.
+//! Parameter files: parameters and first inputs for boards, in YAML that users edit.
 //!
-//! The protocol has no way to read parameters back (D-35), so a file shows the wanted values, never the present ones of a
-//! board. Boards are identified by flash number or name, and the names of signals belong to a Program ID.
+//! The protocol has no way to read parameters back (D-35), so a file holds requested values, never the present values of a board. Boards
+//! are identified by flash number or name, and the names of signals belong to a Program ID.
 
 mod check;
 mod read;
@@ -14,7 +14,7 @@ use super::signals::SignalValue;
 use super::text::{TextError, read_text};
 use std::path::{Path, PathBuf};
 
-/// The page about these files.
+/// Help page about these files.
 pub const PARAMS_HELP: &str = include_str!("help.txt");
 
 /// A parameter file.
@@ -31,15 +31,15 @@ pub struct ParamsBoard {
     pub number: u8,
     /// Place in the file.
     pub place: Place,
-    /// The flash number that must stand there.
+    /// Flash number that the board at this position must have.
     pub flash_number: Option<u16>,
-    /// The name in the inventory that must stand there; a board has this or a flash number, or both.
+    /// Name in the inventory that the board at this position must have. A board has this, a flash number, or both.
     pub name: Option<String>,
-    /// The program that the names belong to; `None`: `any` in the file.
+    /// Program that the names belong to; `None`: `any` in the file.
     pub program_id: Option<u16>,
     /// Parameters.
     pub par: Vec<ParamsEntry>,
-    /// First inputs, for a start.
+    /// First inputs, used at a start.
     pub ci: Vec<ParamsEntry>,
 }
 
@@ -54,7 +54,7 @@ pub struct ParamsEntry {
     pub place: Place,
 }
 
-/// A place in a text, from 1.
+/// Place in a text, counted from 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// Line.
@@ -76,7 +76,7 @@ pub enum ParamsError {
     /// The file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// Not YAML of this form.
+    /// The text is not YAML of this form.
     #[error("{place}: {what}")]
     Form {
         /// Place.
@@ -84,10 +84,10 @@ pub enum ParamsError {
         /// Error.
         what: String,
     },
-    /// Not YAML of this form, at no place.
+    /// The text is not YAML of this form; the place is not known.
     #[error("{0}")]
     Nowhere(String),
-    /// In a file.
+    /// Error in a file.
     #[error("{}: {source}", path.display())]
     In {
         /// The file.
@@ -104,7 +104,7 @@ impl ParamsFile {
         Self::parse(&text).map_err(|e| ParamsError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// The values for a board.
+    /// Returns the values for a board.
     pub fn board(&self, number: u8) -> Option<&ParamsBoard> {
         self.boards.iter().find(|b| b.number == number)
     }

@@ -1,4 +1,4 @@
-//! From YAML to values, each with its place.
+//! Conversion from YAML to values, each with its place.
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
@@ -6,7 +6,7 @@ use serde_saphyr::Spanned;
 use super::{ParamsBoard, ParamsEntry, ParamsError, ParamsFile, Place};
 use crate::files::signals::SignalValue;
 
-/// More boards than a bus has, and more values than a buffer.
+/// Limit of YAML nodes: more boards than a bus has, and more values than a buffer.
 const MAX_NODES: usize = 400_000;
 
 #[derive(Deserialize)]
@@ -15,7 +15,7 @@ struct File {
     boards: Vec<Spanned<Board>>,
 }
 
-// Every scalar is taken as it is written: 0x10 and 16 are different things here.
+// Every scalar is read as it is written: 0x10 and 16 differ here.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Board {
@@ -66,7 +66,7 @@ fn wrong(place: Place, what: String) -> ParamsError {
     ParamsError::Form { place, what }
 }
 
-/// A number of 16 bits, decimal or with 0x.
+/// Reads a number of 16 bits, decimal or with 0x.
 fn number(text: &Spanned<String>, what: &str) -> Result<u16, ParamsError> {
     let number = match text.value.trim().parse() {
         Ok(SignalValue::Raw(word)) => Some(word),
@@ -119,7 +119,7 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
 
 /// Rewords the YAML library's message for the author of the file.
 fn people(words: &str) -> String {
-    // This message has a place of its own.
+    // This message names another place itself.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);

@@ -1,4 +1,4 @@
-//! Files read, checked and written.
+//! Parameter files that are read, checked and written.
 
 use super::*;
 use crate::files::signals::{BoardSignals, Signal, SignalTable, SignalType};
@@ -51,7 +51,7 @@ fn values_become_words_of_their_signals() {
     assert_eq!((file.board(2).unwrap().program_id, file.board(2).unwrap().flash_number), (None, None));
 }
 
-/// The board is known by its number, its flash number or name, and its program.
+/// A board is identified by its number, its flash number or name, and its program.
 #[test]
 fn another_board_or_program_is_a_problem_with_its_line() {
     let file = ParamsFile::parse(GOOD).unwrap();
@@ -151,7 +151,7 @@ fn saved() -> SavedBoard {
     }
 }
 
-/// D-35: a value that is not wanted is written as a comment.
+/// D-35: a value that is not requested is written as a comment.
 #[test]
 fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let text = params_text(&[saved()]);
@@ -166,7 +166,7 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: with another signal table, or none, a saved file means the same word or is refused; never another word.
+/// D-11, D-35: with another signal table, or without one, a saved file gives the same word or is refused, never another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };
@@ -221,7 +221,7 @@ fn names() -> impl Strategy<Value = Vec<String>> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// For any parameter names, a saved file gives the same words for the same places.
+    /// For any parameter names, a saved file gives the same words at the same places.
     #[test]
     fn a_saved_file_gives_the_same_words(par in names(), words in prop::collection::vec(any::<Option<u16>>(), 8), kind in 0..4_usize, text in any::<String>()) {
         let description = IoDescription { description: text.clone(), par, ..Default::default() };

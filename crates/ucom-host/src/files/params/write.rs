@@ -1,18 +1,18 @@
-//! The text of a parameter file: values that are wanted, and every other name as a comment.
+//! Text of a parameter file: requested values, and every other name as a comment.
 
 use crate::files::signals::{Signal, SignalType, SignalValue};
 use crate::files::text::quoted;
 use crate::master::io::{IoDescription, Kind, short};
 use std::fmt::Write;
 
-/// A board to be written down.
+/// Board to be saved.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SavedBoard {
     /// Board number.
     pub number: u8,
     /// Flash number of the board.
     pub flash_number: u16,
-    /// Name in the inventory; empty: none.
+    /// Name in the inventory; empty if there is none.
     pub name: String,
     /// Program ID.
     pub program_id: u16,
@@ -29,13 +29,13 @@ pub struct SavedBoard {
 pub struct SavedSignal {
     /// Meaning.
     pub signal: Signal,
-    /// The word that is wanted; `None`: the name becomes a comment.
+    /// Requested word; `None`: the name is written as a comment.
     pub word: Option<u16>,
-    /// Time of writing for a wanted word; other information for the rest.
+    /// For a requested word the time of writing; for other signals further information.
     pub remark: String,
 }
 
-/// The text of a parameter file.
+/// Returns the text of a parameter file.
 pub fn params_text(boards: &[SavedBoard]) -> String {
     let mut text = String::from(
         "# Parameters of boards; `ucom help params` explains the form, `ucom par --apply FILE` writes them.\n\
@@ -90,7 +90,7 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text for a word. A file may be read again with another signal table, or with none; a bare number would then be
+/// Returns the text for a word. The file may be read again with another signal table, or without one. A bare number would then give
 /// another word. So each number gets a unit, which a reader without the table refuses, or the word itself is written.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
@@ -101,7 +101,7 @@ fn value(signal: &Signal, word: u16) -> String {
         }
         _ => return raw,
     };
-    // A digit that rounding has lost, or a limit that the word does not keep.
+    // Rounding lost a digit, or the word is beyond a limit.
     if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }
@@ -109,7 +109,8 @@ fn value(signal: &Signal, word: u16) -> String {
     if text.chars().all(plain) { text } else { quoted(&text) }
 }
 
-/// Returns a remark for the end of a line. Texts of boards may hold any characters: control characters and line separators become blanks.
+/// Returns a remark for the end of a line. Texts of boards may hold any characters, so control characters and line separators become
+/// blanks.
 fn comment(words: &str) -> String {
     let one_line: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let one_line = one_line.replace(['\u{2028}', '\u{2029}', '\u{FEFF}', '\u{FFFE}', '\u{FFFF}'], " ");
@@ -123,14 +124,14 @@ const KEY_MAX: usize = 1024;
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // A board may call another signal "#1": further signs make the number different from every name.
+    // A board may have another signal with the name "#1": further signs distinguish the number from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;
     let name = names.chain(numbers).find(|name| fits(name) && means(name)).unwrap_or_default();
     let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    // Words that YAML takes for something else.
+    // Words that have another meaning in YAML.
     let taken = ["null", "true", "false", "yes", "no", "on", "off", "y", "n"];
     if word && !taken.contains(&name.to_ascii_lowercase().as_str()) { name } else { quoted(&name) }
 }

@@ -14,7 +14,7 @@ pub struct CandumpReader<R> {
 }
 
 impl<R: BufRead> CandumpReader<R> {
-    /// From the start of the file.
+    /// Creates a reader at the start of the file.
     pub fn new(input: R) -> Self {
         Self { lines: Lines::new(input), profile: None }
     }
@@ -28,7 +28,7 @@ impl<R: BufRead> CandumpReader<R> {
 impl<R: BufRead> Iterator for CandumpReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// The next record; the first error ends it.
+    /// Returns the next record; the first error ends the sequence.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |comment| {
             if let Some(text) = comment.strip_prefix(PROFILE.trim_end()) {
@@ -104,7 +104,7 @@ fn frame_of(text: &str) -> Result<RecordedFrame, RecordProblem> {
         };
         return Ok(made(FrameKind::Remote { length }, Vec::new(), dlc));
     }
-    // Bytes may be separated by dots.
+    // Dots may separate the bytes.
     let data = hex_bytes(&body.replace('.', ""), 8).ok_or(RecordProblem::Data)?;
     Ok(made(if error { FrameKind::Error } else { FrameKind::Data }, data, dlc))
 }
@@ -115,7 +115,7 @@ pub struct CandumpWriter<W> {
 }
 
 impl<W: Write> CandumpWriter<W> {
-    /// Begins with no line at all, as candump does.
+    /// Creates a writer. The output has no header, as with candump.
     pub fn new(out: W) -> Self {
         Self { out }
     }
@@ -128,7 +128,7 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Adds a line. Its time has microseconds: can-utils refuse any other number of decimals.
+    /// Adds a line. Times have six decimals, because can-utils refuse any other number of decimals.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let (seconds, ns) = (record.time_ns / 1_000_000_000, record.time_ns % 1_000_000_000);
         write!(self.out, "({seconds:010}.{:06})", ns / 1000)?;
@@ -146,7 +146,7 @@ impl<W: Write> CandumpWriter<W> {
         Ok(self.out.flush()?)
     }
 
-    /// The output.
+    /// Returns the output.
     pub fn into_inner(self) -> W {
         self.out
     }

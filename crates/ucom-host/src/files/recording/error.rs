@@ -16,18 +16,18 @@ pub enum RecordingError {
     /// A line is not a valid record.
     #[error("line {line}: {problem}")]
     Line {
-        /// From 1.
+        /// Line, from 1.
         line: usize,
         /// Error in the line.
         problem: RecordProblem,
     },
-    /// Not an FZI-CAN stream of version 1.2.
+    /// The file is not an FZI-CAN stream of version 1.2.
     #[error("the first line is `{first}`, not `{}`", super::FZI_HEADER)]
     FziHeader {
         /// First line of the file.
         first: String,
     },
-    /// The form has no place for this frame.
+    /// The format cannot hold this frame.
     #[error("FZI-CAN holds classic data frames of 11-bit ids only, this one is {frame}")]
     NotRepresentable {
         /// The frame.
@@ -46,25 +46,25 @@ pub enum RecordingError {
 /// Errors in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RecordProblem {
-    /// Longer than any record.
+    /// The line is longer than any record.
     #[error("longer than {} bytes; is this a recording?", super::MAX_LINE)]
     TooLong,
     /// Wrong number of columns.
     #[error("a line of candump is `(seconds) interface ID#DATA`")]
     Columns,
-    /// Not a time.
+    /// The text is not a time.
     #[error("not a time in seconds")]
     Time,
-    /// Not an identifier.
+    /// The text is not an identifier.
     #[error("not an identifier")]
     Id,
-    /// Not a length.
+    /// The text is not a length.
     #[error("not a length of 0 to 8")]
     Length,
-    /// Not data.
+    /// The text is not data.
     #[error("the data are not pairs of hexadecimal digits, or too many")]
     Data,
-    /// The file ends in the middle of the record: the readable part may be only its beginning.
+    /// The file ends in the middle of the record, so the readable part may be only its beginning.
     #[error("the file is broken off here: the line has no end")]
     BrokenOff,
     /// Wrong number of columns.

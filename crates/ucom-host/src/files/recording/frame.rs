@@ -6,7 +6,7 @@ use std::fmt;
 pub enum FrameKind {
     /// Classic data frame.
     Data,
-    /// Remote frame: no data, asks for `length` bytes.
+    /// Remote frame: it has no data and requests `length` bytes.
     Remote {
         /// Requested length, 0..8.
         length: u8,
@@ -16,16 +16,16 @@ pub enum FrameKind {
         /// Flags as candump writes them: 1 bit rate switch, 2 error state.
         flags: u8,
     },
-    /// Not a frame but an error that the adapter reports.
+    /// Error report of the adapter instead of a frame.
     Error,
 }
 
 /// A frame as recorded.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedFrame {
-    /// Identifier; of an error report the error class.
+    /// Identifier, or the error class of an error report.
     pub id: u32,
-    /// 29 bits.
+    /// `true` if the identifier has 29 bits.
     pub extended: bool,
     /// Kind.
     pub kind: FrameKind,
@@ -36,12 +36,12 @@ pub struct RecordedFrame {
 }
 
 impl RecordedFrame {
-    /// A classic data frame with an 11-bit identifier.
+    /// Creates a classic data frame with an 11-bit identifier.
     pub fn classic(id: u16, data: &[u8]) -> Self {
         Self { id: id.into(), extended: false, kind: FrameKind::Data, data: data.to_vec(), dlc: None }
     }
 
-    /// Identifier and payload when this is a classic data frame with an 11-bit identifier (D-02); `None`: foreign.
+    /// Returns identifier and payload of a classic data frame with an 11-bit identifier (D-02); `None` for a foreign frame.
     pub fn as_classic(&self) -> Option<(u16, &[u8])> {
         let id = u16::try_from(self.id).ok().filter(|id| *id <= 0x7FF)?;
         (self.kind == FrameKind::Data && !self.extended && self.data.len() <= 8)
@@ -49,7 +49,7 @@ impl RecordedFrame {
     }
 }
 
-/// As candump writes it.
+/// Prints a frame as candump does.
 impl fmt::Display for RecordedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.kind == FrameKind::Error {

@@ -1,4 +1,4 @@
-//! FZI-CAN 1.2: `sec.usec id dlc b0 … b7`, id decimal, bytes hexadecimal, always eight of them.
+//! FZI-CAN 1.2: `sec.usec id dlc b0 … b7`; the id is decimal, the bytes are hexadecimal, always eight of them.
 
 use super::{Record, RecordProblem, RecordedFrame, RecordingError, lines::Lines, seconds};
 use std::io::{BufRead, Write};
@@ -6,7 +6,7 @@ use std::io::{BufRead, Write};
 /// First line of a stream.
 pub const FZI_HEADER: &str = "# FZI-CAN Stream version 1.2";
 
-/// Name of the interface that records get: the form has none.
+/// Interface name of the records, because the format has none.
 const CHANNEL: &str = "can0";
 
 /// Reads records one by one.
@@ -29,7 +29,7 @@ impl<R: BufRead> FziReader<R> {
 impl<R: BufRead> Iterator for FziReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// The next record; the first error ends it.
+    /// Returns the next record; the first error ends the sequence.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |_| ())
     }
@@ -62,13 +62,13 @@ pub struct FziWriter<W> {
 }
 
 impl<W: Write> FziWriter<W> {
-    /// Begins with the first line.
+    /// Creates a writer and writes the first line.
     pub fn new(mut out: W) -> Result<Self, RecordingError> {
         writeln!(out, "{FZI_HEADER}")?;
         Ok(Self { out })
     }
 
-    /// Adds a line. Foreign frames have no place in this form.
+    /// Adds a line. This format cannot hold foreign frames.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let Some((id, data)) = record.frame.as_classic() else {
             return Err(RecordingError::NotRepresentable { frame: record.frame.to_string() });
@@ -87,7 +87,7 @@ impl<W: Write> FziWriter<W> {
         Ok(self.out.flush()?)
     }
 
-    /// The output.
+    /// Returns the output.
     pub fn into_inner(self) -> W {
         self.out
     }

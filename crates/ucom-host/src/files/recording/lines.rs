@@ -1,4 +1,4 @@
-//! Lines of the text forms: a record each, with blank lines and comments between.
+//! Lines of the text formats: one record each, with blank lines and comments between.
 
 use super::{MAX_LINE, Record, RecordProblem, RecordingError};
 use std::io::{BufRead, Read};
@@ -7,13 +7,13 @@ use std::io::{BufRead, Read};
 pub(super) struct Lines<R> {
     input: R,
     number: usize,
-    /// The last line had no end.
+    /// `true` if the last line had no line end.
     endless: bool,
     failed: bool,
 }
 
 impl<R: BufRead> Lines<R> {
-    /// From the start of the file.
+    /// Creates a reader at the start of the file.
     pub fn new(input: R) -> Self {
         Self { input, number: 0, endless: false, failed: false }
     }
@@ -33,7 +33,8 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
     }
 
-    /// The next record, made by `parse` from its line; the first error ends it. `comment` sees the comments before it.
+    /// Returns the next record, which `parse` makes from its line; the first error ends the sequence. `comment` receives the comments
+    /// before it.
     pub fn record(
         &mut self,
         parse: fn(&str) -> Result<Record, RecordProblem>,

@@ -122,7 +122,7 @@ pub struct McapWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> McapWriter<W> {
-    /// Begins with the profile as metadata.
+    /// Creates a writer and stores the profile as metadata.
     pub fn new(out: W, profile: &str) -> Result<Self, RecordingError> {
         let mut out = WriteOptions::new()
             .library(concat!("openjtc ", env!("CARGO_PKG_VERSION")))
@@ -135,7 +135,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(Self { out, channel, sequence: 0 })
     }
 
-    /// Adds a frame, with the words for it.
+    /// Adds a frame with its description in words.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         let header = MessageHeader {
             channel_id: self.channel,
@@ -148,7 +148,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.write_to_known_channel(&header, &json)?)
     }
 
-    /// Ends the open chunk: the data written so far can then be read without the rest.
+    /// Ends the open chunk, so that the data written so far can be read even if the rest is lost.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         Ok(self.out.flush()?)
     }
@@ -160,7 +160,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Reads a whole file, or the file of a killed writer up to its last whole record.
+/// Reads a whole file. Of a killed writer's file it reads all whole records.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();
@@ -185,7 +185,7 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     });
-    // A chunk whose writer was killed does not contain its length yet, so its damage need not be at the end.
+    // A chunk whose writer was killed does not contain its length yet, so the damage is not always at the end.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
     let broken_off = |why: String| format!("the file is broken off after {} bytes{why}", file.len());
     recording.broken_off = match read {

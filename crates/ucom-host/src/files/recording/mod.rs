@@ -1,8 +1,9 @@
 //! Recordings of a bus: `candump -L`, FZI-CAN 1.2 and MCAP.
 //!
-//! A recording is only meaningful with the profile that was in use. MCAP keeps it as metadata. The two text forms have no
-//! place for it that every reader accepts (python-can's candump reader takes each line for a frame), so it is stored in a
-//! separate file next to the recording, see [`profile_path`]; comment lines `# …` with it are read if they occur.
+//! A recording is only meaningful with the profile that was in use. MCAP stores the profile as metadata. In the two text formats no place
+//! for it suits every reader: python-can's candump reader, for example, takes each line for a frame. For text formats the profile is
+//! therefore stored in a separate file next to the recording, see [`profile_path`]. Comment lines `# …` with a profile are read if they
+//! occur.
 mod candump;
 mod error;
 mod frame;
@@ -25,7 +26,7 @@ pub use mcap::{McapWriter, read_mcap};
 /// Longest line of a text recording, bytes; a longer line is not a recording.
 pub const MAX_LINE: usize = 4096;
 
-/// Form of a recording.
+/// Format of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordingFormat {
     /// Lines `(sec.frac) interface ID#DATA` of can-utils.
@@ -37,7 +38,7 @@ pub enum RecordingFormat {
 }
 
 impl RecordingFormat {
-    /// By the file's first bytes.
+    /// Returns the format by the file's first bytes.
     pub fn detect(start: &[u8]) -> Self {
         if start.starts_with(b"\x89MCAP0\r\n") {
             Self::Mcap
@@ -48,7 +49,7 @@ impl RecordingFormat {
         }
     }
 
-    /// By the ending of a name: `.mcap`, `.fzi`; candump otherwise.
+    /// Returns the format by the ending of a name: `.mcap`, `.fzi`; candump otherwise.
     pub fn of_path(path: &Path) -> Self {
         match path.extension().and_then(|e| e.to_str()) {
             Some("mcap") => Self::Mcap,
@@ -68,16 +69,16 @@ pub fn profile_path(recording: &Path) -> PathBuf {
 /// A whole recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
-    /// The profile in use, as TOML; `None`: not known.
+    /// Profile in use, as TOML; `None` if it is not known.
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
-    /// Place and kind of an end in the middle of a record, as after a killed writer; `None`: the file is complete.
+    /// Place and kind of an end in the middle of a record, as a killed writer leaves it; `None`: the file is complete.
     pub broken_off: Option<String>,
 }
 
 impl Recording {
-    /// Reads a file of any of the forms, and the profile next to it.
+    /// Reads a file of any format, and the profile next to it.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let mut file = BufReader::new(File::open(path).map_err(io)?);
@@ -110,7 +111,7 @@ impl Recording {
     }
 }
 
-/// Returns the records of a text up to its end; if the last line is cut off, also its error.
+/// Returns the records of a text up to its end, and the error of the last line if that is cut off.
 fn whole(
     lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
 ) -> Result<(Vec<Record>, Option<String>), RecordingError> {
@@ -127,7 +128,7 @@ fn whole(
     Ok((records, None))
 }
 
-/// Writes a recording of any form to a file.
+/// Writer for a recording of any format.
 pub enum RecordingWriter {
     /// candump.
     Candump(CandumpWriter<BufWriter<File>>),
@@ -138,7 +139,7 @@ pub enum RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Creates the file, and for text forms the profile's file next to it.
+    /// Creates the file, and for text formats the profile's file next to it.
     pub fn create(path: &Path, format: RecordingFormat, profile: &str) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let out = BufWriter::new(File::create(path).map_err(io)?);
@@ -154,7 +155,7 @@ impl RecordingWriter {
         .map_err(|e| e.with_path(path))
     }
 
-    /// Adds a frame. FZI-CAN cannot hold foreign frames: that is an error, and nothing is written.
+    /// Adds a frame. FZI-CAN cannot hold foreign frames: this is an error, and nothing is written.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.write(record),
@@ -182,7 +183,7 @@ impl RecordingWriter {
     }
 }
 
-/// `sec.fraction` with any number of digits as nanoseconds; finer digits are dropped.
+/// Returns `sec.fraction` with any number of digits as nanoseconds; finer digits are dropped.
 fn seconds(text: &str) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
@@ -196,7 +197,7 @@ fn seconds(text: &str) -> Option<u64> {
     whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(ns)
 }
 
-/// Bytes from pairs of hexadecimal digits, at most `most`.
+/// Returns bytes from pairs of hexadecimal digits, at most `most`.
 fn hex_bytes(text: &str, most: usize) -> Option<Vec<u8>> {
     let digits = text.as_bytes();
     if digits.len() % 2 == 1 || digits.len() > most * 2 || !digits.iter().all(u8::is_ascii_hexdigit) {

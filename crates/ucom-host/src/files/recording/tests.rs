@@ -1,4 +1,4 @@
-//! C-3 and C-7 for files; the python readers are run by the reference checks.
+//! C-3 and C-7 for files; the reference checks run the Python readers.
 
 use proptest::prelude::*;
 use std::io::Cursor;
@@ -17,7 +17,7 @@ fn problem(line: &str) -> RecordProblem {
     }
 }
 
-/// C-3: a reset for all is a frame like any other.
+/// C-3: a reset of all boards is a frame like any other.
 #[test]
 fn c3_reset_for_all_is_kept() {
     let records = read("(1.5) can0 000#\n").unwrap();
@@ -132,7 +132,8 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// A killed writer leaves a file that is cut off anywhere: whole records are read, none is made up, the rest is reported.
+/// A killed writer leaves a file that is cut off at any place. Whole records are read, no record is invented, and the remainder is
+/// reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     let record = |i: u64| {
@@ -168,7 +169,7 @@ fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     }
 }
 
-/// As before, while a chunk of MCAP was being written: its head does not contain its length yet.
+/// As before, but a chunk of MCAP was being written: its head does not contain its length yet.
 #[test]
 fn a_chunk_without_its_end_hides_nothing_before_it() {
     let record = |i: u64| {
@@ -206,7 +207,7 @@ fn records(us: bool) -> impl Strategy<Value = Vec<Record>> {
 }
 
 proptest! {
-    /// C-7 for candump: any frames come back as they were, their times in µs.
+    /// C-7 for candump: any frames are read back unchanged, with times in µs.
     #[test]
     fn c7_candump_round_trip(records in records(true)) {
         let mut out = CandumpWriter::new(Vec::new());
@@ -226,7 +227,7 @@ proptest! {
         prop_assert_eq!(back, plain);
     }
 
-    /// MCAP: frames and the profile come back.
+    /// MCAP: frames and the profile are read back unchanged.
     #[test]
     fn mcap_round_trip(records in records(false)) {
         let mut out = McapWriter::new(Cursor::new(Vec::new()), "endian = \"big\"\n").unwrap();
@@ -238,7 +239,7 @@ proptest! {
         prop_assert_eq!(back.profile.as_deref(), Some("endian = \"big\"\n"));
     }
 
-    /// Any text: records or a named error.
+    /// Random text gives records or a named error.
     #[test]
     fn any_text_is_read_or_refused(text in "[ -~\n#()R]{0,200}", bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let _ = read(&text);

@@ -49,7 +49,7 @@ impl Default for FileSignal {
     }
 }
 
-/// `0x1234` or `[0x1234, 0x4B3F]`. Not as an untagged enum: that would lose the place of a mistake.
+/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the place of a mistake.
 fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
     struct Ids;
     impl<'de> serde::de::Visitor<'de> for Ids {

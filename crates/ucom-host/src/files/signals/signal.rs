@@ -26,11 +26,11 @@ pub enum SignalType {
 pub struct Signal {
     /// Number type of the word.
     pub kind: SignalType,
-    /// Units for each step of the word.
+    /// Units per step of the word.
     pub scale: f64,
     /// Value of the word 0, in units.
     pub offset: f64,
-    /// As `deg`; empty: none.
+    /// Unit such as `deg`; empty if there is none.
     pub unit: String,
     /// Smallest value that may be written, in units.
     pub min: Option<f64>,
@@ -46,7 +46,7 @@ pub struct Signal {
 const SLACK: f64 = 1e-9;
 
 impl Signal {
-    /// A signal that no table knows: a bare word, signed or not by the profile.
+    /// Creates a signal that no table knows: a bare word, signed or not by the profile.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {
@@ -96,12 +96,12 @@ impl Signal {
 
     fn written(&self, value: f64) -> String {
         let text = format!("{value:.*}", self.digits());
-        // Rounding may leave a sign on nothing.
+        // Rounding may leave a sign in front of zero.
         let zero = text.starts_with('-') && text.chars().all(|c| "-0.".contains(c));
         if zero { text.trim_start_matches('-').into() } else { text }
     }
 
-    /// The word as a value in the signal's unit, without the unit: `15.50`, `-20`, `0x00FF`, `on`.
+    /// Returns the word as a value in the signal's unit, without the unit: `15.50`, `-20`, `0x00FF`, `on`.
     pub fn text(&self, word: u16) -> String {
         match self.kind {
             SignalType::Bool => if word == 0 { "off" } else { "on" }.into(),
@@ -115,7 +115,7 @@ impl Signal {
         self.text(word) + &space(&self.unit)
     }
 
-    /// The value for programs: a number in the signal's unit, or true and false.
+    /// Returns the value for programs: a number in the signal's unit, or true and false.
     pub fn json(&self, word: u16) -> Value {
         match self.kind {
             SignalType::Bool => json!(word != 0),
@@ -140,7 +140,7 @@ impl Signal {
         }
         let text = |limit: f64, own: Option<f64>| {
             let text = self.written(limit);
-            // A limit of the table between two words is shown as it is.
+            // A limit of the table that lies between two words is shown unchanged.
             let odd = own == Some(limit) && text.parse() != Ok(limit);
             if odd { limit.to_string() } else { text }
         };
@@ -148,7 +148,7 @@ impl Signal {
         (text(low, self.min), text(high, self.max))
     }
 
-    /// Returns the smallest and largest number of a word whose value is within the limits; the first is larger if no word is.
+    /// Returns the smallest and largest word, as numbers, whose values are within the limits; the first is larger if no word is.
     pub(super) fn allowed(&self) -> (i32, i32) {
         let (low, high) = self.words();
         let steps = |limit: f64| (limit - self.offset) / self.scale;
@@ -167,7 +167,7 @@ impl Signal {
         !below && !above
     }
 
-    /// Returns the value that is sent instead of one that lies between two words, with the unit; `None`: the value itself.
+    /// Returns the value, with its unit, that is sent instead of a value between two words; `None`: the value itself is sent.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -175,17 +175,18 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// Returns the word for a value. Between two words the nearer one is taken if the signal has a scale, but never one beyond the limits.
+    /// Returns the word for a value. A value between two words gives the nearer word if the signal has a scale, but never a word beyond
+    /// the limits.
     ///
     /// # Errors
-    /// A value outside of the limits, in another unit, between two words of a signal without scale, or of another type.
+    /// The value is out of the limits, in another unit, between two words of a signal without a scale, or of another type.
     pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // The word itself is sent for any scale; limits hold for it, too.
+            // The word itself is sent unscaled; limits apply to it as well.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
@@ -223,7 +224,7 @@ impl Signal {
         Ok(number as u16)
     }
 
-    /// The error of a value, in the signal's unit, that is outside of the limits.
+    /// Returns the error for a value, in the signal's unit, that is out of the limits.
     fn outside(&self, given: &SignalValue, value: f64) -> ValueError {
         let (min, max) = self.limits();
         let (low, high) = self.range();

@@ -1,4 +1,4 @@
-//! The file: TOML, by Program ID.
+//! The file: TOML with tables by Program ID.
 
 use super::Signal;
 use super::form::{File, FileSignal, LARGEST, people};
@@ -7,7 +7,7 @@ use crate::master::io::{IoDescription, Kind, short};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The page about these files.
+/// Help page about these files.
 pub const SIGNAL_HELP: &str = include_str!("help.txt");
 
 /// Tables of several programs.
@@ -20,7 +20,7 @@ pub struct SignalTable {
 /// Signals of a program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramSignals {
-    /// Program IDs of the versions that it fits.
+    /// Program IDs of the program versions that the table fits.
     pub program_ids: Vec<u16>,
     /// Name for display.
     pub name: String,
@@ -51,7 +51,7 @@ pub enum SignalTableError {
         /// The Program ID.
         id: u16,
     },
-    /// A number that makes no sense.
+    /// A number that is not valid.
     #[error("program 0x{id:04X}, {kind} `{signal}`: {what}")]
     Signal {
         /// The first Program ID.
@@ -63,7 +63,7 @@ pub enum SignalTableError {
         /// Error, with the limit.
         what: String,
     },
-    /// In a file.
+    /// Error in a file.
     #[error("{}: {source}", path.display())]
     In {
         /// The file.
@@ -123,8 +123,8 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// Returns the file's text for programs that need a table: every name, with scale and unit as guessed from the texts
-    /// of the boards, for review by an expert.
+    /// Returns the file's text for programs that need a table: every name, with scale and unit as guessed from the texts of the boards.
+    /// An expert must review it.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
@@ -149,7 +149,7 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Two signals of one name, and a third that is called by the number of the second: nothing to be done.
+                    // Two signals share a name, and a third has the number of the second as its name: not solvable.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
@@ -160,7 +160,7 @@ impl SignalTable {
     }
 }
 
-/// `scale = 0.01, unit = "deg"` from `position [0.01 deg]`.
+/// Returns `scale = 0.01, unit = "deg"` for `position [0.01 deg]`.
 fn keys(name: &str) -> String {
     let bracket =
         name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
@@ -210,7 +210,7 @@ impl ProgramSignals {
             .or_else(|| all.get(&format!("#{index}")))
     }
 
-    /// Names of the table that the program has not: mistakes in writing, mostly.
+    /// Returns names in the table that the program does not have, which are mostly typing errors.
     pub fn strays(&self, description: &IoDescription) -> Vec<String> {
         let mut strays = Vec::new();
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
@@ -249,7 +249,7 @@ mod tests {
         }
     }
 
-    /// D-11: tables are found by Program ID; a signal without a table entry stays a bare word.
+    /// D-11: the Program ID selects the table. A signal without an entry stays a bare word.
     #[test]
     fn d11_tables_are_found_by_program_and_name() {
         let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
@@ -296,7 +296,7 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: names in another letter case are equal, as for given values.
+    /// D-11: letter case does not matter for names, as with given values.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
@@ -309,7 +309,7 @@ mod tests {
         assert!(table.is_given() && !SignalTable::default().is_given());
     }
 
-    /// A template is a table, and it names every signal.
+    /// A template is a valid table and names every signal.
     #[test]
     fn a_template_is_a_table_of_all_signals() {
         let text = SignalTable::template(&[(0x1234, &description())]);

@@ -5,16 +5,16 @@ use core::str::FromStr;
 /// Longest unit, in bytes.
 const UNIT_MAX: usize = 32;
 
-/// A value before it is known which signal it is for.
+/// A value whose signal is not known yet.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SignalValue {
     /// `0x05DC`: the word itself, for any type and scale of the signal.
     Raw(u16),
-    /// `15.5 deg`: in the unit of the signal. `15.5`: if the signal has no unit; without a table, the word as a number.
+    /// `15.5 deg`: in the unit of the signal. `15.5`: for a signal without a unit; without a table, the word as a number.
     Number {
         /// The number.
         value: f64,
-        /// Unit after the number; empty: none was given.
+        /// Unit after the number; empty if none was given.
         unit: String,
     },
     /// `on`, `off`, `true`, `false`, `yes`, `no`.
@@ -54,7 +54,7 @@ impl FromStr for SignalValue {
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
         }
-        // The longest beginning that is a number; the rest is its unit.
+        // The number is the longest valid beginning; the remainder is its unit.
         let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
@@ -62,7 +62,7 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // 0o10 and -0x10 are numbers elsewhere, not 0 in a unit of that name.
+        // 0o10 and -0x10 are numbers elsewhere, not 0 with a unit of that name.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined
@@ -133,7 +133,7 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
-        // An accepted text is accepted again as it is displayed, with an additional blank.
+        // The displayed form of an accepted text is accepted again, although it has one more blank.
         assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);

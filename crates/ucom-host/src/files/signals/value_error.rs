@@ -1,4 +1,4 @@
-//! Why a value cannot be written to a signal.
+//! Errors of values for signals.
 /// Reasons why a value cannot be written to a signal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
@@ -11,14 +11,14 @@ pub enum ValueError {
         min: String,
         /// Largest value.
         max: String,
-        /// Their unit.
+        /// Unit of the limits.
         unit: String,
         /// The value as a number in this unit.
         value: f64,
-        /// The limit that it is beyond.
+        /// The limit that was exceeded.
         limit: f64,
     },
-    /// Given in another unit than the signal's.
+    /// The unit differs from the signal's.
     #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
     Unit {
         /// Given text.
@@ -26,21 +26,21 @@ pub enum ValueError {
         /// The signal's unit.
         unit: String,
     },
-    /// A number alone that could be the word or a value in the signal's unit.
+    /// A bare number that could be the word or a value in the signal's unit.
     #[error("{given}: {}, or the word itself as 0x0000", no_unit(given, unit))]
     NoUnit {
         /// Given text.
         given: String,
-        /// The signal's unit; empty: the table scales it and names none.
+        /// Unit of the signal; empty: the table scales the signal and names no unit.
         unit: String,
     },
-    /// Between two words.
+    /// A value between two words.
     #[error("{given}: it is a whole number")]
     Fraction {
         /// Given text.
         given: String,
     },
-    /// Not 0 or 1, on or off.
+    /// A value other than 0, 1, on or off.
     #[error("{given}: it is on or off")]
     Switch {
         /// Given text.
@@ -54,7 +54,7 @@ pub enum ValueError {
         /// Given text.
         given: String,
     },
-    /// On or off, but the signal is a number.
+    /// On or off for a signal that is a number.
     #[error("{given}: it is a number")]
     NoSwitch {
         /// Given text.

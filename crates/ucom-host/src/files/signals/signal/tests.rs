@@ -21,7 +21,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
         (word(&signal, "32767"), word(&signal, "-32768"), word(&signal, "0xFFEC")),
         (Ok(32767), Ok(32768), Ok(65516))
     );
-    // A number that would come back as another one is refused.
+    // A number that would be read back as another number is refused.
     for wrong in ["32768", "40000", "65535", "-32769", "1.5", "3 deg", "on"] {
         assert!(word(&signal, wrong).is_err(), "{wrong}");
     }
@@ -59,14 +59,14 @@ fn d11_scale_offset_and_unit() {
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
     assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
-    // The number would be the word if the table is missing; without a unit only the word can be given.
+    // Without the table the number would mean the word. Without a unit only the word can be given.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table scales it and names no unit") && message.contains("0x0000"),
         "{message}"
     );
     assert_eq!(word(&down, "0x0002"), Ok(2));
-    // A number that the table does not scale is the word with it and without.
+    // A number that the table does not scale gives the same word with and without the table.
     assert_eq!(word(&signal(SignalType::Int16, 1.0, 0.0, ""), "2"), Ok(2));
 }
 
@@ -78,7 +78,7 @@ fn d11_limits_of_the_table_hold_for_every_form() {
     assert!(word(&signal, "0x03E9").is_err() && word(&signal, "-0.01A").is_err());
 }
 
-/// No value beyond a limit is taken, and no word beyond it is sent, for any step size.
+/// For any step size, no value beyond a limit is accepted and no word beyond it is sent.
 #[test]
 fn d11_rounding_never_leaves_the_limits() {
     let coarse = Signal { max: Some(150.0), ..signal(SignalType::Int16, 100.0, 0.0, "mA") };
@@ -92,7 +92,7 @@ fn d11_rounding_never_leaves_the_limits() {
     );
     let down = Signal { min: Some(-150.0), ..signal(SignalType::Int16, -100.0, 0.0, "A") };
     assert_eq!((word(&down, "-150A"), word(&down, "-151A").is_err()), (Ok(1), true));
-    // Rounding errors of fractions are not violations.
+    // Rounding errors of fractions do not violate a limit.
     let tenths = Signal { max: Some(0.3), ..signal(SignalType::Int16, 0.1, 0.0, "A") };
     assert_eq!((word(&tenths, "0.3A"), word(&tenths, "0x0003")), (Ok(3), Ok(3)));
     let odd = Signal { min: Some(-0.125), max: Some(3276.65), ..signal(SignalType::Int16, 0.1, 0.0, "") };
@@ -127,7 +127,7 @@ fn d11_switches_and_bits() {
 }
 
 proptest! {
-    /// The word that is sent keeps the limits, and no allowed word is nearer.
+    /// The word that is sent is within the limits, and no allowed word is nearer.
     #[test]
     fn d11_the_sent_word_keeps_the_limits(scale in prop::sample::select(vec![-7.0, -0.3, 0.01, 0.3, 1.5, 100.0]), offset in -50..50_i32, a in -2000..2000_i32, b in -2000..2000_i32, value in -2500..2500_i32) {
         let (min, max) = (f64::from(a.min(b)) / 8.0, f64::from(a.max(b)) / 8.0);

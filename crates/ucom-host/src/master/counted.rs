@@ -1,4 +1,4 @@
-//! Numbers with their noun.
+//! Numbers followed by a noun.
 
 use std::format;
 use std::string::String;

@@ -8,7 +8,7 @@ pub use host_kit::{Finding, Severity};
 use crate::master::counted::counted;
 use ucom::{Function, Profile};
 
-/// State that the CAN controller reports.
+/// State reported by the CAN controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Controller {
     /// `true` if the controller is bus-off.
@@ -42,17 +42,17 @@ pub struct Observation {
     pub controller: Option<Controller>,
     /// A harmless scan.
     pub scan: Option<ScanReport>,
-    /// An init, when there was one.
+    /// Report of an init, if there was one.
     pub init: Option<InitReport>,
     /// Another bit rate at which frames were received, bit/s.
     pub other_bitrate: Option<u32>,
-    /// Another PC's last frame.
+    /// Last frame of another PC.
     pub competing_master: Option<(Function, u8)>,
     /// The profile in use.
     pub profile: Profile,
 }
 
-/// Everything that can be reported, problems first.
+/// Returns all findings, problems first.
 pub fn findings(o: &Observation) -> Vec<Finding> {
     let mut f = Findings::default();
     bus(o, &mut f);
@@ -211,7 +211,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), why, next);
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The other values of these boards were read in the wrong order, too.
+        // The other values of these boards were also read in the wrong order.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }

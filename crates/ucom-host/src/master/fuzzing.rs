@@ -1,4 +1,4 @@
-//! Body of the fuzz targets: any frames at any time into any procedure. A panic or an endless wait is a finding.
+//! Body of the fuzz targets: random frames at any time during any procedure. A panic or an endless wait is a finding.
 use crate::master::engine::Event;
 use crate::master::interface::Master;
 use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};
@@ -39,7 +39,7 @@ fn request(choice: u8) -> Request {
     }
 }
 
-/// The first byte chooses the procedure, the rest are frames: pause in ms, identifier, length, data.
+/// Runs a procedure, chosen by the first byte. The remainder holds frames: pause in ms, identifier, length, data.
 pub fn frames(data: &[u8]) {
     let Some((&choice, mut rest)) = data.split_first() else { return };
     let mut master = Master::new(Profile::default());

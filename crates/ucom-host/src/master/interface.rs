@@ -24,7 +24,7 @@ impl Master {
         Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
     }
 
-    /// Starts a procedure; its end comes as [`Event::Done`]. Refused while another one works with the same board.
+    /// Starts a procedure; its end is reported as [`Event::Done`]. Refused while another procedure works with the same board.
     pub fn start(&mut self, now: u64, request: Request) -> Result<ProcedureId, Error> {
         let (id, name, claims) = (ProcedureId(self.next_id), request.name(), request.claims());
         {
@@ -45,7 +45,7 @@ impl Master {
         Ok(id)
     }
 
-    /// Cancels a procedure; it still undoes its changes on the boards, then [`Event::Done`] comes.
+    /// Cancels a procedure. It still undoes its changes on the boards before [`Event::Done`] comes.
     pub fn cancel(&mut self, id: ProcedureId) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.cancel = true;
@@ -53,8 +53,8 @@ impl Master {
         self.run();
     }
 
-    /// Ends a procedure without another frame, because the bus is lost. [`Event::Done`] comes at once: an update's with
-    /// the known state of each board, the conformance tests' with the finished tests, any other's with [`MasterError::Bus`].
+    /// Ends a procedure without another frame, because the bus is lost. [`Event::Done`] comes at once. For an update it has the known
+    /// state of each board, for conformance tests the finished tests, for all others [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -62,7 +62,7 @@ impl Master {
         self.run();
     }
 
-    /// A frame has arrived; see [`Frame::received`].
+    /// Takes a received frame; see [`Frame::received`].
     pub fn handle(&mut self, now: u64, received: Result<Frame, Foreign>) {
         {
             let mut core = lock(&self.core);
@@ -72,13 +72,13 @@ impl Master {
         self.run();
     }
 
-    /// The next frame to send; call it until it gives none.
+    /// Returns the next frame to send; call it until it returns `None`.
     pub fn poll(&mut self, now: u64) -> Option<Frame> {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has handed over the frames up to `received`, but not those between that time and
-    /// `now`: no wait ends after `received`, but heartbeats are sent.
+    /// Like `poll`, for a driver that has delivered the frames up to `received`, but not those between that time and `now`. No wait ends
+    /// after `received`, but heartbeats are sent.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -110,7 +110,7 @@ impl Master {
         !self.work.is_empty()
     }
 
-    /// Moves every procedure as far as it can go.
+    /// Advances every procedure as far as possible.
     fn run(&mut self) {
         let mut context = Context::from_waker(Waker::noop());
         let core = self.core.clone();
@@ -126,7 +126,7 @@ impl Master {
         });
     }
 
-    /// The profile in use.
+    /// Returns the profile in use.
     pub fn profile(&self) -> Profile {
         lock(&self.core).profile
     }
@@ -141,29 +141,29 @@ impl Master {
         lock(&self.core).competing_master
     }
 
-    /// No more heartbeats and repeated inputs: boards that run become safe by themselves (D-50).
+    /// Ends heartbeats and repeated inputs: running boards become safe by themselves (D-50).
     pub fn end_session(&mut self) {
         let mut core = lock(&self.core);
         core.session = Session::Quiet;
         core.stops.clear();
     }
 
-    /// The boards as last seen.
+    /// Returns the boards as last seen.
     pub fn boards(&self) -> Boards {
         lock(&self.core).boards.clone()
     }
 
-    /// Numbers that two boards have, each as the error that procedures end with.
+    /// Returns the numbers that two boards have, each as the error with which procedures end.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
 
-    /// Counters of the bus.
+    /// Returns the counters of the bus.
     pub fn statistics(&self) -> Statistics {
         lock(&self.core).statistics.clone()
     }
 
-    /// Sets an input of a described board: sent at once, and repeated while the board runs (D-34).
+    /// Sets an input of a described board. The input is sent at once, and repeated while the board runs (D-34).
     pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Ci, name)?;
         let mut core = lock(&self.core);
@@ -177,7 +177,7 @@ impl Master {
         Ok(index)
     }
 
-    /// Writes a parameter of a described board; no answer comes, so the shadow marks the value as assumed (D-35).
+    /// Writes a parameter of a described board. The board does not answer, so the shadow marks the value as assumed (D-35).
     pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
@@ -190,34 +190,34 @@ impl Master {
         description.find(board, kind, name)
     }
 
-    /// The description of a board, when it is known.
+    /// Returns the description of a board, if it is known.
     pub fn description(&self, board: u8) -> Option<IoDescription> {
         let core = lock(&self.core);
         let key = core.data.get(&board)?.description?;
         core.descriptions.get(&key).cloned()
     }
 
-    /// All known descriptions, to be kept for the next time.
+    /// Returns all known descriptions, to be stored for the next session.
     pub fn descriptions(&self) -> BTreeMap<DescriptionKey, IoDescription> {
         lock(&self.core).descriptions.clone()
     }
 
-    /// Descriptions from the last time (D-36).
+    /// Stores a description from an earlier session (D-36).
     pub fn know_description(&mut self, key: DescriptionKey, description: IoDescription) {
         lock(&self.core).descriptions.insert(key, description);
     }
 
-    /// Returns `true` if the inputs of a board are sent cyclically: a lost frame is followed by others (D-34).
+    /// Returns `true` if the inputs of a board are sent cyclically, so that a lost frame is followed by others (D-34).
     pub fn repeats_inputs(&self, board: u8) -> bool {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
 
-    /// Inputs of a board as last set, or as it wants them first; `None`: neither is known since its application started.
+    /// Returns the inputs of a board as last set, or its own initial inputs; `None`: neither is known since its application started.
     pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
         lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()
     }
 
-    /// Parameters of a board as this PC believes them to be.
+    /// Returns the parameters of a board as this PC assumes them.
     pub fn parameters(&self, board: u8) -> Vec<ParValue> {
         lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
     }
@@ -239,8 +239,8 @@ impl Master {
         core.start_session();
     }
 
-    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly after: for
-    /// these boards, the last one first, or for all by broadcast. Waits for no answer; [`Request::Stop`] checks each board.
+    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly after. The stop goes to
+    /// these boards, the last one first, or to all by broadcast. Waits for no answer; [`Request::Stop`] checks each board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

@@ -4,7 +4,7 @@ use core::fmt;
 
 use ucom::{Dimensions, Profile};
 
-/// Bits of a classic frame with worst-case stuffing and the pause after it: DLC 0 = 55, 2 = 75, 8 = 135.
+/// Returns the bits of a classic frame with worst-case stuffing and the pause after it: DLC 0 = 55, 2 = 75, 8 = 135.
 pub const fn frame_bits(dlc: u8) -> u64 {
     let data = 8 * if dlc > 8 { 8 } else { dlc as u64 };
     // 34 of the 44 bits outside the data can be stuffed, and three more bits separate frames.
@@ -15,9 +15,9 @@ pub const fn frame_bits(dlc: u8) -> u64 {
 /// Bus load that the control loops of some boards will cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoadForecast {
-    /// Boards that run.
+    /// Number of running boards.
     pub boards: u32,
-    /// Bits per second, all boards and the PC.
+    /// Bits per second of all boards and the PC.
     pub bits_per_s: u64,
     /// Bit rate, bit/s.
     pub bitrate: u32,
@@ -42,12 +42,12 @@ impl LoadForecast {
         Self { boards, bits_per_s: bits as u64, bitrate: profile.bitrate, limit: profile.load_limit }
     }
 
-    /// Percent of the bit rate.
+    /// Returns the percentage of the bit rate.
     pub fn percent(&self) -> f64 {
         100.0 * self.bits_per_s as f64 / f64::from(self.bitrate.max(1))
     }
 
-    /// More than the limit.
+    /// Returns `true` if the load exceeds the limit.
     pub fn exceeds(&self) -> bool {
         self.percent() > f64::from(self.limit)
     }
@@ -69,7 +69,7 @@ impl fmt::Display for LoadForecast {
 mod tests {
     use super::*;
 
-    /// The lengths of the requirements.
+    /// The frame lengths in the requirements.
     #[test]
     fn worst_case_lengths() {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);

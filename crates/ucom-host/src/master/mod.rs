@@ -1,15 +1,15 @@
 //! The PC side: procedures as state machines without I/O.
 //!
-//! A [`Master`] takes frames and the time and returns frames; it never waits, has no clock and no thread. A driver is a
-//! loop of a few lines:
+//! A [`Master`] takes frames and the time and returns frames. It never waits, and has no clock and no thread. A driver is a loop of a few
+//! lines:
 //!
-//! 1. hand over every frame that has arrived: [`Master::handle`];
+//! 1. deliver every frame that has arrived: [`Master::handle`];
 //! 2. send while [`Master::poll`] returns frames;
 //! 3. handle [`Master::take_event`];
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
-//! Hand over all received frames before `poll` is called: waits end only in `poll`, so a late driver never mistakes an answer for silence
-//! ([`Master::poll_behind`] covers frames that came during the hand-over). Time is in microseconds from any start and must not go back (a
+//! Deliver all received frames before `poll` is called. Waits end only in `poll`, so a late driver never mistakes an answer for silence
+//! ([`Master::poll_behind`] covers frames that came during the delivery). Time is in microseconds from any start and must not go back (a
 //! monotonic clock).
 //!
 //! ```
@@ -31,8 +31,8 @@
 //! assert!(report.boards.is_empty());
 //! ```
 //!
-//! Procedures that change something make this PC the master of the bus first: it listens for another one (D-08), then
-//! sends heartbeats until [`Master::end_session`]. Scan, information and descriptions change nothing and send none.
+//! A procedure that changes something first makes this PC the master of the bus. It listens for another master (D-08), then sends
+//! heartbeats until [`Master::end_session`]. Scan, information and descriptions change nothing and send no heartbeats.
 
 mod counted;
 pub mod doctor;

@@ -9,11 +9,11 @@ pub enum Life {
     /// No heartbeat yet, or the application was stopped on purpose.
     #[default]
     Unarmed,
-    /// In time.
+    /// The heartbeats come in time.
     Alive,
-    /// One heartbeat is missing.
+    /// A single heartbeat is missing.
     Late,
-    /// Three are missing.
+    /// Three heartbeats are missing.
     Lost,
 }
 
@@ -25,7 +25,7 @@ const UNDER_WAY: u64 = 100_000;
 pub struct Board {
     /// Last answer to PC_INFO.
     pub info: Option<BoardInfo>,
-    /// Description, if it came whole.
+    /// Description; `None` until it was received completely.
     pub description: Option<String>,
     /// Flags, as last sent by the board.
     pub admin: Option<Admin>,
@@ -33,21 +33,21 @@ pub struct Board {
     pub life: Life,
     /// Last heartbeat, µs.
     pub alive_at: Option<u64>,
-    /// Last frame of any kind, µs, and which.
+    /// Time of the last frame of any kind, µs, and its function.
     pub last: Option<(u64, Function)>,
-    /// Last sensor output, µs: the control loop was running then.
+    /// Time of the last sensor output, µs: the control loop was running then.
     pub so_at: Option<u64>,
     /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
-    /// Errors it reported, newest last, at most 16: time in µs and code.
+    /// Errors reported by the board, newest last, at most 16: time in µs and code.
     pub errors: Vec<(u64, ErrorCode)>,
     /// Number of reported errors.
     pub error_count: u64,
-    /// Strings of its own that could not be put together.
+    /// Strings of the board that could not be reassembled.
     pub bad_strings: u64,
     /// Number of MCA_DSP_READY frames, requested or not.
     pub ready_count: u64,
-    /// Time since which its application is known to be stopped, and not to start by itself.
+    /// Time since which its application is known to be stopped, without a pending automatic start.
     pub(crate) stopped_at: Option<u64>,
     /// Time of the last start command, until the board shows that it has started.
     pub(crate) starting_since: Option<u64>,
@@ -55,7 +55,7 @@ pub struct Board {
 }
 
 impl Life {
-    /// In a word, as screens show it.
+    /// Returns the name as screens show it, in one word.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unarmed => "-",
@@ -85,7 +85,7 @@ impl Board {
         self.life != Life::Lost && !self.rebooted
     }
 
-    /// Returns the state in one word: frames that the board sends by itself count more than an old answer.
+    /// Returns the state in one word. Frames that the board sends by itself override an old answer.
     pub fn state_name(&self, now_us: u64) -> &'static str {
         match (self.life, self.status()) {
             _ if self.rebooted => "rebooted",
@@ -97,29 +97,28 @@ impl Board {
         }
     }
 
-    /// Since the last heartbeat, s.
+    /// Returns the time since the last heartbeat, s.
     pub fn alive_age_s(&self, now_us: u64) -> Option<f64> {
         self.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// The status as last read.
+    /// Returns the status as last read.
     pub fn status(&self) -> Option<Status> {
         self.info.map(|info| info.status)
     }
 
-    /// Returns `true` if the board sends its outputs: its control loop runs now, whatever its last answer was.
+    /// Returns `true` if the board sends its outputs: its control loop then runs now, even if its last answer said otherwise.
     pub fn sends_outputs(&self, now: u64) -> bool {
         self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
     }
 
-    /// Returns `true` if the control loop runs, by the frames last received.
+    /// Returns `true` if the control loop runs, according to the frames received last.
     pub fn running(&self, now: u64) -> bool {
         self.sends_outputs(now)
             || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
-    /// Takes a package of a text of the board; returns the text when it is complete. `passed_us` is the time that has
-    /// passed between frames.
+    /// Takes a package of a text of the board; returns the text when it is complete. `passed_us` is the time between frames.
     pub(crate) fn debug_text(
         &mut self,
         passed_us: u64,
@@ -150,7 +149,7 @@ impl Board {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// Records that the application has ended or is about to: its heartbeats are no longer expected, its state is unknown.
+    /// Records that the application has ended or is about to end. Its heartbeats are no longer expected, and its state is unknown.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;
@@ -159,7 +158,7 @@ impl Board {
     }
 }
 
-/// All boards by number.
+/// Boards by number.
 #[derive(Clone, Debug, Default)]
 pub struct Boards {
     boards: BTreeMap<u8, Board>,
@@ -171,7 +170,7 @@ impl Boards {
         self.boards.get(&number)
     }
 
-    /// All of them in the order of their numbers.
+    /// Returns all boards in the order of their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (u8, &Board)> {
         self.boards.iter().map(|(n, board)| (*n, board))
     }
@@ -184,12 +183,12 @@ impl Boards {
         self.boards.iter_mut().map(|(n, board)| (*n, board))
     }
 
-    /// All numbers are void.
+    /// Forgets all boards, because all numbers are void.
     pub(crate) fn clear(&mut self) {
         self.boards.clear();
     }
 
-    /// Numbers of the boards whose UCoM id this is.
+    /// Returns the number of the board that has this UCoM id.
     pub(crate) fn with_ucom_id(&self, ucom_id: u8) -> Option<u8> {
         let has = |board: &Board| board.info.is_some_and(|info| info.flash_number as u8 == ucom_id);
         self.boards.iter().find(|(_, board)| has(board)).map(|(n, _)| *n)

@@ -5,7 +5,7 @@ use crate::master::reports::update::Progress;
 use crate::master::reports::{ConformanceTest, Outcome, ProcedureId};
 use ucom::{Admin, BoardInfo, ErrorCode, Foreign, Function};
 
-/// Something happened.
+/// Event on the bus or in a procedure.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Event {
@@ -16,15 +16,15 @@ pub enum Event {
         /// Result.
         result: Result<Outcome, Error>,
     },
-    /// An update went on.
+    /// An update made progress.
     Progress {
         /// Procedure.
         id: ProcedureId,
         /// Progress.
         progress: Progress,
     },
-    /// An update is about to reset this board for programming: its flash record no longer holds (D-62). Nothing is erased
-    /// before the board has answered the reset.
+    /// An update is about to reset this board for programming, so its flash record no longer holds (D-62). Nothing is erased before the
+    /// board has answered the reset.
     FlashBegins {
         /// Procedure.
         id: ProcedureId,
@@ -38,7 +38,7 @@ pub enum Event {
         /// Answer of the board.
         info: BoardInfo,
     },
-    /// A conformance test was done.
+    /// A conformance test ended.
     Tested {
         /// Procedure.
         id: ProcedureId,
@@ -49,7 +49,7 @@ pub enum Event {
     Note {
         /// Procedure.
         id: ProcedureId,
-        /// In words.
+        /// Text of the note.
         text: String,
     },
     /// A board's heartbeats changed.
@@ -65,7 +65,7 @@ pub enum Event {
         board: u8,
         /// The code.
         code: ErrorCode,
-        /// The procedure that was at work with the board; `None`: unsolicited.
+        /// Procedure that worked with the board; `None`: unsolicited.
         during: Option<ProcedureId>,
     },
     /// A board's flags, sent without a request.
@@ -89,21 +89,21 @@ pub enum Event {
         /// The words.
         snapshot: Snapshot,
     },
-    /// A frame that is not of this protocol (D-02); the first of each kind, all are counted.
+    /// A frame that is not of this protocol (D-02). Only the first of each kind is reported; all are counted.
     Foreign(Foreign),
-    /// A competing master: another PC sends on the bus (D-08) after at least one second without a frame of it;
-    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows one that continues.
+    /// A competing master: another PC sends on the bus (D-08), after a pause of at least one second without its frames.
+    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that keeps sending.
     CompetingMaster {
         /// Function that it sent.
         function: Function,
-        /// To which number.
+        /// Number that the frame was sent to.
         to: u8,
     },
     /// Two boards have the same number (D-24); reported once, until numbers are assigned again.
     NumberShared {
         /// The number.
         board: u8,
-        /// Their flash numbers; twice the same one when they cannot be distinguished.
+        /// Flash numbers of these boards; the same number twice if the boards cannot be distinguished.
         found: Vec<u16>,
     },
     /// Events were dropped because no caller took them.
@@ -116,11 +116,11 @@ pub enum Event {
 /// Change of a board's supervision (D-51).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Supervision {
-    /// One heartbeat is missing.
+    /// A heartbeat is missing.
     Late,
-    /// Three are; frames of the policy follow at once.
+    /// Three heartbeats are missing; the frames of the policy follow at once.
     Lost,
-    /// The heartbeats are back.
+    /// The heartbeats have returned.
     Back,
     /// An unsolicited report came: the board has rebooted and no longer has a number (D-26).
     Rebooted {

@@ -1,20 +1,20 @@
-//! Detection of shared numbers: every answer to PC_INFO is checked, whichever procedure asked.
+//! Detection of shared numbers: the master checks every answer to PC_INFO, for any procedure.
 //!
-//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot detect
-//! this, the PC can: one PC_INFO is answered twice. Answers to questions are compared all the time
-//! ([`Holders::received`]); before a procedure changes something it waits until no other board answers (`one_board_each`).
+//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot detect this, but the PC
+//! can, because one PC_INFO is answered twice. Answers to questions are compared all the time ([`Holders::received`]). Before a procedure
+//! changes something, it waits until no other board answers (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// Number of consecutive questions that one flash number must answer twice: a gateway may double a frame now and then.
+/// Number of consecutive questions that one flash number must answer twice, because a gateway may double a frame now and then.
 const TWICE: u32 = 3;
-/// Most flash numbers that are remembered of a number: damaged answers may show any.
+/// Limit of flash numbers stored per number, because damaged answers may contain any.
 const MOST: usize = 8;
 
-/// The first frame of DSP_INFO under a number, distinguished from a package of its description: that does not carry the board's
-/// own number and a possible status at these places.
+/// Returns the first frame of DSP_INFO under a number. A package of its description differs: it does not have the board's own number and
+/// a possible status at these places.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
@@ -30,24 +30,24 @@ pub(crate) struct Holders {
 /// Boards that answered to a number since it was assigned.
 #[derive(Debug, Default)]
 struct Holder {
-    /// The last PC_INFO, µs.
+    /// Time of the last PC_INFO, µs.
     asked_at: Option<u64>,
     /// Answers to it: heads by flash number, other frames, and the number of other frames in one answer.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
-    /// Questions before it that were answered twice by one flash number, in a row.
+    /// Consecutive earlier questions that one flash number answered twice.
     twice: u32,
-    /// Number of questions that each flash number answered, the last one to answer, and the number of changes between them.
+    /// Number of questions that each flash number answered, the last to answer, and the number of changes between them.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
-    /// The flash numbers of those that share it, once that is certain.
+    /// Flash numbers of the boards that share it, once that is certain.
     shared: Vec<u16>,
 }
 
 impl Holder {
-    /// The last question was answered twice, from the first frame to the last, by one flash number.
+    /// Returns `true` if one flash number answered the last question twice, from the first frame to the last.
     fn answered_twice(&self) -> bool {
         let two = self.heads.len() == 1 && self.heads.values().all(|count| *count > 1);
         two && self.of_one.is_some_and(|of_one| self.packages >= 2 * of_one)
@@ -86,10 +86,10 @@ impl Holder {
         }
     }
 
-    /// Returns the flash numbers of the boards that share the number, by the answers received so far; else none.
+    /// Returns the flash numbers of the boards that share the number, by the answers received so far; otherwise an empty list.
     ///
-    /// A single damaged answer is not another board, and neither is a board that replaced another one: flash numbers that
-    /// came in answer to different questions must come repeatedly, in turns.
+    /// A single damaged answer does not count as another board, nor does a board that replaced another one. Flash numbers that came in
+    /// answer to different questions must come repeatedly, in turns.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();

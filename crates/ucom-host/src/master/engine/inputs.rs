@@ -7,12 +7,12 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percent of the bus that repeated inputs may take.
 const INPUTS_SHARE: u64 = 70;
-/// Longest time that they may lag that share and catch up, µs.
+/// Longest time that repetitions may fall behind that share and catch up later, µs.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
-    /// Ends the repetition of a board's inputs and drops queued ones. Inputs of a board that is only being started are not
-    /// yet a repetition.
+    /// Ends the repetition of a board's inputs and drops queued inputs. Inputs of a board that is still being started do not count as a
+    /// repetition.
     pub(crate) fn stop_inputs(&mut self, board: u8) {
         if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
             self.forget_inputs(board);
@@ -24,10 +24,11 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// Sends CI again every `ci.period`, so that a lost frame heals (D-34): the board that has waited longest is first.
+    /// Sends CI again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The board that has waited longest
+    /// comes first.
     ///
-    /// All repetitions together leave a part of the bus time to others, even for boards started with force: answers and
-    /// heartbeats have a lower priority than inputs on the bus, and a socket takes more frames than the bus carries.
+    /// All repetitions together leave a part of the bus time to other frames, even for boards started with force. Answers and heartbeats
+    /// have a lower priority than inputs on the bus, and a socket accepts more frames than the bus carries.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -48,7 +49,7 @@ impl Core {
         }
     }
 
-    /// All CI of a board, and the time of the next repetition.
+    /// Queues all CI of a board, and sets the time of the next repetition.
     pub(crate) fn send_inputs(&mut self, board: u8) {
         let Some(data) = self.data.get_mut(&board) else { return };
         if let Some(at) = data.repeat {
@@ -59,8 +60,8 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// Sends a changed input at once. If this PC sends all inputs, the whole package is sent (it is atomic, D-34); else
-    /// the word alone (DLC 4, D-15), because the other words are not known here.
+    /// Sends a changed input at once. If this PC sends all inputs, it sends the whole package (which is atomic, D-34). Otherwise it sends
+    /// the word alone (DLC 4, D-15), because it does not know the other words.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {
@@ -73,7 +74,7 @@ impl Core {
         self.queue_frame(None, frame, Forget::Nothing);
     }
 
-    /// After a restart of its application nothing is known of a board's parameters (D-35), nor of its inputs.
+    /// Forgets a board's parameters (D-35) and inputs after a restart of its application.
     pub(crate) fn forget_parameters(&mut self, board: u8) {
         self.stop_inputs(board);
         if let Some(data) = self.data.get_mut(&board) {
@@ -84,10 +85,10 @@ impl Core {
         }
     }
 
-    /// Writes one parameter; the shadow takes it as assumed (D-35).
+    /// Writes one parameter. The shadow stores it as assumed (D-35).
     ///
-    /// The package holds this word alone (DLC 4, which every receiver takes): the other words may be unknown here and must
-    /// not be touched.
+    /// The package holds this word alone (DLC 4, which every receiver accepts), because the other words may be unknown here and must not
+    /// change.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

@@ -17,14 +17,14 @@ use crate::master::error::{Error, ExchangeError, MasterError};
 use crate::master::reports::ProcedureId;
 use ucom::{Frame, FromBoard, Function, Profile, Sequence, ToBoard};
 
-/// A procedure's hold on the bus.
+/// Access of a procedure to the bus.
 #[derive(Clone)]
 pub(crate) struct Link {
     pub(crate) core: Arc<Mutex<Core>>,
     pub(crate) id: ProcedureId,
 }
 
-/// The lock of the core; a panic elsewhere leaves it usable.
+/// Locks the core. A panic in another thread leaves it usable.
 pub(crate) fn lock(core: &Mutex<Core>) -> MutexGuard<'_, Core> {
     core.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -55,20 +55,20 @@ impl Link {
         self.with(|core| core.event(Event::Note { id: self.id, text }));
     }
 
-    /// Sends and waits until the frame has left.
+    /// Sends a frame and waits until it has left.
     pub(crate) async fn send(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Nothing));
         self.left(serial).await;
     }
 
-    /// Like [`Link::send`]; discards frames received before the frame left.
+    /// Like [`Link::send`], but discards frames that were received before the frame left.
     pub(crate) async fn ask(&self, to: Sequence, message: ToBoard) {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::All));
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps errors: for program data, for which an error may arrive in the middle of a block.
-    /// Returns when the frame left.
+    /// Like [`Link::ask`], but keeps errors. Used for program data, because an error may arrive in the middle of a block. Returns the
+    /// time at which the frame left.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
@@ -81,7 +81,7 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Waits until everything queued so far, by whomever, has left.
+    /// Waits until all frames queued so far, by any procedure, have left.
     pub(crate) async fn flush(&self) {
         let serial = self.with(|core| core.queued());
         self.left(serial).await;
@@ -91,7 +91,7 @@ impl Link {
         poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
     }
 
-    /// Receives these functions of these boards from now on, and their errors.
+    /// Receives these functions of these boards, and their errors, from now on.
     pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -101,7 +101,7 @@ impl Link {
         });
     }
 
-    /// The next frame of the mailbox, or `None` when `until` has come first.
+    /// Returns the next frame of the mailbox; `None` at the time `until`.
     pub(crate) async fn next(&self, until: u64) -> Option<Received> {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
@@ -127,12 +127,12 @@ impl Link {
         .await
     }
 
-    /// The next frame as it is, or `None` when `until` has come first.
+    /// Returns the next unparsed frame; `None` at the time `until`.
     pub(crate) async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 
-    /// Keeps every frame as it is from now on, for [`Link::next_raw`], or no more.
+    /// Begins or ends to keep every unparsed frame for [`Link::next_raw`].
     pub(crate) fn tap(&self, on: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -146,7 +146,7 @@ impl Link {
         self.sleep_until(self.now() + us).await;
     }
 
-    /// Sleeps up to a time.
+    /// Sleeps until a time.
     pub(crate) async fn sleep_until(&self, until: u64) {
         poll_fn(|_| {
             self.with(|core| {
@@ -163,7 +163,7 @@ impl Link {
         .await;
     }
 
-    /// Waits until nothing that the procedure listens to has come for `us`; at most 20 times as long.
+    /// Waits until no frame that the procedure listens to has come for `us`, at most 20 times as long.
     pub(crate) async fn quiet(&self, us: u64) {
         let limit = self.now() + 20 * us;
         while self.next((self.now() + us).min(limit)).await.is_some() {
@@ -173,9 +173,9 @@ impl Link {
         }
     }
 
-    /// Ends `work` with [`MasterError::Cancelled`] when the caller requests it, with [`MasterError::Bus`] when the caller
-    /// reports that the bus is lost, with [`NumberShared`](crate::master::IdentityError::NumberShared) once when two
-    /// boards with one number appear, unless the procedure tolerates that; its queued frames are then dropped.
+    /// Ends `work` early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller reports that
+    /// the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared), once: two boards with one number appear, and the
+    /// procedure does not tolerate that. The procedure's queued frames are then dropped.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -206,7 +206,7 @@ impl Link {
         .await
     }
 
-    /// From now on two boards with one number do not end this procedure, or do.
+    /// Sets whether two boards with one number are tolerated from now on, or end this procedure.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -215,7 +215,7 @@ impl Link {
         });
     }
 
-    /// The board's number, checked against the profile.
+    /// Returns the board's number, checked against the profile.
     pub(crate) fn board(&self, number: u8) -> Result<Sequence, ExchangeError> {
         let profile = self.profile();
         let wrong = ExchangeError::NoBoard { number, first: profile.addr_first };

@@ -3,19 +3,19 @@ use std::collections::VecDeque;
 
 use ucom::{Frame, FromBoard, Function};
 
-/// Most frames that wait for a procedure.
+/// Limit of frames that wait for a procedure.
 pub(crate) const MAX_RECEIVED: usize = 16_384;
 
 /// A frame of a board for a procedure.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// By the time that has certainly passed between frames, µs.
+    /// Time that has certainly passed between frames, µs.
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,
 }
 
-/// Frames that a procedure wants to receive.
+/// Frames that a procedure receives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
     /// Boards by bit.
@@ -27,7 +27,7 @@ pub(crate) struct Filter {
 impl Filter {
     pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
         let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
-        // A board's error is an answer to anything.
+        // An error of a board may answer any request.
         Self { boards, functions: functions | 1 << Function::Error.number() }
     }
 
@@ -44,11 +44,12 @@ pub(crate) struct Mailbox {
     pub claims: u32,
     pub filter: Filter,
     pub received: VecDeque<Received>,
-    /// Every frame as it is, for a procedure that looks at frames themselves.
+    /// Every unparsed frame, for a procedure that evaluates the frames themselves.
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
-    /// `true` if two boards with one number do not end it: a stop, a step that undoes changes, or a procedure that checks numbers itself.
+    /// `true` if two boards with one number do not end the procedure: a stop, a step that undoes changes, or a procedure that checks
+    /// numbers itself.
     pub bears_shared_numbers: bool,
     /// Reason why no frame can be sent or received any more.
     pub bus_gone: Option<String>,
@@ -58,7 +59,7 @@ pub(crate) struct Mailbox {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,
-    /// All but errors.
+    /// All frames except errors.
     Answers,
     All,
 }

@@ -1,7 +1,7 @@
 //! Base of all procedures: the clock, queued frames, mailboxes, the boards as last seen and their supervision.
 //!
-//! Files import downwards only; from the lowest: times, statistics, boards, holders, event, mailbox, shared, inputs,
-//! supervise, link.
+//! Files import only files below them. From the lowest: times, statistics, boards, holders, event, mailbox, shared, inputs, supervise,
+//! link.
 mod boards;
 mod event;
 mod holders;

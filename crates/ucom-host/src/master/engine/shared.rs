@@ -13,20 +13,21 @@ use crate::master::reports::ProcedureId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
 
-/// Most events that wait for their user.
+/// Limit of events that wait for their user.
 const MAX_EVENTS: usize = 4096;
 
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// Received frames of the owner that are discarded when this frame leaves.
+    /// Received frames of the owner to discard when this frame leaves.
     forget: Forget,
     what: What,
 }
 
 enum What {
     Frame(Frame),
-    /// Package of a board's inputs that begins with this word, with their values at the time of sending, so queued values are never stale.
+    /// Package of a board's inputs that begins with this word. The values are taken at the time of sending, so queued inputs are never
+    /// stale.
     Inputs {
         board: u8,
         offset: u16,
@@ -36,7 +37,7 @@ enum What {
 /// Role of this PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Session {
-    /// Only listens and asks.
+    /// Listens and asks only.
     Quiet,
     /// Sends ALIVE.
     Master { next_alive: u64 },
@@ -47,22 +48,22 @@ pub(crate) struct Core {
     pub times: Times,
     /// Time of the last call.
     pub now: u64,
-    /// Time up to which waiting ends: that of the last `poll`. Up to then the caller has handed over all that came, which a
-    /// late one has not up to `now`.
+    /// Time at which waits end: that of the last `poll`. By then the caller has delivered all received frames. A late caller has not
+    /// delivered those up to `now`.
     pub fired: u64,
-    /// Time that has certainly passed between received frames: from the last one to the next `poll`. A caller that hands
-    /// over simultaneous frames late adds no time, so it makes no gap in a string.
+    /// Time that has certainly passed between received frames: from the last frame to the next `poll`. A caller that delivers
+    /// simultaneous frames late adds no time, so it causes no gap in a string.
     pub passed: u64,
-    /// Time at which the last frame was handed over.
+    /// Time at which the last frame was delivered.
     handed_over: u64,
-    /// Since when the bus has been listened to.
+    /// Time since which this PC has listened to the bus.
     pub since: Option<u64>,
     pub session: Session,
-    /// Another PC's last frame.
+    /// Last frame of another PC.
     pub competing_master: Option<(u64, Function, u8)>,
-    /// Reports until then are answers.
+    /// Time until which reports count as answers.
     pub report_until: u64,
-    /// Stops of the policy that are sent again, and when: one frame can be lost.
+    /// Stops of the policy to send again, and their times, because one frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
     /// Time from which inputs may be repeated again.
     pub inputs_from: u64,
@@ -75,7 +76,7 @@ pub(crate) struct Core {
     pub mailboxes: BTreeMap<ProcedureId, Mailbox>,
     urgent: VecDeque<Frame>,
     normal: VecDeque<Outgoing>,
-    /// Packages of inputs in `normal`, each once: the queue stays short on a bus that does not carry them all.
+    /// Packages of inputs in `normal`, each once. The queue therefore stays short if the bus cannot carry all inputs.
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
@@ -117,7 +118,7 @@ impl Core {
         }
     }
 
-    /// Time never goes back.
+    /// Advances the time, which never goes back.
     pub(crate) fn advance(&mut self, now: u64) {
         self.now = self.now.max(now);
         self.since.get_or_insert(self.now);
@@ -145,7 +146,7 @@ impl Core {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
 
-    /// Queues a frame; its serial number is that of [`Core::left`].
+    /// Queues a frame; returns its serial number for [`Core::left`].
     pub(crate) fn queue(
         &mut self,
         owner: Option<ProcedureId>,
@@ -160,7 +161,7 @@ impl Core {
         self.push(owner, forget, What::Frame(frame))
     }
 
-    /// Queues the package of a board's inputs that begins with word `offset`, unless it waits already.
+    /// Queues the package of a board's inputs that begins with word `offset`, unless it already waits.
     pub(crate) fn queue_inputs(&mut self, board: u8, offset: u16) {
         if self.waiting_inputs.insert((board, offset)) {
             self.push(None, Forget::Nothing, What::Inputs { board, offset });
@@ -173,7 +174,7 @@ impl Core {
         self.queued
     }
 
-    /// Serial number of the last frame queued.
+    /// Returns the serial number of the last queued frame.
     pub(crate) fn queued(&self) -> u64 {
         self.queued
     }
@@ -183,7 +184,7 @@ impl Core {
         self.sent >= serial
     }
 
-    /// The next frame for the bus.
+    /// Returns the next frame for the bus.
     pub(crate) fn pop(&mut self) -> Option<Frame> {
         let frame = self.urgent.pop_front().or_else(|| self.pop_normal())?;
         self.note_sent(&frame);
@@ -209,7 +210,7 @@ impl Core {
                 What::Frame(frame) => Some(frame),
                 What::Inputs { board, offset } => self.inputs_frame(board, offset),
             };
-            // An entry that is invalid by now needs no frame.
+            // An entry that is no longer valid needs no frame.
             if frame.is_some() {
                 return frame;
             }
@@ -241,7 +242,7 @@ impl Core {
         }
     }
 
-    /// A start of the application was sent to a board or broadcast.
+    /// Records that a start of the application was sent to a board or broadcast.
     fn may_start(&mut self, to: Sequence) {
         let broadcast = self.profile.broadcast_number() == Some(to);
         let addressed = self.boards.iter_mut().filter(|(number, _)| broadcast || *number == to.number());
@@ -253,7 +254,7 @@ impl Core {
         self.retain_queued(|next| next.owner != Some(owner));
     }
 
-    /// Drops a board's inputs that wait.
+    /// Drops a board's queued inputs.
     pub(crate) fn forget_inputs(&mut self, board: u8) {
         self.waiting_inputs.retain(|(of, _)| *of != board);
         self.retain_queued(|next| !matches!(next.what, What::Inputs { board: of, .. } if of == board));
@@ -261,7 +262,7 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure that waits for a frame in front of the first one left must not wait for ever.
+        // A procedure may wait for a frame in front of the first remaining one; it must not wait for ever.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -270,13 +271,13 @@ impl Core {
         self.urgent.is_empty() && self.normal.is_empty()
     }
 
-    /// A frame is handed over.
+    /// Records the time at which a frame is delivered.
     pub(crate) fn mark_time(&mut self) {
         self.passed += self.fired.saturating_sub(self.handed_over);
         self.handed_over = self.now;
     }
 
-    /// Gives a board's message to the procedures that want it.
+    /// Delivers a board's message to the procedures that receive it.
     pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
         let at = self.passed;
         for mailbox in self.mailboxes.values_mut() {
@@ -286,7 +287,7 @@ impl Core {
         }
     }
 
-    /// Gives the unparsed frame to the procedures that request it.
+    /// Delivers the unparsed frame to the procedures that request it.
     pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
         let at = self.now;
         for raw in self.mailboxes.values_mut().filter_map(|mailbox| mailbox.raw.as_mut()) {
@@ -296,7 +297,7 @@ impl Core {
         }
     }
 
-    /// The procedure that has claimed a board.
+    /// Returns the procedure that has claimed a board.
     pub(crate) fn owner(&self, board: u8) -> Option<ProcedureId> {
         self.mailboxes.iter().find(|(_, mailbox)| mailbox.claims >> board & 1 == 1).map(|(id, _)| *id)
     }
@@ -306,14 +307,14 @@ impl Core {
         Some(LastReceived { function, ago_ms: self.now.saturating_sub(at) / 1000 })
     }
 
-    /// A frame that is not ours.
+    /// Handles a frame of another protocol.
     pub(crate) fn foreign(&mut self, foreign: Foreign) {
         if self.statistics.foreign(self.now, foreign) {
             self.event(Event::Foreign(foreign));
         }
     }
 
-    /// A frame that only a PC sends.
+    /// Handles a frame that only a PC sends.
     pub(crate) fn competing_master_frame(&mut self, function: Function, to: u8, data: &[u8]) {
         self.statistics.competing_master += 1;
         if let Some(to) = Sequence::new(to) {
@@ -328,7 +329,7 @@ impl Core {
             // The reports that follow answer the other PC: no board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // An event only after a pause of at least 1 s.
+        // Reports an event only after a pause of at least 1 s.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

@@ -1,18 +1,18 @@
-//! Values for a monitor: rates of each board, load of the bus, frames of others.
+//! Values for a monitor: rates of each board, load of the bus, foreign frames.
 
 use crate::master::load::frame_bits;
 use std::collections::{BTreeMap, VecDeque};
 use ucom::{Foreign, Frame};
 
-/// Length of the window that rates are taken over, µs.
+/// Window for rates, µs.
 pub const WINDOW_US: u64 = 1_000_000;
 const SLOTS: usize = 10;
 const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 
-/// A number per second over the last second.
+/// Rate per second over the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Number of the slot and its sum.
+    /// Number and sum of each slot.
     slots: VecDeque<(u64, u64)>,
 }
 
@@ -28,7 +28,7 @@ impl Rate {
         }
     }
 
-    /// Sum over the last second before `now`.
+    /// Returns the sum over the last second before `now`.
     pub fn per_second(&self, now: u64) -> u64 {
         let slot = now / SLOT_US;
         self.slots.iter().filter(|(s, _)| *s <= slot && slot - s < SLOTS as u64).map(|(_, sum)| sum).sum()
@@ -40,11 +40,11 @@ impl Rate {
 pub struct Statistics {
     bitrate: u32,
     bits: Rate,
-    /// Frames received from boards, by number; reports of boards without a number count under their identifier's.
+    /// Frames received from boards, by number. Reports of boards without a number count under the number in their identifier.
     boards: BTreeMap<u8, Rate>,
-    /// Frames received, foreign ones not counted.
+    /// Received frames, foreign frames excluded.
     pub received: u64,
-    /// Frames sent.
+    /// Sent frames.
     pub sent: u64,
     /// Foreign frames by kind.
     pub foreign: Vec<(Foreign, u64)>,
@@ -71,7 +71,7 @@ impl Statistics {
         self.boards.entry(number).or_default().add(now, 1);
     }
 
-    /// Counts a foreign frame; `true`: the first of its kind.
+    /// Counts a foreign frame; returns `true` for the first of its kind.
     pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
         self.bits.add(now, frame_bits(8));
         if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {
@@ -82,17 +82,17 @@ impl Statistics {
         true
     }
 
-    /// Frames per second of a board.
+    /// Returns the frames per second of a board.
     pub fn frames_per_s(&self, board: u8, now: u64) -> u64 {
         self.boards.get(&board).map_or(0, |rate| rate.per_second(now))
     }
 
-    /// Load of the bus by worst-case stuffing over the last second, percent.
+    /// Returns the bus load by worst-case stuffing over the last second, percent.
     pub fn load_percent(&self, now: u64) -> f64 {
         100.0 * self.bits.per_second(now) as f64 / f64::from(self.bitrate.max(1))
     }
 
-    /// Foreign frames of all kinds.
+    /// Returns the number of foreign frames of all kinds.
     pub fn foreign_count(&self) -> u64 {
         self.foreign.iter().map(|(_, count)| count).sum()
     }

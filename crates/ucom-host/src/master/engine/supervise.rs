@@ -6,11 +6,11 @@ use crate::master::io::Snapshot;
 use ucom::profile::{AliveMode, OnLost};
 use ucom::{Admin, BoardInfo, Foreign, Frame, FromBoard, Function, Report, Sequence, Status, ToBoard};
 
-/// Between a stop and its repetition, µs.
+/// Time between a stop and its repetition, µs.
 const STOP_AGAIN: u64 = 30_000;
 
 impl Core {
-    /// From now on heartbeats go out.
+    /// Begins to send heartbeats.
     pub(crate) fn start_session(&mut self) {
         if self.session == Session::Quiet {
             self.session = Session::Master { next_alive: self.now };
@@ -33,7 +33,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // Not up to `now`: the heartbeat may be among the frames that the caller has not handed over yet.
+            // Not up to `now`: the heartbeat may be among the frames that the caller has not delivered yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -71,7 +71,7 @@ impl Core {
         }
     }
 
-    /// Applies the policy for boards whose heartbeats have stopped; only a master stops boards.
+    /// Applies the policy for boards whose heartbeats have stopped. Only a master stops boards.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
@@ -89,7 +89,7 @@ impl Core {
         }
     }
 
-    /// Sends run = 0 at once and twice more, because a stop must not depend on one frame. Repetition has no further effect.
+    /// Sends run = 0 at once and twice more, because a stop must not depend on one frame. The repetitions have no further effect.
     pub(crate) fn stop_running(&mut self, to: Sequence) {
         self.urgent(to, ToBoard::Admin(Admin::default()));
         self.stops.extend([(self.now + STOP_AGAIN, to), (self.now + 2 * STOP_AGAIN, to)]);
@@ -123,7 +123,7 @@ impl Core {
         alive.into_iter().chain(supervised).chain(inputs).chain(stops).min()
     }
 
-    /// A frame from the bus.
+    /// Handles a frame from the bus.
     pub(crate) fn received(&mut self, received: Result<Frame, Foreign>) {
         self.mark_time();
         if let Ok(frame) = &received {
@@ -191,7 +191,7 @@ impl Core {
         }
     }
 
-    /// A frame of a board without a number, which can only report errors (D-06).
+    /// Handles a frame of a board without a number, which can only report errors (D-06).
     fn unnumbered_message(&mut self, from: u8, message: FromBoard) {
         if let FromBoard::Error(code) = message {
             let during = self.mailboxes.keys().next().copied();
@@ -199,7 +199,7 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // A probe needs to know if boards answer under the number that belongs to no board.
+        // A probe must detect boards that answer under the number that belongs to no board.
         self.deliver(from, message);
     }
 

@@ -6,23 +6,23 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AddressError {
-    /// Acknowledge of PC_INIT under one number with another in it (D-24).
+    /// DSP_INITACK whose identifier and data have different numbers (D-24).
     #[error("DSP_INITACK under number {id} contains number {data}: the board is refused")]
     AckMismatch {
-        /// By the identifier.
+        /// Number in the identifier.
         id: u8,
-        /// By the data.
+        /// Number in the data.
         data: u8,
     },
-    /// Giving a number could give it to the first board of the chain.
+    /// The first board of the chain could take the number.
     #[error("board {other} does not answer: without a number it would take number {board}")]
     MayTakeNumber {
-        /// Number that was to be assigned.
+        /// Number to be assigned.
         board: u8,
         /// The first board.
         other: u8,
     },
-    /// The boards that report are not those that have a number: a new address assignment would mean other boards than before.
+    /// The reporting boards are not those with a number. A new address assignment could give numbers to other boards than before.
     #[error(
         "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
     )]

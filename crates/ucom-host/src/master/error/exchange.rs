@@ -9,7 +9,7 @@ use ucom::{ErrorCode, Function};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExchangeError {
-    /// A number that no board has.
+    /// A number that no board can have.
     #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
     NoBoard {
         /// The number.
@@ -31,7 +31,7 @@ pub enum ExchangeError {
         /// Last frame that was received from the board.
         last: Option<LastReceived>,
     },
-    /// No complete answer came.
+    /// No answer was complete.
     #[error("board {board}: the answer to {} never came whole ({tries} tries): {problem}", asked.name())]
     Incomplete {
         /// Board number.
@@ -117,7 +117,7 @@ pub struct LastReceived {
     pub ago_ms: u64,
 }
 
-/// Prints `last received: MCA_ALIVE 120 ms ago`, or that there was nothing.
+/// Prints `last received: MCA_ALIVE 120 ms ago`, or that no frame was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received(pub Option<LastReceived>);
 
@@ -143,15 +143,15 @@ pub enum Incomplete {
         /// Bytes of the first frame.
         need: u8,
     },
-    /// Silence in the middle.
+    /// The board went silent in the middle of its answer.
     #[error("{complete} of {of} strings came, then silence")]
     Silence {
-        /// Whole strings.
+        /// Complete strings.
         complete: u32,
         /// Number of announced strings.
         of: u32,
     },
-    /// A frame that fits nowhere.
+    /// A frame that fits no string.
     #[error("a frame of string {string} fits nowhere")]
     Misfit {
         /// Number of the string, from 0.
@@ -160,13 +160,13 @@ pub enum Incomplete {
     /// Frames beyond the end.
     #[error("more frames came than the totals allow")]
     Surplus,
-    /// More strings than can be.
+    /// The answer announces more strings than possible.
     #[error("it announces {strings} strings; is the byte order right?")]
     TooMany {
         /// Number of strings.
         strings: u32,
     },
-    /// Counts that are small numbers in the other order of bytes.
+    /// The counts would be small numbers in the other byte order.
     #[error(
         "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
     )]

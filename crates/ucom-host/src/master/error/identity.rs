@@ -1,4 +1,4 @@
-//! A board that is not the one that is meant.
+//! Errors about a board that is not the intended one.
 use core::fmt;
 
 use crate::master::error::words::{MEASURE_ORDER, other_order};
@@ -9,28 +9,28 @@ use ucom::profile::Endian;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentityError {
-    /// DSP_INFO under one number with another in it.
+    /// DSP_INFO whose identifier and data have different numbers.
     #[error("board {board} reports that its number is {reported}: it is refused")]
     WrongSequence {
-        /// By the identifier.
+        /// Number in the identifier.
         board: u8,
-        /// By the data.
+        /// Number in the data.
         reported: u8,
     },
-    /// Another board than the one that was named.
+    /// A board with another flash number than the named one.
     #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
     WrongBoard {
         /// Board number.
         board: u8,
-        /// The flash number that was named.
+        /// Flash number that was named.
         wanted: u16,
-        /// The one it has.
+        /// Flash number of the board.
         found: u16,
     },
-    /// The flash numbers of boards fit their reports only with their bytes exchanged (D-10).
+    /// The flash numbers of boards fit their reports only after a swap of their bytes (D-10).
     #[error("{}", other_order(*endian))]
     ByteOrder {
-        /// The order that the profile has.
+        /// Byte order of the profile.
         endian: Endian,
     },
     /// Two boards have one number: both carry out every command to it.
@@ -42,9 +42,9 @@ pub enum IdentityError {
     NumberShared {
         /// The number.
         board: u8,
-        /// The flash numbers of those that answered to it; twice the same one when they cannot be distinguished.
+        /// Flash numbers of the boards that answered to it; the same number twice if the boards cannot be distinguished.
         found: Vec<u16>,
-        /// `true` if no board answers to it any more.
+        /// `true` if no board answers to the number any more.
         given_back: bool,
     },
 }

@@ -1,4 +1,4 @@
-//! Procedures that this PC did not begin, or ended.
+//! Errors of procedures that this PC refused to begin, or ended.
 use crate::master::error::words::Boards;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Function;
@@ -12,12 +12,12 @@ pub enum MasterError {
     CompetingMaster {
         /// Function that it sent.
         function: Function,
-        /// To which number.
+        /// Number that the frame was sent to.
         to: u8,
-        /// Time since then, ms.
+        /// Time since that frame, ms.
         ago_ms: u64,
     },
-    /// The procedure needs a board that is at work for another one.
+    /// Another procedure works with a board that this one needs.
     #[error("{} busy with {with}", Boards(boards))]
     Busy {
         /// The boards.
@@ -31,7 +31,7 @@ pub enum MasterError {
         /// The driver's error.
         reason: String,
     },
-    /// The caller asked to end.
+    /// The caller cancelled the procedure.
     #[error("cancelled")]
     Cancelled,
 }

@@ -2,13 +2,13 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Plan;
 
-/// Reasons why the boards of an update are not known.
+/// Reasons why the boards of an update are not determined.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
-    /// No board.
+    /// No board is named.
     #[error("no board is named")]
     None,
-    /// A board twice.
+    /// A board is named twice.
     #[error("board {board} is named twice")]
     Twice {
         /// Board number.
@@ -25,24 +25,24 @@ impl Diagnose for TargetError {
 /// Reasons why an update cannot be planned.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PlanError {
-    /// An image without bytes.
+    /// The image has no bytes.
     #[error("the image is empty")]
     Empty,
-    /// Half a word.
+    /// The image ends with half a word.
     #[error("the image has {bytes} bytes: not whole words")]
     HalfWord {
         /// Length.
         bytes: usize,
     },
-    /// Another image than the one that the user named by its Program ID.
+    /// The image has another Program ID than the user named.
     #[error("the image has Program ID 0x{image:04X}, not 0x{expected:04X}")]
     OtherProgram {
         /// Program ID of the image.
         image: u16,
-        /// The one that was named.
+        /// Program ID that was named.
         expected: u16,
     },
-    /// The number of a board that has no application.
+    /// Program ID and date that mean "no application".
     #[error("Program ID 0xFFFF with date 0xFFFF means `no application`: choose another date")]
     Void,
     /// The plan and the second image do not fit.
@@ -69,13 +69,13 @@ impl Diagnose for PlanError {
 /// Reasons why `prog.plan` and a second image do not fit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SecondImageError {
-    /// The plan needs one.
+    /// The plan needs a second image.
     #[error("plan `{plan}` needs a second image")]
     Missing {
         /// `prog.plan`.
         plan: Plan,
     },
-    /// The plan has no place for one.
+    /// The plan does not use a second image.
     #[error("plan `{plan}` sends one image twice: there is no place for a second one")]
     Unused {
         /// `prog.plan`.

@@ -15,23 +15,23 @@ use host_kit::{Diagnose, Diagnosis, Facts};
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    /// A board did not answer as it must.
+    /// A board did not answer correctly.
     Exchange(#[from] ExchangeError),
-    /// A board is not the one that is meant.
+    /// A board is not the intended one.
     Identity(#[from] IdentityError),
     /// Boards did not get their numbers.
     Address(#[from] AddressError),
     /// A board did not reach a state.
     Status(#[from] StatusError),
-    /// Control loops run, or cannot.
+    /// Control loops run, or cannot run.
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// The boards for an update are not known.
+    /// The boards for an update are not determined.
     Target(#[from] TargetError),
     /// An update cannot be planned.
     Plan(#[from] PlanError),
-    /// This PC did not begin the procedure, or ended it.
+    /// This PC did not begin the procedure, or it ended the procedure.
     Master(#[from] MasterError),
 }
 
@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Facts of several boards. Sets the board if there is exactly one.
+/// Returns the facts of several boards. Sets the board if there is exactly one.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

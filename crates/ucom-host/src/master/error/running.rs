@@ -1,4 +1,4 @@
-//! Control loops that run, or that cannot.
+//! Errors of control loops that run, or that cannot run.
 use crate::master::error::words::Boards;
 use crate::master::load::LoadForecast;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
@@ -10,19 +10,19 @@ pub enum RunningError {
     /// Boards run their control loop.
     #[error("{} running: program data would outrank their process data", Boards(boards))]
     Running {
-        /// Their numbers.
+        /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// Control loops run, and the request could stop the boards at any position, or worse.
+    /// Control loops run, and the request could stop the boards in any position, or worse.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
-        /// Their numbers.
+        /// Numbers of the boards.
         boards: Vec<u8>,
     },
     /// The bus load would be too high.
     #[error("{0}")]
     Load(LoadForecast),
-    /// A board that was being started, or had been started, is lost; by `on_lost` all were stopped (D-51).
+    /// A board was lost while boards were started; `on_lost` required a stop of all boards (D-51).
     #[error("board {board} was lost while boards were started: all are stopped")]
     Lost {
         /// Board number.

@@ -1,4 +1,4 @@
-//! Signals that cannot be read or written.
+//! Errors of signals that cannot be read or written.
 use core::fmt;
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
@@ -7,7 +7,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalError {
-    /// No signal of that name.
+    /// No signal has that name.
     #[error("board {board} has no {kind} `{name}`{}", Near(near))]
     NoSignal {
         /// Board number.
@@ -16,10 +16,10 @@ pub enum SignalError {
         kind: &'static str,
         /// Requested name.
         name: String,
-        /// Names like it.
+        /// Similar names.
         near: Vec<String>,
     },
-    /// No application is on the board, or it is not started.
+    /// The board has no application, or its application is not started.
     #[error("board {board}: {}", if *valid { "its application is not started" } else { "it has no valid application" })]
     NoApplication {
         /// Board number.
@@ -27,7 +27,7 @@ pub enum SignalError {
         /// `true` if the board has an application that is not running.
         valid: bool,
     },
-    /// A board describes itself otherwise than was known when values for it were chosen (D-36).
+    /// The board's description differs from the one by which the values were chosen (D-36).
     #[error(
         "board {board}: its inputs, outputs and parameters are not those that were known under its program"
     )]

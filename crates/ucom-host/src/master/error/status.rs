@@ -1,4 +1,4 @@
-//! A state that a board did not reach.
+//! Errors of a state that a board did not reach.
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Status;
 
@@ -18,7 +18,7 @@ pub enum StatusError {
         board: u8,
         /// Bits to change.
         mask: Status,
-        /// Their wanted values.
+        /// Requested values of these bits.
         wanted: Status,
         /// The status that was read.
         status: Status,
@@ -30,14 +30,14 @@ pub enum StatusError {
     NotReached {
         /// Board number.
         board: u8,
-        /// State that was waited for.
+        /// Expected state.
         what: &'static str,
         /// Time waited, ms.
         waited_ms: u64,
         /// The last status.
         status: Status,
     },
-    /// Flags were sent and others came back.
+    /// The board confirmed other flags than were sent.
     #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
     AdminRefused {
         /// Board number.

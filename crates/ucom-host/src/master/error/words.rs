@@ -1,4 +1,4 @@
-//! Words that several errors and findings share.
+//! Words used by several errors and findings.
 use core::fmt;
 
 use ucom::profile::Endian;
@@ -7,7 +7,7 @@ use ucom::profile::Endian;
 pub(crate) const MEASURE_ORDER: &str =
     "`ucom probe --out FILE` measures it and writes a profile for --profile";
 
-/// Words for boards that send the bytes of a word in the other order than the profile has.
+/// Returns the words for boards that send the bytes of a word in the other order than the profile has.
 pub(crate) fn other_order(endian: Endian) -> String {
     let (here, there) = match endian {
         Endian::Little => ("little", "big"),

@@ -46,7 +46,7 @@ impl DescriptionKey {
     }
 }
 
-/// The application's description of itself and of every signal; kept under a [`DescriptionKey`].
+/// The application's description of itself and of every signal, stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
     /// The application; may differ from the board's own description in DSP_INFO.
@@ -66,7 +66,7 @@ impl IoDescription {
         Dimensions { ci: count(&self.ci), so: count(&self.so), par: count(&self.par) }
     }
 
-    /// The texts of a buffer.
+    /// Returns the texts of a buffer.
     pub fn names(&self, kind: Kind) -> &[String] {
         match kind {
             Kind::Ci => &self.ci,
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the place of a signal: by its text, in any letter case if only one fits, with or without the unit in brackets
-    /// at its end, or by its number (`#3` or `3`).
+    /// Returns the place of a signal. A signal is found by its number (`#3` or `3`) or by its text, with or without the unit in brackets
+    /// at its end. Letter case is ignored if only one signal fits.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
@@ -90,7 +90,7 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        // A unit in brackets makes no name less like another.
+        // The similarity of names does not depend on units in brackets.
         let like = |n: &str| likeness(n, name).max(likeness(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(likeness, _)| *likeness > 0.6);

@@ -1,4 +1,4 @@
-//! Parameters as this PC believes them to be: the protocol has no way to read them back (D-35).
+//! Parameters as this PC assumes them: the protocol has no way to read them back (D-35).
 /// A parameter's value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParValue {
@@ -30,7 +30,7 @@ impl Shadow {
         self.values.fill(ParValue::Unknown);
     }
 
-    /// All parameters in order.
+    /// Returns all parameters in order.
     pub fn values(&self) -> &[ParValue] {
         &self.values
     }

@@ -1,10 +1,10 @@
-//! Sensor outputs of one moment, put together from their packages (D-33).
+//! Sensor outputs of one moment, reassembled from their packages (D-33).
 use ucom::BufferPackage;
 
 /// All sensor outputs of one period.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Snapshot {
-    /// Time of its last package, µs.
+    /// Time of the last package, µs.
     pub time_us: u64,
     /// Words in the order of the buffer.
     pub words: Vec<u16>,
@@ -12,16 +12,16 @@ pub struct Snapshot {
     pub incomplete_before: u64,
 }
 
-/// Puts snapshots together: from offset 0 up to the package with the last word; one with a gap is counted and dropped.
+/// Reassembles snapshots, from offset 0 up to the package with the last word. A snapshot with a gap is counted and dropped.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotAssembler {
     words: Vec<u16>,
-    /// Offset of the package that must come next; `None`: waits for offset 0.
+    /// Offset of the package that must come next; `None`: the next package must have offset 0.
     next: Option<u16>,
     incomplete_now: u64,
     /// Snapshots with a gap.
     pub incomplete: u64,
-    /// Whole snapshots.
+    /// Complete snapshots.
     pub complete: u64,
     /// Packages that start at or beyond the dimension.
     pub beyond: u64,
@@ -33,12 +33,12 @@ impl SnapshotAssembler {
         Self { words: vec![0; dimension.into()], ..Default::default() }
     }
 
-    /// Words of the buffer.
+    /// Returns the number of words of the buffer.
     pub fn dimension(&self) -> usize {
         self.words.len()
     }
 
-    /// Takes a package; gives the snapshot that it completes.
+    /// Takes a package; returns the snapshot that it completes.
     pub fn push(&mut self, now: u64, package: &BufferPackage) -> Option<Snapshot> {
         if usize::from(package.offset) >= self.words.len() {
             self.beyond += 1;

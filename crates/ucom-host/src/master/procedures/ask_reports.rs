@@ -1,4 +1,4 @@
-//! PC_REPORT, and who reports.
+//! PC_REPORT, and the boards that report.
 use crate::master::engine::Link;
 use crate::master::reports::Reports;
 use ucom::{FromBoard, Function, ToBoard};
@@ -7,7 +7,7 @@ use ucom::{FromBoard, Function, ToBoard};
 pub(crate) const REPORTS: [Function; 4] =
     [Function::Report0, Function::Report1, Function::Report2, Function::Report3];
 
-/// PC_REPORT, and who answers within the window.
+/// Sends PC_REPORT and collects the reports within the window.
 pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Report).await;

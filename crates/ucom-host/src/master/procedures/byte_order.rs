@@ -1,10 +1,10 @@
-//! Detection of boards with the other byte order than the profile has (D-10), as far as it needs no further questions.
+//! Detection of boards with another byte order than the profile has (D-10), without further questions as far as possible.
 use crate::master::engine::Link;
 use crate::master::error::IdentityError;
 use crate::master::procedures::ask_reports::ask_reports;
 use crate::master::reports::{BoardSeen, Reports};
 
-/// Returns `true` if flash numbers fit the reports only with their bytes exchanged. A report is one byte: no order changes it.
+/// Returns `true` if flash numbers fit the reports only after a swap of their bytes. A report is one byte, which no byte order changes.
 pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
     let fits = |byte: u16| reports.ids.contains(&(byte as u8));
     let only_exchanged = |number: u16| !fits(number) && fits(number >> 8);
@@ -12,7 +12,7 @@ pub(crate) fn exchanged(reports: &Reports, flash_numbers: &[u16]) -> bool {
         && flash_numbers.iter().all(|number| only_exchanged(*number) || number >> 8 == number & 0xFF)
 }
 
-/// Refuses boards whose words come in the other order. Boards are asked for reports only if a flash number has a high byte, which is rare.
+/// Refuses boards that send words in the other byte order. Asks boards for reports only if a flash number has a high byte, which is rare.
 pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<(), IdentityError> {
     if flash_numbers.iter().all(|number| *number < 0x100) {
         return Ok(());
@@ -25,7 +25,7 @@ pub(crate) async fn right_order(link: &Link, flash_numbers: &[u16]) -> Result<()
     Ok(())
 }
 
-/// Flash numbers of boards.
+/// Returns the flash numbers of boards.
 pub(crate) fn flash_numbers(boards: &[BoardSeen]) -> Vec<u16> {
     boards.iter().map(|board| board.info.flash_number).collect()
 }

@@ -1,4 +1,4 @@
-//! Single acts: status, resets, start, stop, flags.
+//! Single actions: status, resets, start, stop, flags.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, IdentityError, MEASURE_ORDER, SignalError, StatusError};
 use crate::master::procedures::ask_reports::{REPORTS, ask_reports, collect_reports};
@@ -34,7 +34,7 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // Like PC_START: the application needs its time.
+        // As after PC_START, the application needs time to start.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -47,7 +47,7 @@ pub(crate) async fn set_status_procedure(
     Ok(Outcome::Status { board, info: now })
 }
 
-/// INIT off: the board forgets its number, so its silence is the confirmation.
+/// Clears INIT: the board forgets its number, so its silence confirms the change.
 async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
     let to = link.board(board)?;
     let before = numbers(link, board).await?;
@@ -56,7 +56,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // The board cannot answer any more: return the state that the rules require (D-22).
+                // The board can no longer answer, so this returns the state that the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -68,7 +68,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// Polls PC_INFO every 200 ms until some bits are as wanted.
+/// Polls PC_INFO every 200 ms until some bits have the requested values.
 pub(crate) async fn wait_status(
     link: &Link,
     board: u8,
@@ -98,7 +98,7 @@ pub(crate) async fn wait_status(
     }
 }
 
-/// PC_RESET to one board or to all; who reports. Never repeated: the user decides.
+/// Sends PC_RESET to one board or to all, and returns the reports. Never repeated: the user decides.
 pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
     let to = match board {
         Some(board) => link.board(board)?,
@@ -137,8 +137,7 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
     Ok(Outcome::Reset(reports))
 }
 
-/// A board that was reset has reported and has no number any more. Only its report may have been lost: then it is asked
-/// for another one.
+/// Checks that a board was reset: it has reported and has no number any more. If only its report was lost, this asks for another.
 async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
     let since = link.now().saturating_sub(link.times().report_window);
     let ucom_id = before.flash_number as u8;
@@ -171,7 +170,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
     }
 }
 
-/// PC_XRESET, and the board back in its exloader with programming enabled (D-23).
+/// Sends PC_XRESET; then the board is in its exloader with programming enabled (D-23).
 pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
@@ -180,10 +179,9 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
     Ok(Outcome::Status { board, info })
 }
 
-/// XRESET, wait, poll PC_INFO until the exloader runs; PROG by SETSTATUS when it is off (U-4).
+/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is then off, sets it with PC_SETSTATUS (U-4).
 ///
-/// A board that does not answer any more is repaired when its flash number is known; another board that answers in its
-/// place is refused.
+/// A board that does not answer any more is repaired if its flash number is known. Another board that answers in its place is refused.
 pub(crate) async fn enter_exloader(
     link: &Link,
     board: u8,
@@ -198,7 +196,7 @@ pub(crate) async fn enter_exloader(
         (result, _) => result?,
     };
     if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
-        // A single damaged answer is not another board.
+        // A single damaged answer does not count as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -218,8 +216,8 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
     wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
 }
 
-/// Sends PC_XRESET until the board takes it. The command has no answer: a board that answers PC_INFO and has not left
-/// its application did not receive it. A silent board reboots, or has lost its number, and is not disturbed.
+/// Sends PC_XRESET until the board takes it. The command has no answer: a board that answers PC_INFO and has not left its application did
+/// not receive it. A silent board is rebooting or has lost its number, and gets no further PC_XRESET.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -246,7 +244,7 @@ async fn send_xreset(link: &Link, to: Sequence) {
     link.sleep(link.times().xreset_wait).await;
 }
 
-/// PC_START and the application up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
+/// Sends PC_START and waits until the application is up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
 pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let before = info(link, board).await?;
     start_from(link, before).await
@@ -265,7 +263,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // Set before the frame leaves, so that a cancel knows of it.
+        // Set before the frame leaves, so that a cancel takes it into account.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -281,7 +279,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors of a bad bus are only to be logged; they are reported when nothing came of all tries.
+                // Errors of a bad bus are only logged. They are reported if all attempts fail.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -309,10 +307,10 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags to change from: the flags that the board sent last, else those of its status with outputs off (D-37).
+/// Returns the flags that a change starts from: those that the board sent last, otherwise those of its status with outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
-    // A command that ends something does not wait.
+    // A command that ends something does not wait for an answer.
     if !ends {
         one_board_each(link, &[board]).await?;
     }
@@ -321,7 +319,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // A frame of it may have been lost: the status byte knows whether the loop runs.
+    // The board's flags may have been lost, but the status byte shows whether the loop runs.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,
@@ -329,7 +327,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }))
 }
 
-/// Read-modify-write of the flags.
+/// Changes the flags by read-modify-write.
 pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
     let wanted = change.apply(flags(link, board, change.only_ends()).await?);
     admin(link, board, wanted).await

@@ -9,7 +9,7 @@ use ucom::{
     Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
 };
 
-/// Most strings that a description may announce: 1365 boards' worth of words would not fit on any bus.
+/// Limit of strings that a description may announce: more words would not fit on any bus.
 const MAX_STRINGS: u32 = 4096;
 
 /// Collected parts of one answer.
@@ -24,7 +24,7 @@ impl Collector {
         let profile = link.profile();
         let Some(dimensions) = self.dimensions else {
             let need = 6;
-            // Strings begin with 2 bytes, their packages have 1 to 8: only at the start are 6 the dimensions.
+            // Strings begin with 2 bytes and have packages of 1 to 8. Only at the start are 6 bytes the dimensions.
             let start = Incomplete::Start { len: payload.len(), need };
             let dimensions = Dimensions::parse(payload, profile.endian).ok_or(start)?;
             self.dimensions = Some(dimensions);
@@ -37,7 +37,7 @@ impl Collector {
         if self.done() || dimensions.strings() <= string {
             return Err(Incomplete::Surplus);
         }
-        // Only the last package of a string may be short.
+        // Only the last package of a string may have fewer than 8 bytes.
         if self.assembler.missing() > 1 && payload.len() < 8 {
             return Err(Incomplete::Misfit { string });
         }
@@ -60,7 +60,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Returns the problem of the answer: perhaps only the wrong byte order.
+    /// Returns the problem of the answer, which may only be a wrong byte order.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -134,10 +134,9 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// The description of a board whose application runs, as it has sent it since it started.
+/// Returns the description of a board whose application runs, as the board has sent it since that start.
 ///
-/// A description that is only kept under Program ID and date (D-36) may be of another application: nothing is written by
-/// its names.
+/// A description that is only stored under Program ID and date (D-36) may be of another application. Nothing is written by its names.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {
@@ -168,7 +167,7 @@ fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescri
     });
 }
 
-/// Reads the values that a board wants as its first inputs (MCA_DUMP_CI).
+/// Reads the board's own initial inputs (MCA_DUMP_CI).
 pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) -> Result<Vec<u16>, Error> {
     let packages = u32::from(ucom::package_count(dimension));
     if packages == 0 {
@@ -183,11 +182,11 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // The tries are independent: a board may have changed its values.
+        // The attempts are independent, because a board may change its values.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;
-        // A board that repeats itself for ever must not hold us.
+        // The time is limited, even if a board repeats itself for ever.
         let limit = link.now() + times.gap * u64::from(packages + 1);
         while missing_packages(&seen) > 0
             && let Some(received) = link.next((link.now() + times.gap).min(limit)).await
@@ -226,7 +225,7 @@ fn missing_packages(seen: &[bool]) -> u32 {
     seen.iter().filter(|seen| !**seen).count() as u32
 }
 
-/// Asks who it is and whether its application runs, then describes it.
+/// Reads a board's identity and the state of its application, then its description.
 async fn described(link: &Link, board: u8) -> Result<(BoardInfo, IoDescription), Error> {
     let known = info(link, board).await?.info;
     one_board_each(link, &[board]).await?;

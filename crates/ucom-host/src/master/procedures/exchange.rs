@@ -1,20 +1,20 @@
-//! Requests that the procedures are made of, with their bounded repetition.
+//! Requests that procedures consist of, with their limited repetition.
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, StatusError};
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
-/// Requests whose repetition has no further effect are sent once and repeated twice.
+/// A request whose repetition has no further effect is sent once and repeated twice.
 pub(crate) const TRIES: u32 = 3;
 
 /// Result of one PC_INFO.
 #[derive(Debug)]
 pub(crate) enum Answer {
-    /// No frame.
+    /// No frame came.
     Silence,
     /// Frames that are not a valid answer.
     Broken(Incomplete),
-    /// Numbers; the description only if it came whole.
+    /// Numbers; the description only if it was complete.
     Info(BoardInfo, Option<String>),
 }
 
@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// Sends one PC_INFO, not repeated. The mailbox must listen to DSP_INFO.
+/// Sends one PC_INFO without repetition. The mailbox must listen to DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;
@@ -78,7 +78,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // A string's package that is taken for the first frame does not carry the board's number and a possible status.
+        // A string's package could be taken for the first frame, but does not have the board's number and a possible status.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
@@ -120,13 +120,13 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
 
 /// Sends PC_INFO with the description, up to three times.
 ///
-/// If the description never comes whole, the numbers are still valid: they are returned without it. A number that is not
-/// the board's own is an error at once (D-24).
+/// If the description is never complete, the numbers are still valid: they are returned without it. A number other than the board's own
+/// is an error at once (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
 
-/// PC_INFO for the numbers only.
+/// Reads only the numbers with PC_INFO.
 pub(crate) async fn numbers(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     info_for(link, board, false).await.map(|seen| seen.info)
 }
@@ -138,7 +138,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     let mut mismatch = None;
     for tries in 0..TRIES {
         if tries > 0 {
-            // The remainder of a truncated answer must not mix with the next one.
+            // The remainder of a truncated answer must not mix with the next answer.
             link.quiet(link.times().gap).await;
         }
         match ask_info(link, board).await {
@@ -148,7 +148,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // A single damaged frame may contain anything; a board sends the data again.
+            // A single damaged frame may contain anything. The next answer of the board has the data again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -170,7 +170,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     }
 }
 
-/// The numbers of a board, read until two answers agree: one damaged answer is never taken for another board.
+/// Reads the numbers of a board until two answers agree: one damaged answer never counts as another board.
 pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let mut first = info(link, board).await?;
     for _ in 0..TRIES {
@@ -190,8 +190,8 @@ pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
 
-/// PC_SETSTATUS read back with PC_INFO, repeated when it was not taken (D-22). Value bits outside the mask are never
-/// sent.
+/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats both if the board did not take the command (D-22). Value bits
+/// outside the mask are never sent.
 pub(crate) async fn set_status(
     link: &Link,
     board: u8,
@@ -212,22 +212,22 @@ pub(crate) async fn set_status(
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// MCA_ADMIN_DATA, answered by the board's state.
+/// Sends MCA_ADMIN_DATA, which the board answers with its state.
 pub(crate) async fn admin(link: &Link, board: u8, wanted: Admin) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { active: wanted.active && wanted.run, ..wanted };
     ask_admin(link, board, ToBoard::Admin(wanted), to, |is| is == wanted, wanted).await
 }
 
-/// MCA_PC_START, answered by the board's state.
+/// Sends MCA_PC_START, which the board answers with its state.
 pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { run: true, ..Admin::default() };
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// A board's error does not end the exchange: errors of a bad bus are only to be logged, and come exactly when the request
-/// itself was lost. The error is reported if all tries fail.
+/// Sends a request for flags. An error of the board does not end the exchange: errors of a bad bus are only logged, and often come when
+/// the request itself was lost. The error is reported if all attempts fail.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -245,7 +245,7 @@ async fn ask_admin(
         while let Some(received) = link.next(until).await {
             match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // Flags that the board sent of its own accord before the request reached it.
+                // Flags that the board sent by itself before the request reached it.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

@@ -1,8 +1,8 @@
 //! Numbers for the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
 //!
-//! PC_INIT(n) is taken by the one board without a number whose incoming pin is active; its outgoing pin, raised by this
-//! PC after the number is confirmed, enables the next board. PC_INIT is never repeated without asking PC_INFO first:
-//! otherwise a board that raises its pin by itself would let its neighbour take the same number.
+//! The board without a number whose incoming pin is active takes PC_INIT(n). After this PC has confirmed the number, it raises the
+//! board's outgoing pin, which enables the next board. PC_INIT is never repeated without PC_INFO before. Otherwise a board that raises
+//! its pin by itself would let its neighbour take the same number.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -41,7 +41,7 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// Stops boards that did not receive the reset: such a board has kept its number, and runs on with inputs that are no longer repeated.
+/// Stops boards that did not receive the reset. Such a board has kept its number, and continues to run without repeated inputs.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;
@@ -52,13 +52,13 @@ async fn stop_unreset(link: &Link, report: &mut InitReport) {
     }
 }
 
-/// Returns `true` if the board runs on after a reset. By itself a board starts only its application, if
-/// ASTART is set, never its control loop.
+/// Returns `true` if the board continues to run after a reset. A board starts only its application by itself, if ASTART is set, never its
+/// control loop.
 fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
-/// Sends PC_RESET to all and collects their reports. If no board reports although boards are there, the reset was lost and is repeated.
+/// Sends PC_RESET to all and collects their reports. If boards are present but none reports, the reset was lost and is repeated.
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
         link.listen(0, &REPORTS);
@@ -87,10 +87,10 @@ async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error>
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // Raised also when the board reports that it did so itself: harmless, and the read-back is needed anyway.
+    // Also raised if the board reports that it did so itself. This is harmless, and the read-back is needed in any case.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
-        // Either answer was damaged, or two boards have this number.
+        // An answer was damaged, or two boards have this number.
         return confirmed(link, number).await.map(Some);
     }
     Ok(Some(BoardSeen { info: raised, ..seen }))
@@ -105,7 +105,7 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
         ask_reports(link, &mut report.reports).await;
     }
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // Everything else would compare numbers that are read wrong.
+        // Any further comparison would use numbers that were read in the wrong order.
         report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
         return;
     }

@@ -5,8 +5,7 @@ use crate::master::procedures::exchange::numbers;
 use ucom::Function;
 
 impl Link {
-    /// Becomes master before the first intrusive command (D-08): looks for another one, then sends ALIVE until the
-    /// session ends.
+    /// Becomes master before the first intrusive command (D-08): looks for another master, then sends ALIVE until the session ends.
     pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
         self.look_for_master(force).await?;
         self.with(|core| {
@@ -17,19 +16,19 @@ impl Link {
         Ok(())
     }
 
-    /// This PC is the master of the bus.
+    /// Returns `true` if this PC is the master of the bus.
     pub(crate) fn is_master(&self) -> bool {
         self.with(|core| core.session != Session::Quiet)
     }
 
-    /// Listens until `master.listen` has passed, refuses when a frame of another PC was received in that time (D-08). Not when this PC
-    /// is master already, or is forced.
+    /// Listens until `master.listen` has passed. Refuses if a frame of another PC was received in that time (D-08). Does nothing if this
+    /// PC already is the master, or if forced.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // The time before the command counts when the bus was listened to.
+            // Time before the command counts if the bus was listened to.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
@@ -40,7 +39,7 @@ impl Link {
         Ok(())
     }
 
-    /// Refuses when a frame of another PC was received within the last `window` µs.
+    /// Refuses if a frame of another PC was received within the last `window` µs.
     fn no_competing_master(&self, window: u64) -> Result<(), MasterError> {
         let (now, received) = self.with(|core| (core.now, core.competing_master));
         match received.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
@@ -51,8 +50,8 @@ impl Link {
         }
     }
 
-    /// A heartbeat under the number of a board may be the board's, or another PC's for that board alone: whether it is
-    /// started, the board knows. Without an answer it is taken for the board's.
+    /// A heartbeat under the number of a board may come from the board, or from another PC for that board alone. The board's status
+    /// decides: a board that is not started sends no heartbeats. Without an answer the heartbeat counts as the board's.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -6,19 +6,19 @@ use crate::master::error::IdentityError;
 use crate::master::procedures::exchange::TRIES;
 use ucom::{Function, ToBoard};
 
-/// Age up to which an answer to PC_INFO shows the holder of a number, µs.
+/// Age up to which an answer to PC_INFO shows the board that has a number, µs.
 const FRESH: u64 = 2_000 * MS;
-/// Between two questions, µs: the answers of 31 boards do not come as one burst.
+/// Time between two questions, µs, so that the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Checks that each of these numbers belongs to one board: no other board answers PC_INFO within the time that a board may
-/// take. A number without an answer is not refused.
+/// Checks that each of these numbers belongs to one board: no other board answers PC_INFO within the permitted time. A number without an
+/// answer is not refused.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // Answers that came during this wait are as old as the driver is late.
+        // After the first wait answers of any age count, because they are only as old as the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
@@ -72,8 +72,8 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until the last questions to these boards (by bit) cannot be answered any more: a board that shares a number with
-/// one of them may answer late.
+/// Waits until the last questions to these boards (by bit) can no longer be answered. A board that shares a number with one of them may
+/// answer late.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;
     if let Some(asked_at) = link.with(|core| core.holders.last_asked(boards)) {
@@ -81,7 +81,7 @@ pub(crate) async fn last_answers(link: &Link, boards: u32) {
     }
 }
 
-/// Waits until then, and until an answer that has begun is at its end.
+/// Waits until the given time, and until an answer in progress has ended.
 async fn out_of_words(link: &Link, mut until: u64) {
     let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
     while link.next(until).await.is_some() && link.now() < limit {

@@ -1,4 +1,4 @@
-//! PC_SETSTATUS exactly by the formula, value bits outside the mask included (D-22): for experts.
+//! PC_SETSTATUS exactly by the formula, including value bits outside the mask (D-22): for experts.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;
@@ -29,7 +29,7 @@ pub(crate) async fn raw_status(
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
-    // Never repeated: the frame shall take effect once.
+    // Never repeated: the frame must take effect once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;
     let mut boards = Vec::new();
@@ -42,7 +42,7 @@ pub(crate) async fn raw_status(
                 Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => None,
                 Err(e) => return Err(e),
             };
-            // Applications need a while to come up.
+            // Applications need time to start.
             if result.as_expected() || link.now() >= limit {
                 break;
             }

@@ -1,8 +1,8 @@
-//! Returns a lost number to one board while the others keep theirs (section on initialisation: D-21, D-24).
+//! Gives a lost number back to one board while the other boards keep theirs (section on initialisation: D-21, D-24).
 //!
-//! PC_INIT(n) is taken by *every* board without a number whose incoming pin is active. So for that moment no outgoing pin
-//! but the one before board n may be on, and the first board, whose incoming pin is always active, must have its number.
-//! Pins that stay low, as after a cancel, do no harm: they only matter to PC_INIT, and a repair raises the one it needs.
+//! *Every* board without a number whose incoming pin is active takes PC_INIT(n). At that moment only the outgoing pin of the board before
+//! n may be on. The first board, whose incoming pin is always active, must have its number. Pins that stay low, as after a cancel, do no
+//! harm: they matter only to PC_INIT, and a repair raises the pin that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};
@@ -14,15 +14,15 @@ use crate::master::reports::{BoardSeen, Outcome};
 use std::collections::BTreeMap;
 use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Most rounds of PC_INFO that find out who has a number.
+/// Limit of rounds of PC_INFO that determine the boards with a number.
 const ROUNDS: u32 = 6;
 
-/// Gives board `number` its number back when it no longer answers. The flash number must be the expected one, and no
-/// other board may have taken the number as well.
+/// Gives board `number` its number back if it no longer answers. The flash number must be the expected one, and no other board may have
+/// taken the number as well.
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
     let mut lowered = Vec::new();
-    // Two boards that take the number are found here, and do not keep it.
+    // The steps below detect two boards that take the number, and take it back from both.
     link.bear_shared_numbers(true);
     let given = give(link, number, flash_number, &mut lowered).await;
     for board in lowered {
@@ -36,7 +36,7 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     Ok(BoardSeen { info: raised, ..seen })
 }
 
-/// The number for the one board that is meant. `lowered`: boards whose pin was on and is off now.
+/// Gives the number to the intended board only. `lowered`: boards whose pin was on and is off now.
 async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>) -> Result<BoardSeen, Error> {
     let since = link.now();
     only_its_pin(link, number, lowered).await?;
@@ -50,7 +50,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // A board that took it must not keep it, or the next command reaches the wrong board.
+        // A wrong board must not keep the number, or the next command would reach it.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give number {number} back"));
@@ -65,17 +65,17 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     }
 }
 
-/// No outgoing pin on but that of the board before `number`, which is.
+/// Switches off all outgoing pins except that of the board before `number`, which must be on.
 ///
-/// Every number gets the command three times, with or without an answer: a board may be alive with its answers lost. Boards that answer are
-/// read back.
+/// Every number gets the command three times, with or without an answer: a board may work although its answers are lost. Boards that
+/// answer are read back.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // Only a board with a number holds its pin; without it no board could take this number.
+        // Only a board with a number keeps its pin on; without that pin no board could take this number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -92,14 +92,14 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
     }
     for (board, status) in statuses(link, &others).await {
         if !status.is_ok_and(|status| !status.has(Status::OPINIT)) {
-            // Three more times, each read back; then it is refused.
+            // Three more attempts, each read back; then the repair is refused.
             set_status(link, board, Status::OPINIT, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Returns the flash numbers of all boards that answer to this number. A flash number seen only once is a damaged answer.
+/// Returns the flash numbers of all boards that answer to this number. A flash number seen only once counts as a damaged answer.
 async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut seen: BTreeMap<u16, u32> = BTreeMap::new();
     for round in 1..=ROUNDS {
@@ -114,7 +114,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// Sends one PC_INFO and returns the flash number of every answer to it, not only of the first.
+/// Sends one PC_INFO and returns the flash numbers of all answers to it, not only of the first.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -136,14 +136,14 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(found)
 }
 
-/// Withdraws a number that two boards took from both.
+/// Withdraws a number from both boards that took it.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
     let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
     Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
-/// Takes a number from its board; `true`: no board answers to it any more.
+/// Takes a number from its board; returns `true` if no board answers to it any more.
 async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     let to = link.board(number)?;
     for _ in 0..TRIES {
@@ -159,7 +159,7 @@ async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     Ok(true)
 }
 
-/// Repair as a procedure of its own.
+/// Runs a repair as a separate procedure.
 pub(crate) async fn repair_procedure(
     link: Link,
     number: u8,
@@ -170,7 +170,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board is well: only its pin is changed, which must be on.
+        // The board works: only its pin is set, which must be on.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

@@ -1,4 +1,4 @@
-//! Scan without any change: PC_REPORT to all and PC_INFO to each number, no reset (5.4).
+//! Scan without any change: PC_REPORT to all, and PC_INFO to each number, no reset (5.4).
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -18,10 +18,10 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // Doubtful numbers are asked again; confirmed shared numbers are reported below.
+    // Doubtful numbers are asked again. Confirmed shared numbers are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // A board that answered but did not report may have been missed.
+    // The report of a board that answered may have been missed.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };

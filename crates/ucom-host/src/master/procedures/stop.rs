@@ -1,4 +1,4 @@
-//! Stopping a board: outputs, the control loop, the application; also one that does not answer.
+//! Stop of a board, even if it does not answer: outputs, control loop, application.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::control::change_flags;
@@ -12,13 +12,13 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     link.board(board)?;
     link.become_master(force).await?;
     let info = stop_board(&link, board, level).await;
-    // Only reported, by its event, and only now: both boards were commanded to stop.
+    // The shared number is only reported, by its event, and only now: both boards were commanded to stop.
     let _ = one_board_each(&link, &[board]).await;
     Ok(Outcome::Status { board, info: info? })
 }
 
-/// Outputs off, then the loop, then the application: the start order in reverse. A step that gets no answer does not keep
-/// the next ones from being taken; the first that failed is reported.
+/// Switches the outputs off, then stops the loop, then the application: the start order in reverse. A step without an answer does not
+/// prevent the next steps. The first failure is reported.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
     let mut known = match info(link, board).await {
         Ok(seen) => seen.info,
@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// A board that was commanded to start and does not show it yet may do so any time until `start.timeout` has passed: the
-/// procedure commands it to stop in any state, and reads it again after that time.
+/// A board that was commanded to start and does not show it yet may start at any time until `start.timeout` has passed. The procedure
+/// commands it to stop in any state, and reads it again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;
@@ -62,7 +62,7 @@ async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<Board
     Ok(now)
 }
 
-/// Stops a board that does not answer PC_INFO: it may run all the same. Its flags are not read first.
+/// Stops a board that does not answer PC_INFO, because it may run nevertheless. Does not read its flags first.
 async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();

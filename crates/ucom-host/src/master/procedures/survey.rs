@@ -7,7 +7,7 @@ use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Between two requests of a round, µs: the answers of 31 boards do not come as one burst.
+/// Time between two requests of a round, µs, so that the answers of 31 boards do not come as one burst.
 const SPACING: u64 = 2_000;
 
 /// Knowledge about one number.
@@ -40,7 +40,7 @@ impl Slot {
 
     pub(crate) fn seen(&self, number: u8) -> Option<BoardSeen> {
         let (info, _) = self.answers.last()?;
-        // The newest status of the answers that agree.
+        // The latest status of the answers that agree.
         let agreed =
             |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
         let info = self.answers.iter().rev().map(|(i, _)| i).find(|i| agreed(i)).unwrap_or(info);
@@ -50,7 +50,7 @@ impl Slot {
     }
 }
 
-/// PC_INFO to all numbers, in rounds, until each board gave two answers that agree or stayed silent three times.
+/// Sends PC_INFO to all numbers, in rounds, until each board gave two answers that agree or was silent three times.
 pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     let times = link.times();
@@ -97,12 +97,12 @@ pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, S
 fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: &Received) {
     if let FromBoard::Info(payload) = received.message {
         let collector = collectors.entry(received.from).or_default();
-        // Any other frame than a first one leaves the collector empty: the next round asks again.
+        // A frame other than a first frame leaves the collector empty, and the next round asks again.
         let _ = collector.push(received.at, &payload, link);
     }
 }
 
-/// Returns the last status of each of these numbers; an error if its answers contradict each other.
+/// Returns the last status of each of these numbers; an error if the answers of a board contradict each other.
 pub(crate) async fn statuses(
     link: &Link,
     numbers: &[Sequence],
@@ -118,8 +118,8 @@ pub(crate) async fn statuses(
     slots.into_iter().map(status).collect()
 }
 
-/// Returns the status of every board that answers. All are asked at once, and twice, because a frame can be lost; a board that sends
-/// sensor outputs counts as running, for any status.
+/// Returns the status of every board that answers. Asks all at once, and twice, because a frame can be lost. A board that sends sensor
+/// outputs counts as running, with any status.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());

@@ -10,12 +10,12 @@ use crate::master::reports::{Outcome, Request};
 /// Procedure in progress.
 pub(crate) type Work = core::pin::Pin<Box<dyn Future<Output = Result<Outcome, Error>> + Send>>;
 
-/// The procedure of a request.
+/// Returns the procedure of a request.
 pub(crate) fn work(link: Link, request: Request) -> Work {
     let (outer, end, boards) = (link.clone(), link.clone(), request.claims());
     let looks = !request.bears_shared_numbers() && boards != u32::MAX;
     let inner: Work = match request {
-        // These have something to undo when they are cancelled.
+        // These procedures undo changes when they are cancelled.
         Request::Update(options) => return Box::pin(update(link, options)),
         Request::Run(options) => return Box::pin(run::run(link, options)),
         Request::Conformance(options) => return Box::pin(conformance(link, options)),

@@ -6,7 +6,7 @@ use crate::master::reports::{BoardSeen, Verdict};
 use ucom::profile::{Endian, ReportMode};
 use ucom::{Dimensions, Frame, FromBoard, Function, Report, Status, package_count};
 
-/// Report functions among frames, in order.
+/// Returns the report functions among frames, in order.
 pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     let report = |f: &&Frame| f.address().is_ok_and(|(function, _)| (16..20).contains(&function.number()));
     let mut all: Vec<Frame> = frames.iter().filter(report).copied().collect();
@@ -14,7 +14,7 @@ pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     all
 }
 
-/// The frames that the boards report with (D-07).
+/// Returns the frames with which the boards must report (D-07).
 pub(super) fn expected_reports(bench: &Bench<'_>) -> Option<Vec<Frame>> {
     if bench.profile().report_mode != ReportMode::Flash7 {
         return None;
@@ -41,7 +41,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if first != second {
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
-    // A board of the chain may be left out of the test, so there may be more.
+    // A board of the chain may be excluded from the test, so there may be more reports.
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
@@ -94,8 +94,8 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // With data the frame is a board's answer, never a request (D-12). Only the board itself may send it under its number,
-    // so no answer of the board may be pending.
+    // With data the frame is a board's answer, never a request (D-12). Only the board itself may send it under its number, so the board
+    // must not have a pending answer.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
@@ -116,7 +116,7 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     })
 }
 
-/// Counts the strings of a description by their headers alone.
+/// Counts the strings of a description by their headers only.
 fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
     let profile = bench.profile();
     let Some((head, rest)) = came.split_first() else { return Err("silence".into()) };
@@ -183,11 +183,11 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
     Ok(verdict(!wrong, &packages))
 }
 
-/// The dimensions of a board, as its description begins.
+/// Returns the dimensions of a board from the first frame of its description.
 pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimensions> {
     bench.send(Function::DumpIo, board, &[]).await;
     let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
-    // The rest of the answer must not be taken for another one.
+    // The remainder of the answer must not be taken for another answer.
     while !bench.receive(bench.link.times().gap).await.is_empty() {}
     let endian: Endian = bench.profile().endian;
     Dimensions::parse(&first?.payload(), endian)

@@ -1,4 +1,4 @@
-//! Sends and receives frames of a test, and keeps both for the report.
+//! Sends and receives the frames of a test, and stores both for the report.
 
 use crate::master::engine::{Forget, Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, SignalError};
@@ -6,10 +6,10 @@ use crate::master::procedures::control::start_application;
 use crate::master::reports::{BoardSeen, ConformanceOptions, Verdict};
 use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
 
-/// Functions that come by themselves and answer nothing.
+/// Functions that boards send by themselves and that answer nothing.
 const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
 
-/// Most frames of one test that are kept.
+/// Limit of stored frames per test.
 const KEPT: usize = 64;
 
 /// State of the boards before the first test.
@@ -42,7 +42,7 @@ impl<'a> Bench<'a> {
         (self.sent, self.came)
     }
 
-    /// Sends a frame; forgets frames received before.
+    /// Sends a frame; discards frames that were received before.
     pub async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -53,14 +53,14 @@ impl<'a> Bench<'a> {
         self.link.left(serial).await;
     }
 
-    /// All frames of boards within a time, but for those that come by themselves.
+    /// Returns all frames of boards within a time, except those that boards send by themselves.
     pub async fn receive(&mut self, us: u64) -> Vec<Frame> {
         let all = self.hear_all(us).await;
         let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
     }
 
-    /// Like `hear`, for all functions, with the time of each frame.
+    /// Like `receive`, for all functions, with the time of each frame.
     pub async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
         let until = self.link.now() + us;
         let mut all = Vec::new();
@@ -76,7 +76,7 @@ impl<'a> Bench<'a> {
         all
     }
 
-    /// The first frame of a function under a number within a time.
+    /// Returns the first frame of a function under a number within a time.
     pub async fn wait(&mut self, function: Function, from: u8, us: u64) -> Option<Frame> {
         let until = self.link.now() + us;
         while let Some((_, frame)) = self.link.next_raw(until).await {
@@ -95,12 +95,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// The numbers that PC_INFO gives; `None`: silence.
+    /// Returns the numbers of the answer to PC_INFO; `None`: silence.
     pub async fn info(&mut self, board: u8) -> Option<BoardInfo> {
         for _ in 0..3 {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
-            // The text that follows must not be taken for the next answer.
+            // The text of the answer must not be taken for the next answer.
             self.receive(self.link.times().gap).await;
             if let Some(frame) = first {
                 return BoardInfo::parse(&frame.payload(), self.profile().endian);
@@ -122,7 +122,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// No heartbeats of this PC, or heartbeats again.
+    /// Ends or resumes the heartbeats of this PC.
     pub fn heartbeats(&self, on: bool) {
         self.link.with(|core| match on {
             true => core.start_session(),
@@ -130,7 +130,7 @@ impl<'a> Bench<'a> {
         });
     }
 
-    /// The application is up, its loop does not run.
+    /// Starts the application, without its loop.
     pub async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
         match start_application(self.link, board).await {
             Ok(_) => {}
@@ -142,7 +142,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Without an application there is nothing to test.
+/// Skips the test if the board has no application.
 fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     match e {
         Error::Exchange(ExchangeError::Device { .. }) | Error::Signal(SignalError::NoApplication { .. }) => {
@@ -152,7 +152,7 @@ fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     }
 }
 
-/// Frames as words.
+/// Returns frames as text.
 pub(super) fn list(frames: &[Frame]) -> String {
     let texts: Vec<String> = frames.iter().take(8).map(ToString::to_string).collect();
     match frames.len() {

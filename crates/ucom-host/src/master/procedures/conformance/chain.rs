@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::{Bench, list, verdict};
 use crate::master::reports::Verdict;
 use ucom::{Function, Status};
 
-/// PC_RESET to all, and time for all to be ready.
+/// Sends PC_RESET to all boards, and waits until all are ready.
 async fn reset_all(bench: &mut Bench<'_>) -> Vec<ucom::Frame> {
     bench.send(Function::Reset, bench.link.broadcast_number().number(), &[]).await;
     bench.link.with(|core| {
@@ -50,7 +50,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
             return Ok(Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came))));
         }
     }
-    // Also by broadcast: a board without a number does not take it (D-04, D-06).
+    // Also by broadcast: a board without a number ignores it (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
     Ok(verdict(came.is_empty(), &came))
@@ -133,7 +133,7 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// The numbers must be new: the reset in this test gives `first.number` to the first board on the wire.
+/// The numbers must be new, because the reset in this test gives `first.number` to the first board on the wire.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("there is no such board".into()));
@@ -156,7 +156,7 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdic
     let acknowledged = bench.wait(Function::InitAck, board, bench.link.times().init_ack).await.is_some();
     bench.link.sleep(100 * MS).await;
     bench.send(Function::XReset, board, &[]).await;
-    // The hold-off, and the time that an application needs.
+    // The hold-off, and the time that an application needs to start.
     let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
     let came = bench.receive(holdoff + bench.link.times().start).await;
     let now = bench.info(board).await;

@@ -1,9 +1,8 @@
-//! Acceptance tests of the board side, against real boards: do they follow the protocol page?
+//! Acceptance tests of the board side, against real boards: they check that boards follow the protocol page.
 //!
-//! By default the tests only ask questions that change nothing.
-//! [`ConformanceOptions`](crate::master::conformance::ConformanceOptions) allows more: a new address assignment, running
-//! applications with safe outputs, programming. Each test is a short conversation in frames of its own making, so that the
-//! procedures of this crate are not their own judges.
+//! By default the tests only ask questions that change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
+//! allows more: a new address assignment, running applications with safe outputs, programming. Each test exchanges a few frames that it
+//! builds itself, so the procedures of this crate do not check themselves.
 
 mod application;
 mod ask;

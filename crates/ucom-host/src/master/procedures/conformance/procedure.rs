@@ -71,7 +71,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
-        // U-2: program data outrank the process data of any board that runs, tested or not.
+        // U-2: program data outrank the process data of any running board, even outside the test.
         let states = board_states(link).await;
         running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
         running.sort_unstable();
@@ -90,7 +90,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Returns the number of reports, and `true` if the reports match the numbered boards, each with a flash id of its own.
+/// Returns the number of reports, and `true` if the reports match the numbered boards and each board has its own flash id.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

@@ -27,7 +27,7 @@ fn header(bench: &Bench<'_>, program: &ConformanceProgram, cycle: u16) -> Header
     }
 }
 
-/// Sends one block, with the frame gap of the profile.
+/// Sends one block with the frame gap of the profile.
 async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     for data in block.chunks(8) {
         bench.send(Function::Prog, board, data).await;
@@ -35,7 +35,7 @@ async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     }
 }
 
-/// A board's answer to a block: READY, PROGFINISHED or an error.
+/// Returns a board's answer to a block: READY, PROGFINISHED or an error.
 async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     let until = bench.link.now() + us;
     loop {
@@ -116,7 +116,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     ];
     for (what, code, case) in cases {
         enter_exloader(bench.link, board, flash).await?;
-        // A cancelled transfer is forgotten.
+        // The board must have forgotten the cancelled transfer.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
         bench.receive(20 * MS).await;
@@ -136,7 +136,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     })
 }
 
-/// Sends one wrong transfer; `good` is the header of a right one.
+/// Sends one faulty transfer; `good` is a correct header.
 async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, good: Header, case: &Case) {
     let endian = bench.profile().prog_endian;
     match case {
@@ -144,7 +144,7 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
         Case::Pause => {
             bench.send(Function::Prog, board, &[0x43; 8]).await;
             bench.link.sleep(300 * MS).await;
-            // Boards may evaluate the pause only when the next frame comes; frames received in the pause count as well.
+            // Boards may evaluate the pause only when the next frame comes; frames received during the pause count as well.
             bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
             bench.link.flush().await;
         }
@@ -162,7 +162,7 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
     }
 }
 
-/// Another eight bytes of program data.
+/// Returns a frame with eight more bytes of program data.
 fn next_frame(board: u8) -> Frame {
     let number = ucom::Sequence::new(board).unwrap_or(ucom::Sequence::ZERO);
     Frame::of(Function::Prog, number, [0x43; 8].into())

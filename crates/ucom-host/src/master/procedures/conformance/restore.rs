@@ -1,4 +1,4 @@
-//! Boards as they were found: after the tests, and when these end before their time.
+//! Restores boards as they were found: after the tests, and when the tests end early.
 use crate::master::engine::{Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, IdentityError, StatusError};
 use crate::master::procedures::conformance::bench::Found;
@@ -11,7 +11,7 @@ use ucom::{Admin, BoardInfo, Status, ToBoard};
 
 /// Renumbers the chain; every board must have its previous number.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
-    // This PC is the master of the bus already.
+    // This PC is already the master of the bus.
     let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
     let Outcome::Init(report) = outcome else { return Ok(()) };
     for before in &found.boards {
@@ -27,8 +27,8 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     Ok(())
 }
 
-/// Restores all boards after the tests. Failures are reported in `left` and do not keep the other boards from being restored.
-/// `at`: the board whose test was ended early.
+/// Restores all boards after the tests. Failures are reported in `left` and do not prevent the restoration of other boards. `at` is the
+/// board whose test was ended early.
 pub(super) async fn put_all_back(
     link: &Link,
     found: &Found,
@@ -90,7 +90,7 @@ pub(super) async fn put_back(
         }
         return Ok(());
     }
-    // Off first: this discards a transfer that was begun.
+    // PROG is cleared first, which discards a transfer in progress.
     set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
     if was.has(Status::PROG) {
         set_status(link, n, Status::PROG, Status::PROG).await?;
@@ -98,8 +98,8 @@ pub(super) async fn put_back(
     Ok(())
 }
 
-/// Checks that the board answers and is the same one. A board that erases its memory is silent for long, a rebooted board
-/// has lost its number.
+/// Checks that the board answers and is the same board. A board that erases its memory is silent for long. A rebooted board has lost its
+/// number.
 async fn answering(
     link: &Link,
     before: &BoardSeen,
@@ -112,7 +112,7 @@ async fn answering(
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
         Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
-            // The board may run all the same.
+            // The board may run nevertheless.
             halt(link, n).await?;
             repair(link, n, before.info.flash_number).await?.info
         }
@@ -133,7 +133,7 @@ async fn answering(
     }
 }
 
-/// The loop ends; three times, as one frame can be lost.
+/// Ends the loop; sends the stop three times, because one frame can be lost.
 async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     let to = link.board(board)?;
     for _ in 0..3 {
@@ -143,7 +143,7 @@ async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// Gives an application that should not be up, and may be coming up, the time for it.
+/// Waits for an application that should not be up but may be starting.
 async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);

@@ -1,4 +1,4 @@
-//! The tests one after the other.
+//! Runs the tests one after the other.
 use crate::master::engine::{Event, Link};
 use crate::master::error::Error;
 use crate::master::procedures::conformance::bench::{Bench, Found};
@@ -18,7 +18,7 @@ pub(super) struct Runner<'a> {
     /// State to restore.
     found: &'a Found,
     pub report: ConformanceReport,
-    /// Boards may be without their numbers.
+    /// `true` if boards may be without their numbers.
     pub unnumbered: bool,
     /// Board of the running test.
     pub at: Option<u8>,
@@ -29,7 +29,7 @@ impl<'a> Runner<'a> {
         Self { link, options, found, report: Default::default(), unnumbered: false, at: None }
     }
 
-    /// All tests that are wanted, in their order.
+    /// Returns all requested tests in their order.
     fn planned(&self) -> Vec<Planned> {
         let only = &self.options.only;
         let wanted = |test: &&Test| only.is_empty() || only.iter().any(|o| o.eq_ignore_ascii_case(test.id));
@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // That they are not allowed is reported once.
+            // The missing permission is reported once.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),
@@ -60,7 +60,7 @@ impl<'a> Runner<'a> {
         programmed.is_none_or(|program| Some(program.board) == board)
     }
 
-    /// Does every test that may be done; the others are skipped with their reason.
+    /// Runs every allowed test; the others are skipped with their reason.
     pub async fn all(&mut self) -> Result<(), Error> {
         let planned = self.planned();
         for (i, (test, board)) in planned.iter().copied().enumerate() {
@@ -107,7 +107,7 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// ASTART of a board that a test has set it on.
+    /// Restores ASTART of a board if a test has set it.
     async fn autostart_as_found(&self, board: Option<u8>) -> Result<(), Error> {
         if let Some(before) = self.found.boards.iter().find(|b| Some(b.number) == board) {
             let kept = before.info.status & Status::ASTART;
@@ -116,17 +116,17 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// Every board has its number again.
+    /// Gives every board its number again.
     async fn numbered(&mut self) -> Result<(), Error> {
         if self.unnumbered {
-            // True as long as it may not be so.
+            // The flag stays set until all boards have their numbers.
             renumber(self.link, self.found).await?;
             self.unnumbered = false;
         }
         Ok(())
     }
 
-    /// Records the tests that were skipped because the run ended before.
+    /// Records the tests that were skipped because the run ended early.
     pub fn skip_rest(&mut self, why: &str) {
         for (test, board) in self.planned() {
             if self.report.tests.iter().any(|t| t.id == test.id && t.board == board) {

@@ -20,7 +20,7 @@ pub(super) enum Level {
 }
 
 impl Level {
-    /// The option that it needs; `None`: it may be done.
+    /// Returns the option that the test needs; `None`: the test is allowed.
     pub(super) fn needs(self, options: &ConformanceOptions) -> Option<&'static str> {
         match self {
             Self::Init if !options.init => Some("--init"),
@@ -31,7 +31,7 @@ impl Level {
     }
 }
 
-/// Whom a test is of.
+/// Boards that a test covers.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Scope {
     /// The whole chain.
@@ -40,21 +40,21 @@ pub(super) enum Scope {
     Numbers,
     /// Each board.
     Board,
-    /// The board that has the first number; boards may be without their numbers after it.
+    /// The board with the first number; boards may be without their numbers afterwards.
     First,
-    /// The board that is programmed.
+    /// The board to be programmed.
     Programmed,
 }
 
-/// Conversation of a test with a board; for a test of the whole chain the number has no meaning.
+/// Exchange of a test with a board; for a test of the whole chain the number has no meaning.
 pub(super) type Talk =
     for<'a> fn(&'a mut Bench<'_>, u8) -> Pin<Box<dyn Future<Output = Result<Verdict, Error>> + Send + 'a>>;
 
 /// Function of a test.
 pub(super) enum Run {
-    /// By a conversation.
+    /// An exchange with a board.
     Talk(Talk),
-    /// Not from here; why.
+    /// The test cannot run here; the reason.
     Elsewhere(&'static str),
 }
 
@@ -69,7 +69,7 @@ pub(super) struct Test {
 }
 
 impl Test {
-    /// Both are done with one board before the next one's turn comes.
+    /// Returns `true` if both tests run with one board before the next board's turn.
     pub(super) fn goes_with(&self, next: &Self) -> bool {
         let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
         board(self) && board(next) && (self.level == next.level || next.level == Level::Program)
@@ -82,7 +82,7 @@ macro_rules! talk {
     };
 }
 
-/// All tests in the order in which they are done; the numbers are those of the acceptance tests.
+/// All tests in the order of execution. The numbers are those of the acceptance tests.
 #[rustfmt::skip]
 pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),
@@ -132,7 +132,7 @@ pub(super) static TESTS: [Test; 21] = [
         run: Run::Elsewhere("needs two boards with one flash id: `ucom sim --flash-ids 0x21,0x21` has them") },
 ];
 
-/// Names of all tests, for a command line.
+/// Returns the names of all tests, for a command line.
 pub fn test_names() -> impl Iterator<Item = &'static str> {
     let mut names: Vec<&str> = TESTS.iter().map(|test| test.id).collect();
     names.sort_by_key(|name| (name.len(), *name));

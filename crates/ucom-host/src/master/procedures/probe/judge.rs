@@ -1,4 +1,4 @@
-//! Derives a profile from the received frames: decisive observations are reported, for the others the profile keeps its values.
+//! Derives a profile from the received frames. Decisive observations are reported; other keys keep their values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -10,7 +10,7 @@ use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 /// Answers of one board to PC_INFO, frame by frame.
 pub(super) type Answers = Vec<Vec<Payload>>;
 
-/// Everything that was received.
+/// Received frames and answers.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
@@ -19,7 +19,7 @@ pub(super) struct Seen {
     pub raised: Option<bool>,
     /// Boards that answered PC_INFO to 0 and to 31.
     pub broadcast: [usize; 2],
-    /// A board has number 0.
+    /// `true` if a board has number 0.
     pub zero_answers: bool,
     pub infos: BTreeMap<u8, Answers>,
     pub padded: Option<bool>,
@@ -39,13 +39,13 @@ impl Seen {
         self.infos.iter().filter(|(_, a)| started(a)).filter_map(|(n, _)| Sequence::new(*n)).collect()
     }
 
-    /// First frames of the answers: the numbers.
+    /// Returns the first frames of the answers: the numbers.
     fn heads(&self) -> impl Iterator<Item = [u8; 8]> + '_ {
         let first = |a: &Vec<Payload>| a.first().filter(|p| p.len() == 8).map(Payload::padded);
         self.infos.values().flatten().filter_map(first)
     }
 
-    /// Headers of strings with the packages that followed: count bytes, packages.
+    /// Returns the headers of strings with the packages that followed: count bytes, number of packages.
     fn headers(&self) -> Vec<([u8; 2], usize)> {
         let header = |frames: &Vec<Payload>| match frames.as_slice() {
             [_, header, rest @ ..] => match header.bytes() {
@@ -79,12 +79,12 @@ impl Rows {
     }
 }
 
-/// Status byte of the first frame of DSP_INFO: its place depends on nothing.
+/// Returns the status byte of the first frame of DSP_INFO. Its place does not depend on the profile.
 pub(super) fn status_of(payload: &Payload) -> Option<Status> {
     payload.bytes().get(3).filter(|_| payload.len() >= 8).map(|byte| Status(*byte))
 }
 
-/// The profile and the table.
+/// Returns the profile and the table.
 pub(super) fn judge(seen: &Seen) -> ProbeReport {
     let mut rows = Rows { rows: Vec::new(), profile: seen.before };
     reports(&mut rows, seen);
@@ -131,7 +131,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence means something only when there are boards that could have answered.
+        // Silence has a meaning only if some boards could have answered.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
@@ -140,7 +140,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // Before the numbers' start: 0 cannot be both.
+    // Before the first number: 0 cannot be both.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -155,7 +155,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
 
 fn strings(rows: &mut Rows, seen: &Seen) {
     let headers = seen.headers();
-    // The reading that fits most answers, and must fit them all but for lost frames.
+    // Headers that a reading (byte order, count with or without header) fits. The best reading must fit more than any other.
     let fits = |endian: Endian, inclusive: bool| {
         let fit = |(count, packages): &&([u8; 2], usize)| {
             usize::from(endian.word(*count)) == packages + usize::from(inclusive) && (count[0] != count[1])
@@ -254,7 +254,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
 }
 
-/// Judges which heartbeats kept a control loop running: broadcast ones, or those to its number.
+/// Decides which heartbeats keep a control loop running: broadcast heartbeats, or those to its number.
 pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     let mut rows = Rows { rows: core::mem::take(&mut report.rows), profile: report.profile };
     let mode = match (broadcast, unicast) {

@@ -1,4 +1,4 @@
-//! Questions of a probe. Answers are kept as raw payloads, because their interpretation is what the probe measures.
+//! Questions of a probe. Answers are kept as raw payloads, because the probe measures their interpretation.
 
 use crate::master::engine::{Core, Link, MS, Times};
 use crate::master::error::{Error, MasterError, RunningError};
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// Number of questions to each board: one lost frame must not decide.
+/// Number of questions to each board, because one lost frame must not decide.
 const ROUNDS: usize = 3;
 
-/// Returns the findings of a probe, or the error that ended it. The session keeps its profile, and the probe leaves no board started
-/// or running that was not before, however it ends.
+/// Returns the findings of a probe, or the error that ended it. At any end the session keeps its profile, and no board stays started or
+/// running that was not so before.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
     let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
@@ -48,14 +48,14 @@ fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     }
 }
 
-/// A board that this starts, and how far it is stopped at the end, go to `begun`.
+/// Collects the observations. Boards that this step starts, and the level of their stop at the end, go to `begun`.
 async fn measure(
     link: &Link,
     options: &ProbeOptions,
     begun: &mut Option<(u8, StopLevel)>,
 ) -> Result<ProbeReport, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
-    // All frames shall be received raw, so no frame may be refused for its length.
+    // All frames must be received raw, so no frame may be refused for its length.
     use_profile(link, Profile { dlc_strict: false, ..seen.before });
     seen.reports = all_reports(link).await;
     let mut numbered = None;
@@ -63,7 +63,7 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // The whole chain; values that the base profile reads wrong are judged below.
+        // The whole chain. Values that the base profile reads wrong are judged below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -118,7 +118,7 @@ fn use_profile(link: &Link, profile: Profile) {
     });
 }
 
-/// The reports of all boards as they are, of several requests: a board may be booting, a frame may be lost.
+/// Collects the raw reports of all boards over several requests, because a board may be booting, or a frame may be lost.
 async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {
@@ -137,7 +137,8 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     reports
 }
 
-/// Sends PC_RESET, then PC_INIT to the first board; returns `true` if its status shows OPINIT at once; `None`: no board took the number.
+/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status shows OPINIT at once; `None`: no board took the
+/// number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Reset).await;
@@ -165,7 +166,7 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
         if let Some(frame) = Frame::new(Function::Info.id(*number), data) {
             link.send_frame(frame).await;
         }
-        // The answers of many boards shall not come as one burst.
+        // The answers of many boards must not come as one burst.
         link.sleep(2 * MS).await;
     }
     let (times, limit) = (link.times(), link.now() + 5_000 * MS);
@@ -181,7 +182,7 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
     answers
 }
 
-/// Offsets of the packages that answer MCA_DUMP_CI, as the profile in use reads them.
+/// Returns the offsets of the packages that answer MCA_DUMP_CI, as the profile in use reads them.
 async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     link.listen(1 << board.number(), &[Function::DspCi]);
     link.ask(board, ToBoard::DumpCi).await;
@@ -198,7 +199,7 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     offsets
 }
 
-/// Checks if a control loop keeps running with broadcast heartbeats only, and with unicast heartbeats only.
+/// Checks whether a control loop keeps running with broadcast heartbeats only, and with unicast heartbeats only.
 async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
     start_application(link, board).await?;
     let mut held = [false; 2];

@@ -1,4 +1,4 @@
-//! Update of one board: attempts, each from its exloader to the read-back (U-4 to U-10).
+//! Update of one board: attempts, each from the exloader to the read-back (U-4 to U-10).
 use crate::master::engine::{Event, Link};
 use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
@@ -40,7 +40,7 @@ pub(super) async fn one(
         }
         match again {
             None => break,
-            // Overruns: the board needs more time between frames.
+            // After an overrun the board needs more time between frames.
             Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
                 gap_us = (gap_us * 2).max(500);
             }
@@ -54,15 +54,15 @@ pub(super) async fn one(
     Ok(())
 }
 
-/// The board that was checked, in its exloader with programming enabled.
+/// Takes the board that was checked into its exloader with programming enabled.
 ///
-/// Asked before each XRESET: since the check, or the attempt before, another board may have been put in its place.
+/// Reads the board before each XRESET, because another board may have taken its place since the check or the previous attempt.
 pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
     let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
-        // A single damaged answer is not another board.
+        // A single damaged answer does not count as another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -74,7 +74,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
     }
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
-        // A board that took the XRESET must not take the program data of another board's update.
+        // A board that took the XRESET must not take the program data for another board.
         leave_programming(link, board).await;
     }
     entered.map(drop)
@@ -86,7 +86,7 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// Makes one attempt with one board; `Some`: it failed in a way that another attempt may heal (the result shows how).
+/// Makes one attempt with one board; returns `Some` if another attempt may succeed (the result shows the failure).
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -138,29 +138,29 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not take the following frames as the rest of this transfer. The command is sent while the board still
-    // counts as in progress: a cancel in this moment sends the command, too.
+    // The board must not take the following frames as the remainder of this transfer. The command is sent while the board still counts as
+    // in progress, so a cancel at this moment sends the command, too.
     leave_programming(link, board).await;
-    // Another board that has taken the number since complains of program data, or takes them out of turn.
+    // Another board that has taken the number meanwhile reports errors about program data, or takes them in the wrong order.
     if let Err(error) = one_board_each(link, &[board]).await {
         session.fail_with(board, error.into());
         return None;
     }
     session.fail(board, failure);
-    // U-7: the image or the board is wrong, another attempt would end the same.
+    // U-7: the image or the board is wrong, and another attempt would fail in the same way.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
 }
 
-/// U-10: the board must show the new program; then, if wanted, it must run.
+/// U-10: checks that the board shows the new program; then starts it if requested.
 pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
     session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
-        // The board reported that it is done; only the read-back is missing.
+        // The board reported that it is done; only the read-back failed.
         Err(e) => return session.fail_with(board, e),
     };
-    // A board that shares the number was written, too, or is the one that has just answered.
+    // A board that shares the number was also written, or it gave the last answer.
     if let Err(error) = one_board_each(link, &[board]).await {
         return session.fail_with(board, error.into());
     }
@@ -180,7 +180,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
             return session.fail(board, failure);
         }
-        // The expected program is not known; the board must at least show an application, and not run another one.
+        // The expected program is not known. The board must at least show an application, and its exloader must run.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
         None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };
@@ -190,7 +190,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
     }
 }
 
-/// Starts the application of a board that shows `known`, and sees that it runs.
+/// Starts the application of a board that shows `known`, and checks that it runs.
 pub(super) async fn start(link: &Link, session: &mut UpdateSession, board: u8, known: &BoardInfo) {
     session.begin(board);
     session.starting = Some(board);

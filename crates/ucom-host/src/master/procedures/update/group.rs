@@ -1,4 +1,4 @@
-//! Several boards at once, by broadcast PC_PROG: each board with PROG = 1 takes it, so all others must be known not to.
+//! Update of several boards at once by broadcast PC_PROG. Every board with PROG = 1 takes it, so all other boards must have PROG = 0.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::exchange::TRIES;
@@ -10,9 +10,9 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Updates all open boards at once by broadcast; boards that fall out of the group get attempts of their own.
+/// Updates all open boards at once by broadcast. Boards that drop out of the group get attempts of their own.
 ///
-/// If the broadcast could reach a board that must not have it, boards stay open and are updated one by one.
+/// If the broadcast could reach a wrong board, the boards stay open and are updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
@@ -28,7 +28,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     let (boards, stray) = gather(link, session, &selected).await;
     if stray {
         link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
-        // Those that came up stay at work: a cancel takes them out of programming.
+        // The boards in their exloaders stay in progress: a cancel takes them out of programming mode.
         return Ok(());
     }
     for board in &boards {
@@ -65,8 +65,8 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks if a board whose READY was lost has continued with the others and is done: then verifies it. Otherwise keeps its
-/// answer about the flash in the session. A board that had this program before proves nothing by showing it.
+/// Checks whether a board whose READY was lost has continued with the others and is done; then verifies it. Otherwise stores its answer
+/// about the flash in the session. If a board had this program before, its answer proves nothing.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));
@@ -83,9 +83,9 @@ async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, 
     false
 }
 
-/// Takes every number that is not selected out of programming, and reads that back.
+/// Takes every number that is not selected out of programming mode, and reads that back.
 ///
-/// A number that does not answer has got the command as well, three times; who has no number takes no PC_PROG.
+/// A number that does not answer has received the command three times as well. Boards without a number ignore PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
@@ -97,15 +97,15 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     }
     for (board, status) in statuses(link, &others).await {
         if status?.has(Status::PROG) {
-            // Three more times, each read back; then it is refused.
+            // Three more attempts, each read back; then the update is refused.
             set_status(link, board, Status::PROG, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// The selected boards in their exloaders. `true`: one failed, and did not report that it left programming either: it would
-/// be erased by the group's frames unnoticed.
+/// Takes the selected boards into their exloaders. Returns `true` if a board failed and did not confirm that it left programming mode
+/// either: frames to the group would erase it unnoticed.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

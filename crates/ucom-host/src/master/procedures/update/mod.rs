@@ -1,4 +1,4 @@
-//! Firmware update: the image twice in blocks of 64 bytes, checked first, written then, read back last (D-40 to D-46).
+//! Firmware update: the image is sent twice in blocks of 64 bytes, first checked, then written, and read back at the end (D-40 to D-46).
 
 mod board;
 mod group;

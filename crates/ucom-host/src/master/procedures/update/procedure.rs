@@ -43,12 +43,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     }
     match end {
         Ok(()) => {}
-        // A second cancel: the remaining clean-up is skipped.
+        // After a second cancel the remaining clean-up is skipped.
         Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // No frame can be sent any more, but the known state of the boards is still worth reporting.
+        // No frame can be sent any more, but the known state of the boards is still reported.
         Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -70,16 +70,16 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// The boards at work are commanded to forget the transfer; nothing half written is ever valid. `why`: the user ended it, or two
+/// Commands the boards in progress to forget the transfer; a partly written image is never valid. `why`: the user cancelled, or two
 /// boards have one number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
-        // PC_START may have been taken already: the update stops boards that it has started.
+        // The board may have taken PC_START already: the update stops boards that it has started.
         if session.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok()
         {
             session.starting = None;
         }
-        // Best effort: if the board does not take the command now, its own time limit and the next XRESET end the mode.
+        // Best effort: if the board does not take the command now, its own timeout and the next XRESET end the mode.
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
             link.note(format!("board {board} did not confirm that it left programming"));
         }
@@ -101,8 +101,8 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
     Ok(())
 }
 
-/// A board that shows the program already may still be in programming mode, as after an update whose tool was killed: it would take
-/// program data that are meant for others.
+/// Ends programming mode of boards that already show the program. A board may still be in that mode after its update tool was killed, and
+/// would then take program data for other boards.
 async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.programming.first().copied() {
         let ended = match link.become_master(session.options.force).await {
@@ -120,7 +120,7 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// Takes boards that were found in programming mode out of it when the update ends early, if this PC is the master already; else
+/// Takes boards that were found in programming mode out of it when the update ends early, if this PC already is the master. Otherwise
 /// names them, because nothing may be sent to them (D-08).
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
@@ -153,7 +153,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         link.become_master(session.options.force).await?;
         return start_rest(link, session).await;
     }
-    // D-10: the numbers of the header would come out with their bytes exchanged.
+    // D-10: the numbers in the header would have their bytes swapped.
     let flash_numbers: Vec<u16> = session.results.iter().filter_map(|result| result.flash_number).collect();
     if !session.options.force
         && let Err(error) = right_order(link, &flash_numbers).await
@@ -168,7 +168,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08, in a dry run as well: its report must show what an update would do.
+    // D-08, also in a dry run: its report must show what an update would do.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -191,7 +191,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     start_rest(link, session).await
 }
 
-/// Starts the boards that showed the program already.
+/// Starts the boards that already showed the program.
 async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.to_start.first().copied() {
         // PC_INFO has shown the program.
@@ -206,7 +206,7 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
     Ok(())
 }
 
-/// U-3 and D-62: the outcome of a board that needs no transfer; `None`: it is written.
+/// Returns the outcome of a board that needs no transfer (U-3 and D-62); `None`: the board is written.
 ///
 /// PC_INFO shows Program ID and date of program memory. The answer covers neither the load address nor any other image.
 fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
@@ -225,12 +225,12 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // Another program has been on the board since, if it shows something else than after that update.
+    // If the board's answer differs from that after the update, it has had another program since.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }
 
-/// U-1 and U-3, by questions only.
+/// Checks U-1 and U-3 with questions only.
 async fn check(link: &Link, session: &mut UpdateSession) {
     for target in session.options.targets.clone() {
         let board = target.board;
@@ -264,7 +264,7 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             if known.status.has(Status::PROG) && !session.options.dry_run {
                 session.programming.push(board);
             }
-            // An unproven program is started only if the user accepts that.
+            // An unproven program is started only if the user accepts it.
             let trusted = proven || session.options.accept_unverified;
             if session.options.start && trusted && !session.options.dry_run {
                 session.to_start.push(board);

@@ -13,7 +13,7 @@ pub(super) enum Stage {
     /// Unchanged.
     #[default]
     Untouched,
-    /// Frames that erase went past it while it may have listened.
+    /// Frames that erase were sent while the board may have listened.
     MaybeErased,
     /// The board was commanded to erase.
     Erased,
@@ -27,13 +27,13 @@ pub(super) enum Stage {
 pub(super) struct UpdateSession {
     pub options: UpdateOptions,
     pub results: Vec<UpdateResult>,
-    /// Boards between XRESET and their end.
+    /// Boards between XRESET and the end of their update.
     pub active: Vec<u8>,
     /// The board that is commanded to start its application.
     pub starting: Option<u8>,
-    /// Boards that show the program already and are still to be started.
+    /// Boards that already show the program and will be started.
     pub to_start: Vec<u8>,
-    /// Boards that show the program already and are in programming mode.
+    /// Boards that already show the program and are in programming mode.
     pub programming: Vec<u8>,
     stages: BTreeMap<u8, Stage>,
 }
@@ -60,7 +60,7 @@ impl UpdateSession {
         self.stages.get(&board).copied().unwrap_or_default()
     }
 
-    /// Returns `true` if the old application is erased or may be, in whole or in part.
+    /// Returns `true` if the old application is erased, or may be, completely or partly.
     pub fn may_be_erased(&self, board: u8) -> bool {
         self.stage(board) > Stage::Untouched
     }
@@ -70,14 +70,14 @@ impl UpdateSession {
         *known = stage.max(*known);
     }
 
-    /// Records that PC_INFO shows the state before the update: the frames that might have erased the board did not.
+    /// Records that PC_INFO shows the state before the update: the frames that might have erased the board did not do so.
     pub fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
         }
     }
 
-    /// The board shows the program, and it is known that this tool wrote it there.
+    /// Records that the board shows the program and that this tool wrote it there.
     pub fn prove(&mut self, board: u8) {
         if let Some(result) = self.result(board) {
             result.verified = true;
@@ -96,7 +96,7 @@ impl UpdateSession {
         }
     }
 
-    /// The board's outcome is how far its memory has changed.
+    /// Records a failure. The board's outcome is the change of its memory so far.
     pub fn fail(&mut self, board: u8, failure: UpdateFailure) {
         let outcome = match self.stage(board) {
             Stage::Untouched if matches!(failure, UpdateFailure::Cancelled { .. }) => {
@@ -127,7 +127,7 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// The user ended it. A board that was commanded to start, and is not known to be stopped, may run.
+    /// Records a cancel by the user. A board that was commanded to start, and is not known to be stopped, may run.
     pub fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);
@@ -137,7 +137,7 @@ impl UpdateSession {
         }
     }
 
-    /// Boards that were done but for their start.
+    /// Cancels the starts of boards whose update is otherwise done.
     pub fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);
@@ -149,27 +149,27 @@ impl UpdateSession {
         self.results.iter().find(|r| r.board == board).map(|r| r.outcome).unwrap_or_default()
     }
 
-    /// Boards whose turn has not come.
+    /// Returns the boards whose turn has not come.
     pub fn open(&self) -> Vec<u8> {
         let open = |r: &&UpdateResult| r.failure.is_none() && r.outcome == UpdateOutcome::NotStarted;
         self.results.iter().filter(open).map(|r| r.board).collect()
     }
 
-    /// No board is begun.
+    /// Refuses the update before any board is begun.
     pub fn refuse(&mut self, error: &Error) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Refused(Box::new(error.clone())));
         }
     }
 
-    /// No other board is begun after one that failed.
+    /// Skips all boards that were not begun, after one that failed.
     pub fn skip_open(&mut self, after: u8) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Skipped { after });
         }
     }
 
-    /// Boards that are at work or whose turn has not come.
+    /// Returns the boards that are in progress or whose turn has not come.
     pub fn unfinished(&self) -> Vec<u8> {
         let mut boards = self.active.clone();
         boards.extend(self.open().iter().filter(|b| !self.active.contains(b)));

@@ -1,4 +1,4 @@
-//! Update attempt: both cycles, block by block, each block answered before the next one (U-5).
+//! Update attempt: both cycles, block by block. Each block must be answered before the next is sent (U-5).
 use crate::master::engine::{Event, Link, MS};
 use crate::master::reports::update::{Progress, UpdatePlan};
 use ucom::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
@@ -23,8 +23,8 @@ pub(super) enum Broken {
 }
 
 impl Broken {
-    /// Returns `true` if the board drops the following frames (D-43): it reported an error of programming. After any other
-    /// error, as after silence, the board may go on listening.
+    /// Returns `true` if the board drops the following frames (D-43), because it reported an error of programming. After any other error,
+    /// and after silence, the board may go on listening.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -36,7 +36,7 @@ impl Broken {
 pub(super) struct Attempt<'a> {
     pub link: &'a Link,
     pub plan: &'a UpdatePlan,
-    /// To whom the blocks go.
+    /// Number that the blocks go to.
     pub to: Sequence,
     pub boards: Vec<u8>,
     pub number: u32,
@@ -53,8 +53,8 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends everything. `erasing` is called before the first frame of a block that may erase, with the boards that take
-    /// part and those that have left.
+    /// Sends both cycles. `erasing` is called before the first frame of a block that may erase, with the boards that take part and those
+    /// that have dropped out.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
@@ -84,7 +84,7 @@ impl Attempt<'_> {
         out
     }
 
-    /// Sends the eight frames of a block; a frame that came before the last one left is not an answer to it.
+    /// Sends the eight frames of a block. A frame received before the last of them left is not an answer to the block.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;
@@ -95,7 +95,7 @@ impl Attempt<'_> {
         }
     }
 
-    /// Waits for every board; those that complain or stay silent leave the attempt.
+    /// Waits for every board. Boards that report an error or stay silent drop out of the attempt.
     async fn wait(&mut self, cycle: u32, block: usize, slow: bool, last: bool, out: &mut Transferred) {
         let times = self.link.times();
         let timeout = if slow { times.erase } else { times.ready };

@@ -161,7 +161,7 @@ const WORDS: [Fixed; 38] = [
     ),
 ];
 
-/// All words.
+/// Returns all words.
 pub fn words() -> Vec<Word> {
     let fixed = WORDS.iter().map(|(family, shown, meaning, next)| Word {
         family,

@@ -8,15 +8,15 @@ use ucom::profile::{KEYS, Kind, ProfileError};
 /// Reasons why a profile file is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ProfileFileError {
-    /// Not TOML.
+    /// The text is not TOML.
     #[error("profile: {0}")]
     Toml(String),
-    /// A key that no profile has.
+    /// The key does not exist.
     #[error("profile: there is no key `{key}`{}; the keys are: {}", near(.nearest), known())]
     UnknownKey {
         /// The key in the file.
         key: String,
-        /// The known key that looks most like it.
+        /// The most similar key.
         nearest: Option<&'static str>,
     },
     /// A value outside the key's range.
@@ -47,7 +47,7 @@ fn unknown(key: &str) -> ProfileFileError {
     ProfileFileError::UnknownKey { key: key.to_string(), nearest }
 }
 
-/// `a.b = 1` and `[a] b = 1` are the same key.
+/// Flattens tables: `a.b = 1` and `[a] b = 1` are the same key.
 fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)>) {
     for (name, value) in table {
         let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };
@@ -64,16 +64,16 @@ fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)
     }
 }
 
-/// A profile as a file.
+/// Profile in a file.
 pub trait ProfileFile: Sized {
-    /// A profile from TOML; keys that the text does not have keep their defaults.
+    /// Reads a profile from TOML. Missing keys keep their defaults.
     ///
     /// # Errors
     ///
-    /// Text that is not TOML, unknown keys, and values that do not fit: each error names what would fit.
+    /// Text that is not TOML, unknown keys, and values out of range: each error names the allowed values.
     fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
 
-    /// All keys as TOML, each with its meaning in a comment.
+    /// Returns all keys as TOML, each with its meaning in a comment.
     fn to_toml(&self) -> String;
 }
 

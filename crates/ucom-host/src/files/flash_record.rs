@@ -57,7 +57,7 @@ fn hash_of(bytes: &[u8]) -> [u8; 32] {
     Sha256::digest(bytes).into()
 }
 
-/// 64 hexadecimal digits.
+/// Reads a hash of 64 hexadecimal digits.
 fn hash<'de, D: Deserializer<'de>>(input: D) -> Result<[u8; 32], D::Error> {
     let text = String::deserialize(input)?;
     let wrong = || de::Error::custom(format!("\"{text}\" is not a SHA-256: expected 64 hexadecimal digits"));

@@ -3,7 +3,7 @@
 use std::format;
 use std::string::String;
 
-/// `1 board`, `3 boards`: for nouns whose plural takes an s.
+/// Returns `1 board`, `3 boards`: for nouns whose plural takes an s.
 pub fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

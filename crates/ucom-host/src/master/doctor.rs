@@ -182,7 +182,7 @@ fn initialised(init: &InitReport, f: &mut Findings) {
     }
 }
 
-/// The next command after a finding of an init.
+/// Returns the next command after a finding of an init.
 fn after_init(finding: &InitFinding) -> String {
     match finding {
         InitFinding::NoBoards => "check power, cable and bit rate, then `ucom doctor` again".to_owned(),

@@ -45,7 +45,7 @@ impl Master {
         Ok(id)
     }
 
-    /// Cancels a procedure. It still undoes its changes on the boards before [`Event::Done`] comes.
+    /// Cancels a procedure. The procedure still undoes its changes on the boards before [`Event::Done`] comes.
     pub fn cancel(&mut self, id: ProcedureId) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.cancel = true;
@@ -153,7 +153,7 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards have, each as the error with which procedures end.
+    /// Returns the numbers that two boards have, each as the error of procedures that end for that reason.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }

@@ -1,6 +1,6 @@
 //! The controller of this computer has left the bus (bus-off, ISO 11898-1): the message and the next command.
 
-/// On a bad wire it leaves the bus all the time: reported again no sooner than after this, µs.
+/// Minimum time between two messages, µs, because with a bad wire the controller is bus-off again and again.
 const AGAIN_US: u64 = 5_000_000;
 
 /// The likely causes.
@@ -45,7 +45,7 @@ pub fn next(url: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Once at first, then no more often than every 5 s, and no time it happened is left out.
+    /// The first bus-off is reported at once, later ones at most every 5 s, and each is counted.
     #[test]
     fn it_is_reported_once_and_counted() {
         let mut off = BusOff::default();

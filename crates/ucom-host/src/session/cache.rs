@@ -5,22 +5,22 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Longest file that is read beforehand, bytes.
+/// Longest file that is read in advance, bytes.
 const FILE_MAX: u64 = 1 << 20;
-/// Most files that wait for the disk: further files are not stored.
+/// Limit of files that wait for the disk; further files are not stored.
 const WAITING_MAX: usize = 64;
 
 /// Place of the cached names, and a flag to ignore them.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     place: Place,
-    /// Boards are asked although their names are known.
+    /// `true` to ask the boards although their names are known.
     pub fresh: bool,
 }
 
 #[derive(Clone, Debug, Default)]
 enum Place {
-    /// No cache.
+    /// The session has no cache.
     #[default]
     Nowhere,
     Directory(PathBuf),
@@ -40,14 +40,14 @@ impl Cache {
         Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
     }
 
-    /// Like `new`, for a caller that must never wait for a disk: reads all files now; a separate thread writes new ones.
+    /// Like `new`, for a caller that must never wait for a disk. Reads all files now; a separate thread writes new files.
     #[must_use]
     pub fn in_memory(self) -> Self {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // The thread ends with the last clone of this cache; the cache does not wait for it. Data that could not
-        // be stored is requested again.
+        // The thread ends with the last clone of this cache, which does not wait for it. Data that could not be stored is read from the
+        // boards again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }
@@ -68,14 +68,14 @@ impl Cache {
         }
     }
 
-    /// Stores a file. A failed write is ignored: it is not an error.
+    /// Stores a file. A failed write is ignored and does not count as an error.
     pub(super) fn write(&self, name: String, text: String) {
         match &self.place {
             Place::Nowhere => {}
             Place::Directory(directory) => write(directory, &name, text),
             Place::Memory(Memory { texts, writer }) => {
                 texts.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), text.clone());
-                // The cache does not wait for a disk that does not answer.
+                // The cache does not wait for a slow disk.
                 let _ = writer.try_send((name, text));
             }
         }
@@ -90,7 +90,7 @@ fn all(directory: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let text = |entry: fs::DirEntry| {
         let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
-        // Only regular files: reading from anything else could block without end.
+        // Only regular files: reading from anything else could block for ever.
         let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
         about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
     };

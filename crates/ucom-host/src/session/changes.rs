@@ -1,4 +1,4 @@
-//! Single actions on several boards: none is changed before all answer, and changes before a failure are reported.
+//! Single actions on several boards: no board is changed before all answer, and changes before a failure are reported.
 
 use std::collections::BTreeSet;
 
@@ -15,13 +15,13 @@ pub type Numbered = (u8, BoardInfo);
 /// Result of a stop of several boards, or of switching off their outputs.
 #[derive(Debug)]
 pub struct Stopped {
-    /// Boards that confirmed it.
+    /// Boards that confirmed the stop.
     pub boards: Vec<Numbered>,
     /// Boards that may still run, each with the reason.
     pub failed: Vec<(u8, SessionError)>,
 }
 
-/// The one board of an outcome.
+/// Returns the only board of an outcome.
 fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
     match outcome {
         Outcome::Status { board, info } => Ok((board, info)),
@@ -31,7 +31,7 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
 }
 
 impl SessionError {
-    /// Returns this error together with the boards that were changed before, if one of several boards fails.
+    /// Returns this error together with the boards that were changed before it, if there are any.
     #[must_use]
     pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
         let done: Vec<u8> = done.into_iter().collect();
@@ -40,15 +40,15 @@ impl SessionError {
 }
 
 impl Driver {
-    /// Status and numbers of boards.
+    /// Returns status and numbers of boards.
     ///
     /// # Errors
-    /// That of the first board that does not answer.
+    /// Error of the first board that does not answer.
     pub fn statuses(&mut self, boards: &[u8]) -> Result<Vec<Numbered>, SessionError> {
         boards.iter().map(|board| numbered(self.run(Request::Info { board: *board })?)).collect()
     }
 
-    /// Changes one board after the other; none before all of them answer.
+    /// Changes one board after the other, and no board before all of them answer.
     ///
     /// # Errors
     /// Error of the first board that fails; [`SessionError::Partly`] if others were changed before it.
@@ -101,8 +101,8 @@ impl Driver {
         several.try_for_each(|board| self.seen(*board).map(drop))
     }
 
-    /// Stops boards down to `level`. Sends all stop commands before it asks any board, so that a board that does not answer delays no
-    /// other. Failures are collected.
+    /// Stops boards down to `level`. Sends all stop commands before it asks any board, so that a silent board does not delay the others.
+    /// Failures are collected.
     ///
     /// # Errors
     /// The boards on the bus are not known, or no board answers.
@@ -128,7 +128,7 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; their control loops go on. Commands every board, even if that board or another one does not
+    /// Makes the outputs of boards safe; their control loops go on. Commands every board, even if that board or another board does not
     /// answer. Failures are collected.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
@@ -149,8 +149,8 @@ impl Driver {
         stopped
     }
 
-    /// Ends a run: all control loops at once, then applications in reverse order, then the session. Returns the boards whose end is not
-    /// certain; why is noted once for each reason, except for the one that is `known` already.
+    /// Ends a run: all control loops at once, then applications in reverse order, then the session. Returns the boards that may still
+    /// run. Each reason is noted once, except for the reason in `known`.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
         // A lost bus is lost for all boards.

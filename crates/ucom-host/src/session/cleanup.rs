@@ -1,24 +1,24 @@
-//! Cleanup list: work left undone if the process ended now, and the command that finishes it.
+//! Cleanup list: work that would be left undone if the process ended now, and the command that finishes it.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::master::{Request, StopLevel};
 
-/// Work left undone if the process ends now, and the next command.
+/// Work that would be left undone if the process ended now, and the next command.
 type Cleanup = (String, String);
 
-/// List of work begun and not finished; a clone shares the list, also in the thread that receives Ctrl-C.
+/// List of unfinished work. A clone shares the list, also in the thread that receives Ctrl-C.
 #[derive(Clone, Debug, Default)]
 pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Work that the requests in progress leave undone, the outermost first.
+    /// Work that the requests in progress would leave undone, the outermost first.
     now: Vec<Option<Cleanup>>,
-    /// Boards that run, by a request that has ended.
+    /// Boards that a finished request left running.
     running: Vec<u8>,
-    /// Boards that were started by requests that have ended.
+    /// Boards that finished requests started.
     started: BTreeSet<u8>,
     /// `true` if the state of the boards was changed.
     changed: bool,
@@ -47,19 +47,19 @@ impl State {
 }
 
 impl CleanupList {
-    /// Returns the work left undone if the process ended now, and the command that finishes it, as lines for the operator.
+    /// Returns the work that would be left undone if the process ended now, and the command that finishes it, as lines for the operator.
     pub fn words(&self) -> String {
         self.lock().words()
     }
 
-    /// Begins an action that is not a request; `what` is the work it leaves undone, `next` the next command.
+    /// Begins an action that is not a request. `what` is the work that it would leave undone, `next` the next command.
     pub fn begin_other(&self, what: &str, next: &str) {
         let mut state = self.lock();
         state.changed = true;
         state.now.push(Some((what.into(), next.into())));
     }
 
-    /// A request begins.
+    /// Begins a request.
     pub fn begin(&self, request: &Request) {
         let cleanup = cleanup_of(request);
         let mut state = self.lock();
@@ -67,7 +67,7 @@ impl CleanupList {
         state.now.push(cleanup);
     }
 
-    /// The request that began last has ended: boards that it started or that run are undone until they are stopped.
+    /// Ends the request that began last. Boards that it started, or that run, remain on the list until they are stopped.
     pub fn end(&self, request: &Request, done: bool) {
         let mut state = self.lock();
         state.now.pop();
@@ -145,7 +145,7 @@ fn cleanup_of(request: &Request) -> Option<Cleanup> {
             let what = format!("what {} took of it is not known", several(boards.len(), &boards.join(", ")));
             (what, format!("ucom status {}", boards.join(",")))
         }
-        // These may have started a board or renumbered the chain.
+        // These requests may have started a board or renumbered the chain.
         Request::Probe(_) | Request::Conformance(_) => {
             ("what the boards do is not known".into(), "ucom scan".into())
         }
@@ -163,7 +163,7 @@ mod tests {
         Request::Stop { board, level: StopLevel::Application, force: true }
     }
 
-    /// An action counts as undone until it ends, even while another one runs inside it.
+    /// An action counts as undone until it ends, even while another action runs inside it.
     #[test]
     fn what_is_left_undone() {
         let cleanup = CleanupList::default();
@@ -184,7 +184,7 @@ mod tests {
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
-    /// Boards that earlier requests of the same command started are named, whichever request is in progress.
+    /// Boards that earlier requests of the same command started are named, for any request in progress.
     #[test]
     fn boards_started_before_are_named() {
         let cleanup = CleanupList::default();
@@ -202,7 +202,7 @@ mod tests {
         assert!(cleanup.words().contains("ucom stop 2\n"));
     }
 
-    /// A dry run changes nothing, which the message states.
+    /// A dry run changes nothing, and the message says so.
     #[test]
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {

@@ -17,23 +17,23 @@ use crate::master::{
     StopLevel, Supervision,
 };
 
-/// Operator of a session: can end it, and receives notes in addition to results.
+/// Operator of a session, who can end it and receives notes in addition to results.
 pub trait Operator {
     /// Returns `true` if the user requested an end (Ctrl-C).
     fn stop_asked(&self) -> bool;
-    /// Takes a line; waits for no reader.
+    /// Takes a line without waiting for a reader.
     fn note(&self, text: String);
-    /// Receives an event outside the running procedure; `text`: the note to show for it.
+    /// Receives an event outside the running procedure; `text` is the note to show for it.
     fn happened(&self, _event: &Event, text: Option<String>) {
         if let Some(text) = text {
             self.note(text);
         }
     }
-    /// Called in each turn, also during procedures: for work that cannot wait for their end.
+    /// Runs in each turn, also during procedures, for work that cannot wait for their end.
     fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
-/// The PC side on an open bus.
+/// PC side on an open bus.
 pub struct Driver {
     /// Procedures and boards.
     pub master: Master,
@@ -44,7 +44,7 @@ pub struct Driver {
     lost: RefCell<Vec<Loss>>,
 }
 
-/// A board was lost, or has rebooted.
+/// Loss or reboot of a board.
 struct Loss {
     board: u8,
     rebooted: bool,
@@ -57,12 +57,12 @@ impl Driver {
         Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
     }
 
-    /// µs since the bus was opened.
+    /// Returns the time since the bus was opened, µs.
     pub fn now_us(&self) -> u64 {
         self.link.now_us()
     }
 
-    /// The bus.
+    /// Returns the bus.
     pub fn link(&mut self) -> &mut Link {
         &mut self.link
     }
@@ -72,7 +72,7 @@ impl Driver {
         self.operator.stop_asked()
     }
 
-    /// Hands over received frames and sends due ones; waits for either no longer than `patience`.
+    /// Delivers received frames and sends due frames; waits for either no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         self.operator.turned(&mut self.master, &mut self.link);
@@ -96,12 +96,12 @@ impl Driver {
         self.drive(request, true, &mut |_, event| see(event))
     }
 
-    /// Asks a board for its identity and state.
+    /// Reads a board's identity and state.
     pub fn seen(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, true)
     }
 
-    /// Like `seen`, also after Ctrl-C: a cancelled procedure may have left the board in any state.
+    /// Like `seen`, also after Ctrl-C, because a cancelled procedure may have left the board in any state.
     pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, false)
     }
@@ -113,12 +113,12 @@ impl Driver {
         }
     }
 
-    /// Ends control loops before anything else is sent or asked: of these boards, or by broadcast of all.
+    /// Ends control loops before anything else is sent or asked: those of these boards, or by broadcast those of all.
     pub fn stop_at_once(&mut self, boards: Option<&[u8]>) {
         self.master.stop_at_once(self.link.now_us(), boards);
     }
 
-    /// Stops a board, also after Ctrl-C: a started board is not left running.
+    /// Stops a board, also after Ctrl-C, so that a started board is not left running.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
         self.drive(request, false, &mut |_, _| {}).map(drop)
@@ -137,7 +137,7 @@ impl Driver {
             Err(error) => Err(error.into()),
         };
         self.cleanup.end(&request, result.is_ok());
-        // A board that does not answer may never have received the request.
+        // A board that does not answer may not have received the request.
         let was_off = self.link.times_bus_off() > times_off;
         result.map_err(|failure| match was_off && failure.kind() == ErrorKind::NoLink {
             true => SessionError::BusOff { failure: Box::new(failure), url: self.link.url().into() },
@@ -155,7 +155,7 @@ impl Driver {
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
-                // Its end follows at once, with the known results.
+                // The procedure ends at once, with the known results.
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
@@ -191,12 +191,12 @@ impl Driver {
         self.cleanup.forget();
     }
 
-    /// A line for the operator.
+    /// Shows a line to the operator.
     pub fn note(&self, text: String) {
         self.operator.note(text);
     }
 
-    /// Returns an error if a board was lost, or one of these has rebooted, according to the reports.
+    /// Returns an error if a board was lost, or if one of these boards has rebooted, according to the reports.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
         let losses = self.lost.borrow();
         let lost = losses.iter().filter(|l| !l.rebooted).count();
@@ -217,12 +217,12 @@ impl Driver {
         self.operator.happened(event, event_text(event, during));
     }
 
-    /// Something that is not to be noted happened.
+    /// Handles an event that is not noted.
     pub(super) fn pass_over(&self, event: &Event) {
         self.operator.happened(event, None);
     }
 
-    /// Returns the numbers of the selected boards; for `all` it scans the bus, and refuses a number that two boards have.
+    /// Returns the numbers of the selected boards. For `all` it scans the bus, and refuses if two boards have one number.
     pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         let numbers = self.numbers_to_stop(boards)?;
         match self.master.shared_numbers().into_iter().next() {
@@ -231,7 +231,7 @@ impl Driver {
         }
     }
 
-    /// Like `numbers`, including numbers that two boards share: a stop stops both.
+    /// Like `numbers`, but accepts numbers that two boards share, because a stop stops both.
     pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
@@ -245,7 +245,7 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Boards that are not among these numbers are noted, not left out silently.
+                    // Boards that are not among these numbers are noted, not silently left out.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
@@ -296,12 +296,12 @@ pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> 
     })
 }
 
-/// Refuses to go on with a bus on which two boards have one number.
+/// Refuses to go on if two boards on the bus have one number.
 pub fn nothing_shared(master: &Master) -> Result<(), SessionError> {
     master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// Returns one short line per test while the tests run.
+/// Returns one short line per finished test.
 fn test_text(test: &ConformanceTest) -> String {
     let how = match &test.verdict {
         Verdict::Pass => "passed",

@@ -1,4 +1,4 @@
-//! Errors of a session: a procedure failed, or its environment did.
+//! Errors of a session: a procedure or its environment failed.
 use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
@@ -28,10 +28,10 @@ pub enum SessionError {
     /// The open bus failed.
     #[error("{0}")]
     Bus(CanError),
-    /// The bus has no such frame.
+    /// The frame is not possible on this bus.
     #[error("{0}")]
     Frame(InvalidFrame),
-    /// No answer while the controller of this computer was bus-off: the request may never have been sent.
+    /// No answer came while the controller of this computer was bus-off, so the request may never have been sent.
     #[error("{failure}; the CAN controller of this computer was bus-off meanwhile")]
     BusOff {
         /// Failure.
@@ -56,7 +56,7 @@ pub enum SessionError {
         /// Number of boards.
         boards: usize,
     },
-    /// Boards were lost, or have rebooted, in the course of the session.
+    /// Boards were lost or have rebooted during the session.
     #[error("{}", losses(*lost, *rebooted))]
     Lost {
         /// Number of losses of a board.
@@ -73,10 +73,10 @@ pub enum SessionError {
     /// The names of boards' inputs, outputs and parameters are not known.
     #[error("{}", unnamed(failed))]
     NoNames {
-        /// These boards, each with its failure.
+        /// These boards, each with its error.
         failed: Vec<(u8, SessionError)>,
     },
-    /// An outcome that does not fit its request: a mistake in this library.
+    /// An outcome that does not fit its request: an error in this library.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
 }
@@ -92,7 +92,7 @@ pub enum ValuesError {
         board: u8,
         /// Buffer.
         kind: Kind,
-        /// The place.
+        /// Place in the buffer.
         index: u16,
     },
     /// The value is not valid for the signal.
@@ -104,7 +104,7 @@ pub enum ValuesError {
         kind: Kind,
         /// Name as given.
         name: String,
-        /// The program that the board has.
+        /// Program ID of the board.
         program_id: u16,
         /// Error in the value.
         error: Box<ValueError>,
@@ -119,7 +119,7 @@ pub enum ValuesError {
         /// Name.
         name: String,
     },
-    /// A value for a board that is not meant.
+    /// A value is for a board that is not selected.
     #[error("{board}.{name}: board {board} is not among those to {to}")]
     NotMeant {
         /// The board.
@@ -129,20 +129,20 @@ pub enum ValuesError {
         /// Action for which boards were selected, as a verb.
         to: &'static str,
     },
-    /// Values were sent, but the application was not running to take them.
+    /// Values were sent, but the application did not run and could not take them.
     #[error("board {board}: values were sent, but {why}: what it has now is unknown{}", before(written))]
     Unknown {
         /// The board.
         board: u8,
         /// Reason.
         why: String,
-        /// Boards that were written to before it; `None` if irrelevant.
+        /// Boards that were written before it; `None` if irrelevant.
         written: Option<Vec<u8>>,
     },
-    /// A parameter file cannot be read, or has nothing to write.
+    /// A parameter file cannot be read, or has no value to write.
     #[error("{message}")]
     File {
-        /// With the file's name.
+        /// Message with the file's name.
         message: String,
         /// Remedy.
         hint: &'static str,
@@ -150,7 +150,7 @@ pub enum ValuesError {
     /// A parameter file does not fit the boards: one line for each mistake.
     #[error("{}", lines.join("\n"))]
     Misfit {
-        /// Each with the file's name and the line.
+        /// Lines, each with the file's name and the line number.
         lines: Vec<String>,
     },
 }
@@ -161,12 +161,12 @@ impl SessionError {
         matches!(self, Self::Procedure(Error::Master(MasterError::Cancelled)))
     }
 
-    /// Returns `true` if the error concerns one board only: the others may answer.
+    /// Returns `true` if the error concerns one board only, so that others may answer.
     pub(crate) fn is_of_one_board(&self) -> bool {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
 
-    /// A board could be asked if its application were started.
+    /// Returns `true` if the board could answer after a start of its application.
     fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }

@@ -1,4 +1,4 @@
-//! Diagnosis of a bus: listens, asks if that cannot do harm, and reports the findings.
+//! Diagnosis of a bus: listens, asks if questions cannot do harm, and reports the findings.
 
 use std::time::{Duration, Instant};
 
@@ -14,11 +14,11 @@ use crate::master::{BoardSeen, Outcome, Request};
 /// Result of a diagnosis.
 #[derive(Clone, Debug)]
 pub struct Examination {
-    /// The worst first.
+    /// Findings, the most serious first.
     pub findings: Vec<Finding>,
-    /// The boards that answered.
+    /// Boards that answered.
     pub boards: Vec<BoardSeen>,
-    /// Frames of boards that were received.
+    /// Number of received frames of boards.
     pub received: u64,
 }
 
@@ -31,8 +31,8 @@ impl Examination {
 }
 
 impl Driver {
-    /// Listens to the bus for a while, then scans it. With a competing master on the bus no question is sent, because even
-    /// questions could mix with those of that master (D-08).
+    /// Listens to the bus for a while, then scans it. If a competing master is on the bus, no question is sent, because even questions
+    /// could mix with those of that master (D-08).
     ///
     /// # Errors
     /// The bus failed, or the operator requested an end.

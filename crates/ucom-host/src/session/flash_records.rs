@@ -9,7 +9,7 @@ use crate::files::{FlashRecord, Inventory, InventoryError};
 use crate::master::update::{UpdateOptions, UpdateReport};
 use crate::master::{Event, Outcome, Request};
 
-/// Flash records of this tool (D-62): in the inventory file for boards that it lists, else in memory until the session ends.
+/// Flash records of this tool (D-62): in the inventory file for boards that it lists, otherwise in memory until the session ends.
 #[derive(Debug, Default)]
 pub struct FlashRecords {
     inventory: Option<PathBuf>,
@@ -18,12 +18,12 @@ pub struct FlashRecords {
 }
 
 impl FlashRecords {
-    /// Creates the records of an inventory file, which need not exist; `None`: only the session keeps them.
+    /// Creates the records of an inventory file, which need not exist; `None`: only the session stores them.
     pub fn new(inventory: Option<PathBuf>) -> Self {
         Self { inventory, ..Self::default() }
     }
 
-    /// Reads the inventory again, because other programs and users write it, too.
+    /// Reads the inventory again, because other programs and users may change it.
     fn read(&mut self) -> Result<(), InventoryError> {
         self.listed.clear();
         let Some(path) = self.inventory.as_ref().filter(|path| path.exists()) else { return Ok(()) };
@@ -56,7 +56,7 @@ impl Driver {
     /// board has been read back. If it cannot be removed, the update is cancelled before anything is erased.
     ///
     /// # Errors
-    /// As [`Driver::run`]; and the inventory cannot be read.
+    /// As [`Driver::run`], and if the inventory cannot be read.
     pub fn update(
         &mut self,
         mut options: UpdateOptions,

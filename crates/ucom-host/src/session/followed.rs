@@ -1,7 +1,7 @@
-//! Boards that a run supervises: which of them has left its control loop, and how old their values are.
+//! Boards that a run supervises: which boards have left their control loops, and the age of their values.
 //!
-//! A board leaves its loop by itself when it misses the PC, when another PC stops it, or when its application stops it. The
-//! board reports this once (MCA_ADMIN_DATA); if that frame is lost, its outputs stop and the master asks for its status.
+//! A board leaves its loop by itself if it misses the PC's heartbeat, if another PC stops it, or if its application stops it. The board
+//! reports this once (MCA_ADMIN_DATA). If that frame is lost, the outputs stop and the master reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -14,19 +14,19 @@ use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, S
 
 /// Age at which the last outputs count as old, µs. Outputs normally come every few milliseconds.
 const OLD_US: u64 = 500_000;
-/// A board that sends no outputs and lives is not asked more often than this, µs.
+/// Minimum time between questions to a board that sends heartbeats but no outputs, µs.
 const ASK_US: u64 = 1_000_000;
-/// Time without any board in its loop after which a run is over, µs.
+/// Time without any board in its loop after which a run has ended, µs.
 const OVER_US: u64 = 3_000_000;
 
 /// Change of a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Its heartbeat is late.
+    /// The heartbeat is late.
     Late,
-    /// Its heartbeats have ended.
+    /// The heartbeats have ended.
     Lost,
-    /// Its heartbeats come again.
+    /// The heartbeats have returned.
     Back,
     /// The board has rebooted.
     Rebooted,
@@ -39,7 +39,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// Short name for programs.
+    /// Returns a short name for programs.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Late => "late",
@@ -62,7 +62,7 @@ pub struct Notice {
     pub change: Change,
     /// Time, s.
     pub time_s: f64,
-    /// Age of its last outputs, s; `None` if none came, or if the change concerns heartbeats.
+    /// Age of the board's last outputs, s; `None` if none came, or if the change concerns heartbeats.
     pub age_s: Option<f64>,
 }
 
@@ -95,7 +95,7 @@ impl Notice {
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Since when no board is in its loop.
+    /// Time since which no board is in its loop.
     nobody_since: Option<u64>,
 }
 
@@ -103,24 +103,24 @@ pub struct Followed {
 struct One {
     last: Option<Snapshot>,
     out: bool,
-    /// A board was lost, or has rebooted, since this one runs: by `on_lost` it may have been stopped for that.
+    /// `true` if a board was lost or has rebooted since this board runs: with `on_lost` that may be why it stopped.
     lost: bool,
-    /// `true` if the board left its loop at some time, for another reason than the loss of another board.
+    /// `true` if the board has ever left its loop for another reason than the loss of another board.
     left: bool,
-    /// `true` if the board is out of its loop by its status, because its own report was lost.
+    /// `true` if the board's status shows that it is out of its loop; its own report was lost.
     status_out: bool,
     asked_us: u64,
 }
 
 impl Followed {
-    /// These boards run now.
+    /// Creates the list of boards that run now.
     pub fn new(boards: impl Iterator<Item = u8>, now_us: u64) -> Self {
         let mut new = Self::default();
         new.add(&boards.collect::<Vec<_>>(), now_us);
         new
     }
 
-    /// Adds boards that run now or have been restarted. The state of the others is kept.
+    /// Adds boards that run now or have been restarted. The state of other boards stays.
     pub fn add(&mut self, boards: &[u8], now_us: u64) {
         for board in boards {
             let one = self.boards.entry(*board).or_default();
@@ -129,12 +129,12 @@ impl Followed {
         self.nobody_since = None;
     }
 
-    /// This board is followed no more.
+    /// Removes a board from supervision.
     pub fn remove(&mut self, board: u8) {
         self.boards.remove(&board);
     }
 
-    /// Handles an event of the bus, in addition to the text that the driver prints.
+    /// Handles an event of the bus, and returns a notice. The driver prints the event's own text.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         match event {
             Event::Snapshot { board, snapshot } => {
@@ -168,7 +168,7 @@ impl Followed {
         None
     }
 
-    /// Returns the boards that left or re-entered their loops since the last call. Asks boards that send nothing.
+    /// Returns the boards that left or re-entered their loops since the last call. Reads the status of boards that send nothing.
     pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Notice> {
         let boards = master.boards();
         let (mut notices, mut silent) = (Vec::new(), None);
@@ -200,8 +200,8 @@ impl Followed {
         notices
     }
 
-    /// Returns `true` if the run is over: every board has left its loop, or was lost and, by `on_lost`, stopped. Only a new
-    /// run leads a board back into its loop. With `report` the run waits for a lost board, which may still be in its loop.
+    /// Returns `true` if the run has ended: every board has left its loop, or was lost and, by `on_lost`, stopped. Only a new run starts
+    /// a board's loop again. With `report` the run waits for a lost board, which may still be in its loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -242,7 +242,7 @@ impl Followed {
     }
 }
 
-/// Missing heartbeats make its values doubtful.
+/// Returns `true` if missing heartbeats make the board's values doubtful.
 fn in_doubt(board: &Board) -> bool {
     board.rebooted || matches!(board.life, Life::Late | Life::Lost)
 }
@@ -262,7 +262,7 @@ mod tests {
 
     use super::*;
 
-    /// Receives frames of board 1 at a time; returns the notices.
+    /// Receives frames of board 1 at a time, and returns the notices.
     fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();
@@ -304,7 +304,7 @@ mod tests {
         assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
         assert!(receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "reported once");
         assert_eq!(stale(&master, &followed, 30_000), [true]);
-        // Another PC starts the board again: the run is still broken.
+        // Another PC starts the board again: the run counts as interrupted nevertheless.
         let again = ["601#01000000", "381#0000640065006600"];
         assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
@@ -336,7 +336,7 @@ mod tests {
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
     }
 
-    /// Starting or stopping a board does not change the state of the others.
+    /// A start or stop of a board does not change the state of the others.
     #[test]
     fn d37_boards_that_come_and_go_leave_the_others_as_they_were() {
         let (mut master, mut followed) = running();
@@ -350,7 +350,7 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // The board is restarted: earlier losses do not count, it leaves its loop by itself.
+        // The board is restarted. Earlier losses do not count: it leaves its loop by itself.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);

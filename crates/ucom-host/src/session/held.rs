@@ -1,5 +1,5 @@
-//! Boards that a session has started, and its knowledge of them; shared by all programs that own a bus for others. In doubt a board
-//! counts as started: one more stop costs nothing.
+//! Boards that a session has started, and its knowledge of them. All programs that own a bus for others use this module. A board in doubt
+//! counts as started, because an additional stop does no harm.
 //!
 //! - [`Held`]: the state, which the session's [`Operator`](super::Operator) writes in the middle of procedures.
 //! - [`Session`]: a driver with that state; all starts and stops of boards go through it.
@@ -29,9 +29,9 @@ use crate::master::{Event, InitReport};
 pub struct Held {
     started: BTreeSet<u8>,
     running: BTreeSet<u8>,
-    /// Boards whose control loops it supervises.
+    /// Boards whose control loops the session supervises.
     pub followed: Followed,
-    /// The last outputs of boards.
+    /// Last outputs of boards.
     pub snapshots: BTreeMap<u8, Snapshot>,
     /// The names of boards.
     pub known: BTreeMap<u8, Arc<Known>>,
@@ -44,17 +44,17 @@ impl Held {
         Self { has_started, ..Self::default() }
     }
 
-    /// Boards whose applications the session has started.
+    /// Returns the boards whose applications the session has started.
     pub fn started(&self) -> &BTreeSet<u8> {
         &self.started
     }
 
-    /// Boards whose control loops the session has started.
+    /// Returns the boards whose control loops the session has started.
     pub fn running(&self) -> &BTreeSet<u8> {
         &self.running
     }
 
-    /// An event of the bus: outputs are kept, and a change of a board that is supervised is returned.
+    /// Handles an event of the bus: stores outputs, and returns a change of a supervised board.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         if let Event::Snapshot { board, snapshot } = event {
             self.snapshots.insert(*board, snapshot.clone());
@@ -62,7 +62,7 @@ impl Held {
         self.followed.see(event, now_us)
     }
 
-    /// These boards count as started.
+    /// Counts these boards as started.
     fn starts(&mut self, boards: &[u8]) {
         self.started.extend(boards);
         self.show();
@@ -106,7 +106,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Lets the bus go on, waiting no longer than `patience`.
+    /// Runs the bus for a moment, waiting no longer than `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         self.driver.turn(patience)?;
         while let Some(event) = self.driver.master.take_event() {
@@ -115,7 +115,7 @@ impl Session {
         Ok(())
     }
 
-    /// Returns the boards that left or re-entered their control loops since the last call. Asks boards that send nothing.
+    /// Returns the boards that left or re-entered their control loops since the last call. Reads the status of boards that send nothing.
     pub fn look(&mut self) -> Vec<Notice> {
         let now_us = self.driver.now_us();
         self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
@@ -126,8 +126,8 @@ impl Session {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Ends the heartbeats unless this session has started boards or a client `commands`: boards of another PC must become safe if that
-    /// PC is lost (D-50).
+    /// Ends the heartbeats unless this session has started boards or a client holds the lease (`commands`). Boards of another PC must
+    /// become safe if that PC is lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
@@ -157,7 +157,7 @@ impl Session {
         Ok(self.knows(known))
     }
 
-    /// The names of a board are known from now on, and its outputs are put together.
+    /// Stores the names of a board, and begins to reassemble its outputs.
     pub fn knows(&mut self, known: Known) -> Arc<Known> {
         let known = Arc::new(known);
         self.driver.master.watch(known.board, Some(known.names.dimensions().so), true);
@@ -165,7 +165,7 @@ impl Session {
         known
     }
 
-    /// Runs an action by names; if a board turns out to have other names than the cached ones, runs it once more with those.
+    /// Runs an action by names. If a board has other names than the cached names, runs the action once more with those.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -174,14 +174,14 @@ impl Session {
         with_names(&cache, |cache| act(self, cache))
     }
 
-    /// Runs an action that starts or moves these boards. The boards count as started before anything is sent, because an end
-    /// may be requested at any time. On failure, boards that were sent nothing or that answer that they are stopped no longer count.
+    /// Runs an action that starts or moves these boards. The boards count as started before anything is sent, because the user may end
+    /// the action at any time. After a failure, boards that received no command, or that answer that they are stopped, no longer count.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],
         act: impl FnOnce(&mut Self) -> Result<T, SessionError>,
     ) -> Result<T, SessionError> {
-        // No board is sent anything if one of them does not answer.
+        // No board receives a command if one of them does not answer.
         for board in boards {
             self.driver.seen(*board)?;
         }
@@ -199,12 +199,12 @@ impl Session {
         done
     }
 
-    /// Returns `true` if the board answers that its application does not run; asks even after a cancelled request.
+    /// Returns `true` if the board answers that its application does not run. Asks even after a cancelled request.
     fn is_stopped(&mut self, board: u8) -> bool {
         self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
     }
 
-    /// The control loops of these boards run from now on.
+    /// Records that the control loops of these boards run.
     pub fn runs(&mut self, boards: &[u8]) {
         let now_us = self.driver.now_us();
         self.held.borrow_mut().runs(boards, now_us);
@@ -215,8 +215,8 @@ impl Session {
         self.held.borrow_mut().runs_no_more(board);
     }
 
-    /// Records that the control loop of this board has ended while its application goes on. A board that this session has not started
-    /// does not count as started by that: its heartbeats are not supervised here.
+    /// Records that the control loop of this board has ended while its application goes on. If this session has not started the board,
+    /// the board does not count as started: its heartbeats are not supervised here.
     pub fn only_started(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         let counted = held.started.contains(&board);
@@ -226,19 +226,19 @@ impl Session {
         }
     }
 
-    /// The number or the application of this board is another one, or none.
+    /// Forgets a board whose number or application has changed or is gone.
     pub fn forget(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         held.runs_no_more(Some(board));
         held.known.remove(&board);
     }
 
-    /// The boards that count as started.
+    /// Returns the boards that count as started.
     pub fn started(&self) -> Vec<u8> {
         self.held.borrow().started.iter().copied().collect()
     }
 
-    /// Stops the boards that this session has started. Returns the boards whose stop is not certain; they still count as started.
+    /// Stops the boards that this session has started. Returns the boards that may still run; they still count as started.
     pub fn leave(&mut self) -> Vec<u8> {
         self.quiet();
         let started = self.started();
@@ -256,7 +256,7 @@ impl Session {
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {
-                // The board runs on if it ran, or its state is unknown.
+                // The board continues to run if it ran, or its state is unknown.
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate
@@ -274,8 +274,9 @@ impl Session {
         }
     }
 
-    /// Boards have new numbers, and names are of others from now on. Where not all is well, who has none now may run under the one it
-    /// had, and who shows that it is started may have missed the reset.
+    /// Handles new numbers of boards: all stored names are dropped. After a complete init no board counts as started. After an incomplete
+    /// init, boards that the report does not list still count, because they may run under their old numbers. Boards that show a started
+    /// application count as well, because they may have missed the reset.
     pub fn renumbered(&mut self, report: Option<&InitReport>) {
         let mut held = self.held.borrow_mut();
         match report {

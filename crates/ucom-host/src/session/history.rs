@@ -1,5 +1,5 @@
-//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now: the
-//! protocol has no read-back, and a restart of the application, which may go unnoticed, ends them (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now. The protocol has no
+//! read-back, and a restart of the application, which may go unnoticed, resets them (D-35).
 
 use std::collections::BTreeMap;
 
@@ -17,14 +17,14 @@ pub struct Written {
     pub at: u64,
 }
 
-/// Parameters of one board by their place in the buffer, as last written.
+/// Values last written to the parameters of one board, by place in the buffer.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(default)]
 pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
-    /// Cache and file name.
+    /// Cache, and name of the file.
     #[serde(skip)]
     kept: (Cache, String),
 }
@@ -40,7 +40,7 @@ impl History {
         Self { program_id: info.program_id, date: info.date, par, kept: (cache.clone(), file) }
     }
 
-    /// Records words that were written now. A failed write is ignored: it is not an error.
+    /// Records words that were written now. A failed write of the file is ignored and does not count as an error.
     pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
         let at = host_kit::unix_time().as_secs();
         self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
@@ -57,9 +57,9 @@ impl History {
 }
 
 impl Written {
-    /// `2026-11-21 06:10 UTC`.
+    /// Returns the time as `2026-11-21 06:10 UTC`.
     pub fn when(&self) -> String {
-        // Days from 1970-01-01 to 2000-01-01.
+        // Days from 1970-01-01 to 2000-01-01 are subtracted.
         let days = (self.at / 86_400).saturating_sub(10_957);
         let date = u16::try_from(days).ok().and_then(|days| DateForm::Days2000.decode(days));
         let (year, month, day) = date.unwrap_or((2000, 1, 1));

@@ -10,7 +10,7 @@ use crate::files::{BoardSignals, SignalTable};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::{Outcome, Request, Setting};
 
-/// Board, its names, and the meaning of its words.
+/// Board, with its names and the meaning of its words.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Board number.
@@ -26,8 +26,8 @@ pub struct Known {
 }
 
 impl Cache {
-    /// Returns a board with its names. The names come from the cache, or from the running application. A failed
-    /// write to the cache is ignored: the names are read again next time.
+    /// Returns a board with its names. The names come from the cache, or from the running application. A failed write to the cache is
+    /// ignored: the names are then read again next time.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
         let info = driver.seen(board)?.info;
         if let Some(names) = self.kept(driver, &info) {
@@ -36,7 +36,7 @@ impl Cache {
         self.described(driver, table, board)
     }
 
-    /// Like `known` for a board whose application must run: asks the board, because cached names may be of another application.
+    /// Like `known`, for a board whose application must run. Asks the board, because cached names may be of another application.
     pub fn described(
         &self,
         driver: &mut Driver,
@@ -80,7 +80,7 @@ impl Cache {
         if failed.is_empty() { Ok(all) } else { Err(SessionError::NoNames { failed }) }
     }
 
-    /// Returns the cached names of a program, without asking for them.
+    /// Returns the cached names of a program, without asking the board.
     fn kept(&self, driver: &mut Driver, info: &BoardInfo) -> Option<IoDescription> {
         let key = DescriptionKey::of(info);
         if self.fresh || !info.has_application() {
@@ -103,15 +103,15 @@ fn file(key: DescriptionKey) -> String {
 }
 
 impl Known {
-    /// Returns a word of this board in the master's form; by number if the name would mean another signal.
+    /// Returns a word of this board in the master's form, by number if the name would mean another signal.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
-        // A text that means another signal cannot be its name, and numbers may be names.
+        // A text that means another signal cannot identify this one, and numbers may be names.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
         let name = if by_name { word.name.clone() } else { format!("##{}", word.index) };
         Setting { name, value: word.word }
     }
 
-    /// Returns this board with the names that it has sent since.
+    /// Returns this board with the names that it has sent meanwhile.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
@@ -137,7 +137,7 @@ fn with_signals(
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
     let mut signals = BoardSignals::new(&names, program, &profile);
-    // A table was given, so its units are expected: values for a program that is not in it would be sent unscaled.
+    // A table was given, so units are expected: values for a program without an entry would be sent unscaled.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("it knows nothing of {who}"));
         signals = signals.raw_only();

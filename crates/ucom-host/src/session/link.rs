@@ -1,4 +1,4 @@
-//! An open bus, and its frames as the protocol's.
+//! An open bus, and conversion of its frames to and from the protocol's.
 
 use std::time::{Duration, Instant};
 
@@ -10,11 +10,11 @@ use super::error::SessionError;
 use super::pump::Line;
 use crate::files::recording::{FrameKind, RecordedFrame};
 
-/// Longest wait that is kept exactly.
+/// Longest wait that is kept precisely.
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled in such a wait.
 const LOOK: Duration = Duration::from_micros(100);
-/// Most that a sleep exceeds its duration; this last part of a wait is not slept.
+/// Longest delay of a sleep beyond its duration; this last part of a wait is not slept.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// An open bus with its clock.
@@ -35,17 +35,17 @@ impl Link {
         Ok(Self::on(bus, url))
     }
 
-    /// Creates a link on an open bus; `url` is its name for display.
+    /// Creates a link on an open bus; `url` is its display name.
     pub fn on(bus: Box<dyn CanBus + Send>, url: &str) -> Self {
         Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() }
     }
 
-    /// The URL it was opened with.
+    /// Returns the URL of the bus.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// µs since it was opened.
+    /// Returns the time since the bus was opened, µs.
     pub fn now_us(&self) -> u64 {
         self.start.elapsed().as_micros() as u64
     }
@@ -55,12 +55,12 @@ impl Link {
         self.bus.send(frame).map_err(SessionError::Bus)
     }
 
-    /// Returns the next frame, of any protocol; waits at most `timeout`.
+    /// Returns the next frame of any protocol; waits at most `timeout`.
     pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, SessionError> {
         if timeout > COARSE {
             return self.bus.receive(timeout - COARSE).map_err(SessionError::Bus);
         }
-        // Sockets round their timeouts up to the system's tick, up to 10 ms; gaps between frames are shorter.
+        // Sockets round their timeouts up to the system's tick, up to 10 ms. Gaps between frames are shorter.
         let end = Instant::now() + timeout;
         loop {
             if let Some(frame) = self.bus.receive(Duration::ZERO).map_err(SessionError::Bus)? {
@@ -72,7 +72,7 @@ impl Link {
             }
             match left.checked_sub(OVERSLEPT) {
                 Some(left) => std::thread::sleep(left.min(LOOK)),
-                // Not a yield: on a busy machine that gives away some milliseconds.
+                // No yield here: on a busy machine that would lose some milliseconds.
                 None => std::hint::spin_loop(),
             }
         }
@@ -83,7 +83,7 @@ impl Link {
         self.bus.state()
     }
 
-    /// Returns how often the controller of this computer has been bus-off.
+    /// Returns the number of times that the controller of this computer has been bus-off.
     pub fn times_bus_off(&self) -> u64 {
         self.bus.times_bus_off()
     }
@@ -109,20 +109,20 @@ impl Line for Link {
     }
 }
 
-/// A frame of the protocol as one of the bus.
+/// Converts a frame of the protocol to a frame of the bus.
 pub fn to_wire(frame: &Frame) -> Result<CanFrame, SessionError> {
     let id = Id::standard(frame.id().into());
     let made = id.and_then(|id| CanFrame::classic(id, frame.data()));
     made.map_err(SessionError::Frame)
 }
 
-/// A frame of the bus as one of the protocol, or why it is foreign (D-02).
+/// Converts a frame of the bus to the protocol, or returns the reason why it is foreign (D-02).
 pub fn from_wire(frame: &CanFrame) -> Result<Frame, Foreign> {
     let format = Format { extended: frame.is_extended(), remote: frame.is_remote(), fd: frame.is_fd() };
     Frame::received(frame.id().value(), format, frame.data())
 }
 
-/// A frame of the bus for a recording.
+/// Converts a frame of the bus for a recording.
 pub fn recorded(frame: &CanFrame) -> RecordedFrame {
     let kind = if frame.is_remote() {
         FrameKind::Remote { length: frame.len() as u8 }
@@ -146,7 +146,7 @@ pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     }
 }
 
-/// A frame of a recording as one of the protocol, or why it is foreign.
+/// Converts a frame of a recording to the protocol, or returns the reason why it is foreign.
 pub fn protocol_frame(frame: &RecordedFrame) -> Result<Frame, Foreign> {
     let format = Format {
         extended: frame.extended,

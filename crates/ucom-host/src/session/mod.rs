@@ -4,7 +4,7 @@
 //!   the order that keeps times correct.
 //! - [`Driver`]: procedures from start to end, with an [`Operator`] who may stop them and reads notes.
 //! - [`Examination`]: diagnosis of a bus; [`Watch`]: live view of a bus.
-//! - [`CleanupList`]: work left undone if the process ended now.
+//! - [`CleanupList`]: work that would be left undone if the process ended now.
 //! - [`Cache`], [`History`]: knowledge of boards that is kept between sessions.
 //! - [`Known`], [`Word`], [`Prepared`], [`ParameterFile`]: values by name as words of boards, checked before anything is sent.
 //! - [`FlashRecords`]: images that this tool wrote to boards, for [`Driver::update`].

@@ -1,4 +1,4 @@
-//! Values of boards by the names of their signals, as programs read them.
+//! Values of boards by the names of their signals, for programs.
 
 use serde_json::{Map, Value, json};
 
@@ -12,13 +12,13 @@ impl Known {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
 
-    /// The keys of such values, in the order of the buffer.
+    /// Returns the keys of such values, in the order of the buffer.
     pub fn keys(&self, kind: Kind) -> Vec<String> {
         let names = self.names.names(kind);
         keys(names, names.len())
     }
 
-    /// The units of such values, by the same keys, as far as a signal table has them.
+    /// Returns the units of such values, by the same keys, as far as a signal table has them.
     pub fn units(&self, kind: Kind) -> Value {
         let (names, signals) = (self.names.names(kind), self.signals.all(kind));
         let pairs = keys(names, names.len()).into_iter().zip(signals);
@@ -40,7 +40,7 @@ fn keys(names: &[String], count: usize) -> Vec<String> {
     (0..count).map(key).collect()
 }
 
-/// Values by the names of their signals.
+/// Returns values by the names of their signals.
 fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
     let value =
         |i: usize, word: u16| signals.get(i).map_or_else(|| json!(word as i16), |signal| signal.json(word));

@@ -1,4 +1,4 @@
-//! Parameters of boards: written so that it is known whether they arrived, and from parameter files.
+//! Parameters of boards: writes them with proof that they arrived, and reads them from parameter files.
 
 use std::path::Path;
 
@@ -17,10 +17,10 @@ use crate::files::params::{
 use crate::master::io::Kind;
 use crate::master::{AdminChange, Error, Outcome, Request};
 
-/// Board, the words to write to it, and the words written before.
+/// Board, the words to write, and the words written before.
 #[derive(Debug)]
 pub struct Parameters {
-    /// The board with its names.
+    /// Board with its names.
     pub known: Known,
     /// Words to write.
     pub words: Vec<Word>,
@@ -28,7 +28,7 @@ pub struct Parameters {
     pub history: History,
 }
 
-/// Writes all words of all boards; nothing before every board is ready for it.
+/// Writes all words of all boards, and no word before every board is ready.
 pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), SessionError> {
     for board in all.iter().filter(|p| !p.words.is_empty()) {
         become_master(driver, board.known.board, force)?;
@@ -54,7 +54,7 @@ pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result
     Ok(())
 }
 
-/// Listens for another PC before anything is sent (D-08), and reads whether the loop runs.
+/// Listens for another PC before anything is sent (D-08), and returns whether the control loop runs.
 pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, SessionError> {
     let change = AdminChange::default();
     match driver.run(Request::Admin { board, change, force })? {
@@ -63,8 +63,8 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Sends queued frames, then checks that the application still runs and has taken them: inputs and parameters themselves
-/// are not answered (D-35). Frames leave in their order, so the answer to a question comes after all of them.
+/// Sends queued frames, then checks that the application still runs and has taken them. Inputs and parameters themselves are not answered
+/// (D-35). Frames leave in their order, so the answer to a question comes after all of them.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
@@ -82,13 +82,13 @@ pub fn inventory(path: &Path) -> Result<Option<Inventory>, InventoryError> {
     }
 }
 
-/// The name of a board by an inventory.
+/// Returns the name of a board in an inventory.
 pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str> {
     let board = inventory?.boards().find(|b| b.flash_number == flash_number)?;
     Some(board.name.as_str()).filter(|name| !name.is_empty())
 }
 
-/// Parameter file that was read, for the boards on the bus.
+/// Parameter file for the boards on the bus.
 #[derive(Debug)]
 pub struct ParameterFile {
     file: String,
@@ -96,11 +96,11 @@ pub struct ParameterFile {
     inventory: Option<Inventory>,
 }
 
-/// A board's words of a parameter file: first inputs, and parameters.
+/// A board's words in a parameter file: first inputs, and parameters.
 pub type FileWords = (Vec<Word>, Vec<Word>);
 
 impl ParameterFile {
-    /// Reads a file and takes from it the boards that are meant.
+    /// Reads a file, and keeps the selected boards.
     pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, ValuesError> {
         let wrong = |message: String, hint| ValuesError::File { message, hint };
         let file =
@@ -116,19 +116,19 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Keeps only the selected boards, for files read before the boards were known.
+    /// Keeps only the selected boards, for a file that was read before the boards were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));
         self
     }
 
-    /// The boards of the file.
+    /// Returns the boards of the file.
     pub fn numbers(&self) -> Vec<u8> {
         self.boards.iter().map(|b| b.number).collect()
     }
 
-    /// Checks that the boards are those of the file. Sends questions only.
+    /// Checks that the boards are those of the file. Sends only questions.
     pub fn identities(&self, driver: &mut Driver) -> Result<(), SessionError> {
         let mut problems = Vec::new();
         for board in &self.boards {
@@ -147,7 +147,7 @@ impl ParameterFile {
         Ok(self.verdict(problems)?)
     }
 
-    /// The words of all boards, or every mistake.
+    /// Returns the words of all boards, or every mistake.
     pub fn words<'a>(
         &self,
         known: impl Fn(u8) -> Option<&'a Known>,

@@ -1,4 +1,4 @@
-//! With which inputs and parameters a run starts each board.
+//! Inputs and parameters of each board for the start of a run.
 
 use super::cache::Cache;
 use super::driver::Driver;
@@ -11,7 +11,7 @@ use super::values::{Prepared, Word, note_rounded, words};
 use crate::master::io::Kind;
 use crate::master::{RunBoard, Setting};
 
-/// Returns the values for each board: those of the file, then those given in addition.
+/// Returns the values for each board: those of the file, then the additional ones.
 pub fn plans(
     driver: &Driver,
     prepared: &Prepared,
@@ -39,7 +39,7 @@ pub fn plans(
     prepared.known.values().map(plan).collect()
 }
 
-/// The parameters that a run has written, into the history.
+/// Stores the parameters that a run has written in the history.
 pub fn remember(cache: &Cache, prepared: &Prepared, plans: &[RunBoard]) {
     for plan in plans.iter().filter(|plan| !plan.par.is_empty()) {
         let Some(known) = prepared.known.get(&plan.board) else { continue };

@@ -1,4 +1,4 @@
-//! A bus whose owner looks up often: a stop waits for no frame.
+//! A bus with a short receive timeout: its owner often checks for requests, and a stop does not wait for a frame.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use can_link::{CanBus, CanError, CanFrame, ControllerState};
 /// Longest wait for a frame.
 const WAIT: Duration = Duration::from_millis(5);
 
-/// Bus wrapper with a receive timeout of at most 5 ms, so that its owner checks for requests that often.
+/// Bus wrapper with a receive timeout of at most 5 ms. Its owner can therefore check for requests that often.
 pub struct Prompt(pub Box<dyn CanBus + Send>);
 
 impl CanBus for Prompt {

@@ -1,5 +1,5 @@
-//! Moves frames between the bus and the PC side, in the order that keeps its times correct: received frames are handed
-//! over before a timeout can end, and neither direction can block the other.
+//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout
+//! can end, and neither direction can block the other.
 
 use std::time::Duration;
 
@@ -10,34 +10,34 @@ use crate::master::Master;
 
 /// Longest wait, and thus the interval at which Ctrl-C is checked.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Most frames that are handed over, and the longest time that it takes, before due frames are sent: a flooded bus
-/// must not stop heartbeats.
+/// Limits of frames delivered, and of the time for this, before due frames are sent: a flooded bus must not stop heartbeats.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
-/// Most frames that are sent before received frames are handled.
+/// Limit of frames sent before received frames are handled.
 const MOST_SENT: usize = 64;
-/// Age from which frames count as handed over on a bus that floods without end, µs.
+/// Age from which frames count as delivered on a bus that is flooded without end, µs.
 const BEHIND_US: u64 = 1_000_000;
 
 /// A bus with a clock.
 pub trait Line {
-    /// µs from any start.
+    /// Returns the time in µs from any start.
     fn now_us(&self) -> u64;
     /// Puts a frame on the bus.
     fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
-    /// Returns the next frame; waits at most `timeout`, and not at all for zero.
+    /// Returns the next frame. Waits at most `timeout`, and not at all for zero.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
 /// State of the loop.
 #[derive(Debug, Default)]
 pub struct Pump {
-    /// Everything that arrived up to then has been handed over, µs.
+    /// Time up to which everything that arrived has been delivered, µs.
     received_us: u64,
 }
 
 impl Pump {
-    /// Waits for a frame until an action is due, no longer than `patience`; hands over all that has arrived; sends the due frames.
+    /// Waits for a frame until an action is due, no longer than `patience`. Delivers all frames that have arrived, and sends the due
+    /// frames.
     pub fn turn(
         &mut self,
         master: &mut Master,
@@ -73,7 +73,7 @@ impl Pump {
                         break;
                     }
                 }
-                // No frame had arrived at that time.
+                // No further frame had arrived at that time.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -86,7 +86,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Sends due frames; `true`: there may be more.
+    /// Sends due frames; returns `true` if there may be more.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
@@ -105,10 +105,10 @@ mod tests {
 
     use super::*;
 
-    /// A bus in virtual time with board 1, which answers PC_INFO within a millisecond, and a CPU that is lost now and then.
+    /// A bus in virtual time with board 1, which answers PC_INFO within a millisecond, and a process that loses the CPU now and then.
     struct Bench {
         now: u64,
-        /// Frames on their way to the PC, by time.
+        /// Frames in transmission to the PC, by time.
         coming: VecDeque<(u64, Frame)>,
         /// Durations of CPU loss before and after each access to the bus, µs; each entry is used once.
         lost: VecDeque<u64>,
@@ -200,7 +200,8 @@ mod tests {
         z ^ (z >> 27)
     }
 
-    /// The CPU may be lost anywhere, and for longer than the answer takes: a frame that arrived meanwhile is not silence.
+    /// The process may lose the CPU at any place, and for longer than an answer takes. A frame that arrived meanwhile does not count as
+    /// silence.
     #[test]
     fn a_lost_cpu_is_no_silence() {
         let ask = |lost: Vec<u64>| {
@@ -219,11 +220,11 @@ mod tests {
         }
     }
 
-    /// D-50: a bus that brings more frames than can be handed over stops neither heartbeats nor timeouts.
+    /// D-50: a bus with more frames than can be delivered stops neither heartbeats nor timeouts.
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);
-        // Each takes 5 µs here.
+        // Each frame takes 5 µs here.
         bench.flood_us = Some(4);
         let mut master = Master::new(Profile::default());
         master.begin_session(0);

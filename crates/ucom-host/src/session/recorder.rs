@@ -1,4 +1,4 @@
-//! Recording of a bus: frames with their time, and with their names.
+//! Recording of a bus: frames with their times and names.
 
 use std::io::Write;
 use std::path::Path;
@@ -17,10 +17,10 @@ enum Sink {
     Stream(CandumpWriter<Box<dyn Write>>),
 }
 
-/// A recording that is being written; it listens on the way who answers to which number.
+/// A recording in progress. Its master listens to the frames to learn the numbers of the boards.
 pub struct Recorder {
     sink: Sink,
-    /// Frames of other protocols may have no form in it.
+    /// `true` if the format has no form for frames of other protocols.
     only_protocol: bool,
     channel: String,
     decoder: Decoder,
@@ -30,7 +30,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recording as a file, with the profile in it or next to it; `channel` is the bus's name in it.
+    /// Creates a recording as a file, with the profile in it or next to it. `channel` is the name of the bus in the recording.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -45,7 +45,7 @@ impl Recorder {
         Ok(Self { only_protocol, ..Self::new(sink, profile, channel) })
     }
 
-    /// A recording as lines in candump's form.
+    /// Creates a recording as lines in candump's form.
     pub fn stream(out: impl Write + 'static, profile: Profile, channel: &str) -> Self {
         Self::new(Sink::Stream(CandumpWriter::new(Box::new(out))), profile, channel)
     }
@@ -77,24 +77,24 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes all data to the disk: a recorder that is killed afterwards does not lose them.
+    /// Writes all data to the disk, so that a recorder that is killed afterwards does not lose them.
     ///
     /// # Errors
     /// The disk does not accept the data.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match &mut self.sink {
             Sink::File(writer) => writer.flush(),
-            // A stream is written line by line.
+            // A stream is written line by line already.
             Sink::Stream(_) => Ok(()),
         }
     }
 
-    /// Frames that were written.
+    /// Returns the number of written frames.
     pub fn frames(&self) -> u64 {
         self.frames
     }
 
-    /// Frames of other protocols that the form has no place for.
+    /// Returns the number of frames of other protocols that the format cannot hold.
     pub fn left_out(&self) -> u64 {
         self.left_out
     }

@@ -1,4 +1,4 @@
-//! Frames of a recording on a bus again, and which of them change boards.
+//! Replay of a recording on a bus, and the frames in it that change boards.
 
 use std::time::{Duration, Instant};
 
@@ -7,8 +7,8 @@ use super::error::SessionError;
 use super::link::{Link, protocol_frame, replayed};
 use crate::files::recording::{Record, RecordedFrame};
 
-/// Sends frames when they are due, at `speed` times the pace of the recording, until the operator asks for an end; `done` is
-/// called after each. Returns how many were sent.
+/// Sends frames when they are due, at `speed` times the pace of the recording, until the operator requests an end. `done` is called after
+/// each frame. Returns the number of sent frames.
 ///
 /// # Errors
 /// The bus fails.
@@ -46,7 +46,7 @@ pub fn replay(
     Ok(sent)
 }
 
-/// A frame of this protocol that changes boards or keeps them running.
+/// Returns `true` for a frame of this protocol that changes boards or keeps them running.
 pub fn is_intrusive(frame: &RecordedFrame) -> bool {
     let function = protocol_frame(frame).ok().and_then(|f| f.address().ok()).map(|(f, _)| f);
     function.is_some_and(intrusive_function)

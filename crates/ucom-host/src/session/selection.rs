@@ -10,9 +10,9 @@ use crate::files::SignalValue;
 pub enum Boards {
     /// Every board that answers.
     All,
-    /// None at all.
+    /// No board.
     None,
-    /// These, ascending, each once.
+    /// These boards, ascending, each once.
     Some(Vec<u8>),
 }
 
@@ -53,7 +53,7 @@ impl FromStr for Boards {
 /// `NAME=VALUE` or `BOARD.NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
-    /// The board, when it is named.
+    /// The board, if it is named.
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
@@ -79,12 +79,12 @@ impl FromStr for Assignment {
     }
 }
 
-/// Values belong to the one board that is meant, or to all of them.
+/// Returns the values for a board: those that name it, and those that name no board.
 pub fn for_board(values: &[Assignment], board: u8) -> Vec<Assignment> {
     values.iter().filter(|a| a.board.is_none_or(|b| b == board)).cloned().collect()
 }
 
-/// A value for a board that is not meant is a mistake.
+/// Returns an error if a value names a board that is not selected.
 pub fn only(boards: &[u8], values: &[Assignment], to: &'static str) -> Result<(), ValuesError> {
     match values.iter().find(|a| a.board.is_some_and(|b| !boards.contains(&b))) {
         Some(a) => {

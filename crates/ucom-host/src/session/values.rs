@@ -1,4 +1,4 @@
-//! Values as words of the boards: names and ranges are checked before anything is sent.
+//! Conversion of values to words of the boards; names and ranges are checked before anything is sent.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use crate::master::{Error, Outcome, Request, SignalError, StopLevel};
 /// A word for a signal.
 pub type Word = ParamsWord;
 
-/// The words of assignments for a board.
+/// Returns the words of assignments for a board.
 pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, SessionError> {
     let board = known.board;
     let word = |a: &Assignment| {
@@ -42,7 +42,7 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Notes which values lie between two words and go as the nearer one.
+/// Notes values between two words, which are sent as the nearer word.
 pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
@@ -51,7 +51,7 @@ pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     }
 }
 
-/// Runs an action by cached names; if a board turns out to have other names, runs it once more by the names that the board sends.
+/// Runs an action by cached names. If a board has other names, runs the action once more with the names that the board sends.
 pub fn with_names<T>(
     cache: &Cache,
     mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
@@ -64,16 +64,16 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names; applications were started if only they could send the names.
+/// Boards with their names. An application was started only if the board could not send the names otherwise.
 #[derive(Default)]
 pub struct Prepared {
-    /// By number.
+    /// Boards by number.
     pub known: BTreeMap<u8, Known>,
     started: RefCell<Vec<u8>>,
 }
 
 impl Prepared {
-    /// Asks for the names of a board; starts its application only if necessary. This moves no axis.
+    /// Reads the names of a board, and starts its application only if necessary. This moves no axis.
     pub fn add(
         &mut self,
         driver: &mut Driver,
@@ -84,10 +84,10 @@ impl Prepared {
     ) -> Result<(), SessionError> {
         let known = match cache.known(driver, table, board) {
             Err(SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) => {
-                // Before the command leaves: a start that is cancelled may have reached it.
+                // Recorded before the command leaves, because a start that is cancelled may have reached the board.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
-                    // Refused means that nothing was sent; taking that back would speak on another PC's bus.
+                    // Refused means that nothing was sent. A stop would be a command on another PC's bus.
                     if e.kind() == ErrorKind::Refused {
                         self.started.borrow_mut().pop();
                     }
@@ -103,7 +103,8 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops applications that were started only to be asked, once: a refusal leaves the boards as they were. Failures are reported.
+    /// Stops the applications that were started only to read names, so that a refusal leaves the boards as they were. Acts only once.
+    /// Failures are reported.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

@@ -15,18 +15,18 @@ pub type CompetingMaster = (Function, u8);
 
 /// Seconds of bus load that the curve shows.
 pub const HISTORY: usize = 120;
-/// Lines of the log that are kept.
+/// Limit of lines in the log.
 pub const LOG: usize = 200;
 
 /// Content of the view apart from the boards.
 pub struct Watch {
     /// The bus.
     pub url: String,
-    /// Percent, one value a second.
+    /// Bus load in percent, one value per second.
     pub load: VecDeque<f64>,
     /// Events, oldest first: time in s and text.
     pub log: VecDeque<(f64, String)>,
-    /// Last frame of another PC that is master; while it is set, no question is sent.
+    /// Last frame of another PC that is master. While it is set, no question is sent.
     pub competing_master: Option<CompetingMaster>,
     /// `true` if nothing may be sent.
     pub listen_only: bool,
@@ -43,7 +43,7 @@ pub struct Watch {
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
-    /// Watches the bus of this URL; with `listen_only` nothing is ever sent.
+    /// Creates a watch of the bus of this URL. With `listen_only` nothing is ever sent.
     pub fn new(url: String, listen_only: bool, profile: Profile) -> Self {
         Self {
             url,
@@ -63,7 +63,7 @@ impl Watch {
         now_us >= QUIET_US
     }
 
-    /// Lets the bus go on for a moment.
+    /// Runs the bus for a moment.
     pub fn turn(&mut self, driver: &mut Driver) -> Result<(), SessionError> {
         driver.turn(Duration::from_millis(25))?;
         let time_s = driver.now_us() as f64 * 1e-6;
@@ -94,7 +94,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Stops the control loops of all boards; who is master does not matter for that.
+    /// Stops the control loops of all boards. This PC need not be the master for that.
     pub fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
             self.message = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
@@ -104,7 +104,7 @@ impl Watch {
         self.message = "stop sent to all boards; `ucom stop all` also ends their applications".into();
     }
 
-    /// Asks the boards for their identity again, if that is allowed.
+    /// Asks the boards for their identity again, if questions are allowed.
     pub fn ask_again(&mut self) {
         self.ask = !self.listen_only;
         self.message =
@@ -118,20 +118,20 @@ impl Watch {
         }
     }
 
-    /// Asks once, or when the user requests it again. Constant questions would look like a second master to others (D-08),
-    /// and changes are received anyway.
+    /// Asks once, or when the user requests it again. Constant questions would look like a second master to other PCs (D-08), and changes
+    /// are received in any case.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
-            // No other procedure runs that this one could meet.
+            // No other procedure runs, so this one cannot conflict with it.
             let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
     }
 }
 
-/// All that a view shows at a time.
+/// Content of a view at one time.
 pub struct Picture<'a> {
-    /// The boards as last seen.
+    /// Boards as last seen.
     pub boards: &'a Boards,
     /// Traffic on the bus.
     pub statistics: &'a Statistics,
@@ -139,7 +139,7 @@ pub struct Picture<'a> {
     pub shared: &'a [String],
     /// CAN adapter, if it reports its state.
     pub controller: Option<Controller>,
-    /// µs.
+    /// Time, µs.
     pub now: u64,
     /// Content apart from the boards.
     pub watch: &'a Watch,
@@ -152,7 +152,7 @@ pub struct Problems {
     pub causes: Vec<String>,
     /// Problems that do not keep boards from working.
     pub warnings: Vec<String>,
-    /// The next command against the worst; empty when there is nothing to do.
+    /// Next command for the most serious problem; empty if there is nothing to do.
     pub next: String,
 }
 

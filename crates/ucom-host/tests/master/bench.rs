@@ -17,7 +17,7 @@ pub trait Member {
     fn sent(&mut self, now: u64, frame: &Frame);
     fn receive(&mut self, now: u64, frame: &Frame);
     fn deadline(&self) -> u64;
-    /// The board that answers for this member, if any.
+    /// Returns the board that answers for this member, if any.
     fn board(&mut self) -> Option<&mut TestNode> {
         None
     }
@@ -118,7 +118,7 @@ impl Bench {
         Self::new(Profile::default(), vec![Box::new(script)])
     }
 
-    /// A chain of real boards, each with an application.
+    /// Creates a chain of real boards, each with an application.
     pub fn chain(flash_ids: &[u16]) -> Self {
         Self::chain_with(flash_ids, Profile::default())
     }
@@ -279,7 +279,7 @@ impl Bench {
         self.times_of(text).len()
     }
 
-    /// Number of frames from any sender that begin with `start`.
+    /// Returns the number of frames from any sender that begin with `start`.
     pub fn beginning(&self, start: &str) -> usize {
         self.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
     }
@@ -319,7 +319,7 @@ pub fn node(flash: u16, pins: WirePins, profile: Profile) -> TestNode {
     Node::new(config, memory, pins, store, application, 0)
 }
 
-/// The golden image: byte i is (37·i + 11) mod 256.
+/// Returns the golden image: byte i is (37·i + 11) mod 256.
 pub fn image(len: usize) -> Vec<u8> {
     (0..len).map(|i| (37 * i + 11) as u8).collect()
 }

@@ -36,8 +36,8 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: this PC is master and another PC sends heartbeats for a board that is not started. The master reports them, and does not
-/// expect more of them. It does not take a board that it has started itself for a PC.
+/// D-08, D-51: this PC is master and another PC sends heartbeats for a board that is not started. The master reports these and does not
+/// expect more of them. The heartbeats of a board that this PC has started are not taken for those of another PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);

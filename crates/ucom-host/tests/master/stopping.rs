@@ -16,7 +16,7 @@ fn run(boards: &[u8]) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
 }
 
-/// From now on board 1 reports error 7 (CAN_RECEIVE) again and again, as on a bad bus.
+/// Lets board 1 report error 7 (CAN_RECEIVE) again and again from now on, as on a bad bus.
 fn bad_bus(bench: &mut Bench) {
     let from = bench.now / MS;
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
@@ -85,7 +85,7 @@ fn a_silent_board_gets_the_stop_more_than_once() {
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
     for request in [run(&[1]), Request::Start { board: 1, force: true }] {
-        // The board shows the start one second after the command. It stops when it receives a stop after that.
+        // The board shows the start one second after the command, and stops when it receives a stop after that.
         let (idle, started) = (info("1B"), info("8B"));
         let idle: Vec<&str> = idle.iter().map(String::as_str).collect();
         let started: Vec<&str> = started.iter().map(String::as_str).collect();

@@ -59,7 +59,7 @@ pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) 
     }
 }
 
-/// The board shows the program: it was written, or it was there before and no flash record proves more.
+/// Returns `true` if the board shows the program: it was written, or it was there before and no flash record proves more.
 fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }

@@ -265,7 +265,7 @@ fn u4_repair_that_finds_another_board_is_refused() {
     assert!(place("1C1#0200") < place("281#"));
 }
 
-/// D-08: a dry run also looks for another PC, because it shows what an update would do. It still sends only questions.
+/// D-08: a dry run also looks for another PC, because it shows what an update would do. The dry run still sends only questions.
 #[test]
 fn d08_a_dry_run_looks_for_another_pc() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -318,8 +318,8 @@ fn a_board_that_is_up_to_date_does_not_stay_in_programming_mode() {
     assert_ne!(report.exit(), 0);
 }
 
-/// P-12: cancelled at any time while such boards are read and taken out of programming mode. A board that stays in that mode and is
-/// reported as up to date is named. The same holds when the bus fails.
+/// P-12: cancelled at any time while such boards are read and taken out of programming mode. The report names each board that stays in
+/// that mode and counts as up to date. This also holds when the bus fails.
 #[test]
 fn a_cancel_leaves_no_board_in_programming_mode_unnamed() {
     let left = || {

@@ -22,7 +22,7 @@ fn written() -> (Bench, UpdateOptions) {
     (bench, recorded(options, &report))
 }
 
-/// The outcome of each board, whether it is verified, the exit code, and whether program data were sent.
+/// Returns the outcome of each board and whether it is verified, the exit code, and whether program data were sent.
 fn again(bench: &mut Bench, options: UpdateOptions) -> (Vec<(&'static str, bool)>, u8, bool) {
     let before = data_frames(bench);
     let report = update(bench, options);

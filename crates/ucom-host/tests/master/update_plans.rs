@@ -78,7 +78,7 @@ fn d40_two_images_reach_two_memories() {
     }
 }
 
-/// A raw update of a board that shows `after` and `done_status` afterwards.
+/// Runs a raw update of a board that shows `after` and `done_status` afterwards.
 fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> UpdateReport {
     let board = Loader { info: ["34126E38", after], done_status, ..Loader::new(32) };
     let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);

@@ -149,7 +149,7 @@ pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     text
 }
 
-/// The fields of a function whose layout is the same for all boards.
+/// Returns the fields of a function whose layout is equal for all boards.
 fn fields(function: Function) -> Vec<DbcSignal> {
     let status = |byte| {
         let bits = Status::NAMES.iter().enumerate();

@@ -22,8 +22,8 @@ use segments::Segments;
 /// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once. It may also
-/// follow each entry of a table of interrupt vectors, whose records are short.
+/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once. Such holes
+/// may also follow each entry of a table of interrupt vectors, whose records are short.
 const EVIDENCE: usize = 3;
 /// Minimum average length of these records, bytes; linkers write 16 and more.
 const EVIDENCE_BYTES: usize = 12;
@@ -52,7 +52,7 @@ impl fmt::Display for Format {
 impl FromStr for Format {
     type Err = ImageError;
 
-    /// `bin`, `hex` or `srec`.
+    /// Reads `bin`, `hex` or `srec`.
     fn from_str(text: &str) -> Result<Self, ImageError> {
         match text {
             "bin" => Ok(Self::Bin),
@@ -279,12 +279,12 @@ impl Image {
         self.bytes
     }
 
-    /// Load address, words.
+    /// Returns the load address, words.
     pub fn address_words(&self) -> u32 {
         self.address_words
     }
 
-    /// Length, words.
+    /// Returns the length, words.
     pub fn length_words(&self) -> u32 {
         (self.bytes.len() / 2) as u32
     }

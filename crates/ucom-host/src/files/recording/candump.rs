@@ -19,7 +19,7 @@ impl<R: BufRead> CandumpReader<R> {
         Self { lines: Lines::new(input), profile: None }
     }
 
-    /// The profile from the comment lines read so far.
+    /// Returns the profile from the comment lines read so far.
     pub fn into_profile(self) -> Option<String> {
         self.profile
     }

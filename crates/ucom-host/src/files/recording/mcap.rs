@@ -160,7 +160,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Reads a whole file. Of a killed writer's file it reads all whole records.
+/// Reads a whole file, or all whole records of a killed writer's file.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();

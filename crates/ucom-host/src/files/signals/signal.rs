@@ -70,7 +70,7 @@ impl Signal {
         self.kind == SignalType::Int16
     }
 
-    /// Range of the word as a number.
+    /// Returns the range of the word as a number.
     fn words(&self) -> (i32, i32) {
         match self.kind {
             SignalType::Int16 => (-32768, 32767),
@@ -125,7 +125,7 @@ impl Signal {
         }
     }
 
-    /// Smallest and largest value that may be written, in units.
+    /// Returns the smallest and the largest value that may be written, in units.
     pub fn range(&self) -> (f64, f64) {
         let (low, high) = self.words();
         let (a, b) = (self.scaled(low), self.scaled(high));

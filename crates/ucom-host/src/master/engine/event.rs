@@ -23,8 +23,8 @@ pub enum Event {
         /// Progress.
         progress: Progress,
     },
-    /// An update is about to reset this board for programming, so its flash record no longer holds (D-62). Nothing is erased before the
-    /// board has answered the reset.
+    /// An update is about to reset this board for programming, so its flash record no longer holds (D-62). The board's memory is not
+    /// erased before the board has answered the reset.
     FlashBegins {
         /// Procedure.
         id: ProcedureId,

@@ -113,17 +113,17 @@ pub(crate) enum Open {
     Wait(u64),
     /// No board has answered.
     Ask,
-    /// One flash number answered twice: check once more.
+    /// A flash number answered twice: check once more.
     AskAgain,
 }
 
 impl Holders {
-    /// PC_INFO went to a number.
+    /// Records that PC_INFO was sent to a number.
     fn asked(&mut self, number: Sequence, now: u64) {
         self.numbers.entry(number.number()).or_default().ask(now);
     }
 
-    /// A frame of DSP_INFO came; the flash numbers of those that share the number, when that is news.
+    /// Takes a frame of DSP_INFO. Returns the flash numbers of the boards that share the number, when this is detected.
     pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
         let holder = self.numbers.entry(number).or_default();
         holder.answer(number, payload, profile);
@@ -175,12 +175,12 @@ impl Holders {
         self.numbers.remove(&number);
     }
 
-    /// All numbers are void.
+    /// Forgets all boards, because all numbers are void.
     fn clear(&mut self) {
         self.numbers.clear();
     }
 
-    /// The lowest of these numbers (by bit) that boards share.
+    /// Returns the lowest of these numbers (by bit) that boards share.
     pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
@@ -188,7 +188,7 @@ impl Holders {
         Some(IdentityError::NumberShared { board: *board, found: holder.shared.clone(), given_back: false })
     }
 
-    /// All numbers that boards share.
+    /// Returns all numbers that boards share.
     pub(crate) fn all_shared(&self) -> Vec<IdentityError> {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
@@ -199,7 +199,8 @@ impl Holders {
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// `received`: up to then everything was handed over. `oldest`: how old an answer may be, µs.
+    /// Returns the step that remains for a number. `received` is the time up to which all frames were delivered, `oldest` the largest
+    /// accepted age of an answer, µs.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {

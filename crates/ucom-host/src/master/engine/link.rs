@@ -141,7 +141,7 @@ impl Link {
         });
     }
 
-    /// Waits; frames received during the wait stay in the mailbox.
+    /// Sleeps for a time; frames received meanwhile stay in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }

@@ -17,7 +17,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// `CI`, `SO` or `PAR`.
+    /// Returns `CI`, `SO` or `PAR`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ci => "CI",

@@ -279,7 +279,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors of a bad bus are only logged. They are reported if all attempts fail.
+                // Errors of a bad bus are only logged, and reported if all attempts fail.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }

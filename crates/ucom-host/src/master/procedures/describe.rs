@@ -136,7 +136,8 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
 
 /// Returns the description of a board whose application runs, as the board has sent it since that start.
 ///
-/// A description that is only stored under Program ID and date (D-36) may be of another application. Nothing is written by its names.
+/// A description that is only stored under Program ID and date (D-36) may be of another application. Its names are not used to write
+/// values.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {

@@ -50,8 +50,9 @@ impl Link {
         }
     }
 
-    /// A heartbeat under the number of a board may come from the board, or from another PC for that board alone. The board's status
-    /// decides: a board that is not started sends no heartbeats. Without an answer the heartbeat counts as the board's.
+    /// Reports heartbeats of another PC. A heartbeat under the number of a board may come from the board, or from another PC for that
+    /// board alone. The board's status decides: a board that is not started sends no heartbeats. Without an answer the heartbeat counts
+    /// as the board's.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

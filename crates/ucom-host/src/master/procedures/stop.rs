@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// A board that was commanded to start and does not show it yet may start at any time until `start.timeout` has passed. The procedure
-/// commands it to stop in any state, and reads it again after that time.
+/// Stops a board that was commanded to start and does not show it yet. Such a board may start at any time until `start.timeout` has
+/// passed. The procedure commands it to stop in any state, and reads it again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;

@@ -8,17 +8,17 @@ use std::collections::BTreeMap;
 /// Permissions and selection of the tests.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConformanceOptions {
-    /// The boards; empty: all that answer.
+    /// The boards; empty: all boards that answer.
     pub boards: Vec<u8>,
     /// Permission to reset and renumber the chain, and to set and clear status bits.
     pub init: bool,
-    /// Start applications and control loops, outputs safe.
+    /// Permission to start applications and control loops, with safe outputs.
     pub run: bool,
-    /// Program one board.
+    /// Program for one board, which permits programming that board.
     pub program: Option<ConformanceProgram>,
     /// Only the tests with these names; empty: all.
     pub only: Vec<String>,
-    /// Also when another PC is on the bus.
+    /// Permission to run the tests although another PC is on the bus.
     pub force: bool,
 }
 
@@ -34,7 +34,7 @@ impl ConformanceOptions {
 pub struct ConformanceProgram {
     /// Board number.
     pub board: u8,
-    /// The flash number that it must have; the header of the image names it, so that no other board takes it.
+    /// The flash number that the board must have. The header of the image names it, so that no other board takes the image.
     pub flash_number: u16,
     /// The program.
     pub image: UpdateImage,
@@ -48,16 +48,16 @@ pub struct ConformanceProgram {
 pub enum Verdict {
     /// The board behaves as expected.
     Pass,
-    /// Failed; the actual result.
+    /// The test failed; the actual result.
     Fail(String),
-    /// Not done; why.
+    /// The test was skipped; the reason.
     Skipped(String),
 }
 
 /// Test of one board, or of the chain.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceTest {
-    /// Name, as `D-T10`.
+    /// Name, such as `D-T10`.
     pub id: &'static str,
     /// Board; `None`: the whole chain.
     pub board: Option<u8>,
@@ -66,11 +66,11 @@ pub struct ConformanceTest {
     /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// The option that would have allowed it; `None`: it was allowed.
+    /// Option that would have allowed the test; `None`: the test was allowed.
     pub needs: Option<&'static str>,
-    /// Frames that were sent, in candump's form.
+    /// Sent frames, in candump's form.
     pub sent: Vec<String>,
-    /// Frames that came, at most 64 of them.
+    /// Received frames, at most 64 of them.
     pub came: Vec<String>,
 }
 
@@ -81,10 +81,10 @@ impl ConformanceTest {
     }
 }
 
-/// All tests.
+/// Results of all tests.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ConformanceReport {
-    /// In the order in which they were done.
+    /// Tests in the order of execution.
     pub tests: Vec<ConformanceTest>,
     /// Differences from the state before, and the remedy.
     pub left: Vec<String>,
@@ -94,23 +94,23 @@ pub struct ConformanceReport {
 }
 
 impl ConformanceReport {
-    /// Tests that failed.
+    /// Returns the number of failed tests.
     pub fn failed(&self) -> usize {
         self.tests.iter().filter(|t| matches!(t.verdict, Verdict::Fail(_))).count()
     }
 
-    /// Tests that were passed.
+    /// Returns the number of passed tests.
     pub fn passed(&self) -> usize {
         self.tests.iter().filter(|t| t.verdict == Verdict::Pass).count()
     }
 
-    /// Tests that were not done.
+    /// Returns the number of skipped tests.
     pub fn skipped(&self) -> usize {
         self.tests.len() - self.passed() - self.failed()
     }
 
-    /// Names of the tests that were not allowed, by the option that would have allowed them; each once, however many boards there
-    /// are.
+    /// Returns the names of the tests that were not allowed, by the option that would have allowed them. Each name appears once, for any
+    /// number of boards.
     pub fn not_allowed(&self) -> BTreeMap<&'static str, Vec<&'static str>> {
         let mut by_option: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for (option, test) in self.tests.iter().filter_map(|test| Some((test.needs?, test))) {
@@ -122,7 +122,7 @@ impl ConformanceReport {
         by_option
     }
 
-    /// Returns the kind of failure: of the error that ended the tests; `Device` if a test failed, or a board is not in its
+    /// Returns the kind of failure: that of the error that ended the tests, or `Device` if a test failed or a board is not in its
     /// previous state. `None`: every test passed.
     pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {

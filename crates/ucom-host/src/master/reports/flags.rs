@@ -1,7 +1,7 @@
-//! Changes to the flags of a board, and how far it is stopped.
+//! Changes to the flags of a board, and levels of a stop.
 use ucom::Admin;
 
-/// Changes to the flags of a board; `None` leaves one as it is (D-37).
+/// Changes to the flags of a board; `None` leaves a flag unchanged (D-37).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AdminChange {
     /// The control loop runs.
@@ -15,7 +15,7 @@ pub struct AdminChange {
 }
 
 impl AdminChange {
-    /// The flags after the change.
+    /// Returns the flags after the change.
     pub fn apply(&self, old: Admin) -> Admin {
         let run = self.run.unwrap_or(old.run);
         Admin {
@@ -37,10 +37,10 @@ impl AdminChange {
 /// Level of a stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopLevel {
-    /// Outputs off, the control loop runs on.
+    /// The outputs are switched off, and the control loop goes on.
     Outputs,
-    /// The control loop ends, the application stays.
+    /// The control loop ends, and the application stays started.
     Loop,
-    /// Back to the exloader.
+    /// The board returns to its exloader.
     Application,
 }

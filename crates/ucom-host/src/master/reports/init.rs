@@ -9,9 +9,9 @@ use ucom::profile::Endian;
 /// Options for numbering a chain.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitOptions {
-    /// Flash numbers by position, from an inventory: another order is a finding.
+    /// Flash numbers by position, from an inventory. A difference is a finding.
     pub expected: Vec<(u8, u16)>,
-    /// Also when another PC is on the bus.
+    /// Permission to number the chain although another PC is on the bus.
     pub force: bool,
 }
 
@@ -22,17 +22,17 @@ pub struct InitReport {
     pub reports: Reports,
     /// Boards in the order of the chain.
     pub boards: Vec<BoardSeen>,
-    /// Problems; empty: ok.
+    /// Problems; empty if there are none.
     pub findings: Vec<InitFinding>,
 }
 
 impl InitReport {
-    /// Returns `true` if every board on the bus has a number, and there is no finding.
+    /// Returns `true` if every board on the bus has a number and the report has no finding.
     pub fn is_ok(&self) -> bool {
         self.findings.is_empty()
     }
 
-    /// Returns the kind of failure; `None`: ok.
+    /// Returns the kind of failure; `None` if the init succeeded.
     pub fn failure(&self) -> Option<ErrorKind> {
         match self.findings.as_slice() {
             [] => None,
@@ -42,7 +42,7 @@ impl InitReport {
     }
 }
 
-/// A named outcome of an init other than ok.
+/// Problem found by an init.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InitFinding {
@@ -59,16 +59,16 @@ pub enum InitFinding {
     NotReached {
         /// Position of the last board that was reached.
         after: u8,
-        /// Low bytes of the flash numbers that reported and were not reached.
+        /// Low bytes of the flash numbers of boards that reported and were not reached.
         ids: Vec<u8>,
     },
-    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    /// The flash numbers fit the reports only after a swap of their bytes (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
-        /// The order that the profile has.
+        /// Byte order of the profile.
         endian: Endian,
     },
-    /// More boards than reports: boards share the low byte of their flash number.
+    /// There are more boards than reports, so boards share the low byte of their flash number.
     #[error(
         "more boards than reports: {}, {}; flash ids must be unique in their low byte",
         counted(*boards as usize, "board"),
@@ -80,13 +80,13 @@ pub enum InitFinding {
         /// Different reports.
         reports: u32,
     },
-    /// A board that did not report.
+    /// A board did not report.
     #[error("board {board} took a number but did not report")]
     NotReported {
         /// Board number.
         board: u8,
     },
-    /// A board that ran on: it did not receive the reset.
+    /// A board did not receive the reset and continued to run.
     #[error("board {board} did not receive PC_RESET and ran on: {}", if *stopped { "it was stopped" } else { "it may still run" })]
     NotReset {
         /// Board number.
@@ -94,26 +94,26 @@ pub enum InitFinding {
         /// `true` if the board has since confirmed that its application is stopped.
         stopped: bool,
     },
-    /// Two boards with one flash number.
+    /// Two boards have one flash number.
     #[error("duplicate flash number 0x{flash_number:04X}: boards {first} and {second}")]
     DuplicateFlash {
         /// The number.
         flash_number: u16,
         /// First board.
         first: u8,
-        /// The other.
+        /// The other board.
         second: u8,
     },
-    /// Another board than the inventory has at a position.
+    /// The board at a position differs from the inventory.
     #[error(
         "unexpected board order: position {board} has flash number 0x{found:04X}, the inventory has 0x{expected:04X}"
     )]
     UnexpectedOrder {
         /// The position.
         board: u8,
-        /// By the inventory.
+        /// Flash number in the inventory.
         expected: u16,
-        /// On the wire.
+        /// Flash number of the board.
         found: u16,
     },
     /// The inventory has a board after the end of the chain.
@@ -124,7 +124,7 @@ pub enum InitFinding {
         /// Flash number of the board.
         expected: u16,
     },
-    /// A board that was refused: the chain is numbered up to the one before it.
+    /// A board was refused, so only the boards before it have numbers.
     #[error("position {board}: {error}")]
     Refused {
         /// Position.
@@ -132,12 +132,12 @@ pub enum InitFinding {
         /// Reason.
         error: Error,
     },
-    /// Two flash ids that share an identifier.
+    /// Two flash ids share an identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
-        /// The lower one.
+        /// The lower id.
         low: u8,
-        /// The higher one.
+        /// The higher id.
         high: u8,
     },
 }

@@ -9,13 +9,13 @@ use crate::master::reports::init::InitReport;
 /// Permissions of a probe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// Permission to reset and renumber the chain: shows if boards raise their pin by themselves.
+    /// Permission to reset and renumber the chain; shows whether boards raise their pin by themselves.
     pub init: bool,
-    /// Start a control loop, outputs inactive: shows which heartbeats count.
+    /// Permission to start a control loop with inactive outputs; shows which heartbeats count.
     pub alive: bool,
-    /// An image that some board has, as sent: shows how the Program ID is computed.
+    /// An image that some board has, as sent; shows how the Program ID is computed.
     pub image: Option<Arc<[u8]>>,
-    /// Also when another PC is on the bus; `init` and `alive` also when control loops run, which end by that.
+    /// Permission to probe although another PC is on the bus; with `init` and `alive` also although control loops run, which this ends.
     pub force: bool,
 }
 
@@ -32,7 +32,7 @@ pub struct ProbeRow {
     pub observed: String,
     /// The value in the profile.
     pub decision: String,
-    /// The observation decides; else the value is the one from before.
+    /// `true` if the observation decided; otherwise the previous value stays.
     pub measured: bool,
 }
 
@@ -47,7 +47,7 @@ pub struct ProbeReport {
     pub boards: Vec<u8>,
     /// Different UCoM ids in reports: boards with and without a number.
     pub reports: usize,
-    /// New numbers, if the probe assigned some.
+    /// New numbers, if the probe assigned any.
     pub init: Option<InitReport>,
 }
 

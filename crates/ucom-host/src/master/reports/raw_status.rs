@@ -6,16 +6,16 @@ use ucom::{BoardInfo, Status};
 pub struct RawStatus {
     /// Board number.
     pub board: u8,
-    /// The status before.
+    /// Status before the command.
     pub before: BoardInfo,
-    /// Status by the formula and the rules.
+    /// Status that the formula and the rules require.
     pub expected: Status,
-    /// The status afterwards; `None`: the board does not answer under its number any more.
+    /// Status after the command; `None`: the board does not answer under its number any more.
     pub after: Option<BoardInfo>,
 }
 
 impl RawStatus {
-    /// Returns `true` if the board did as the rules require: without INIT it has forgotten its number, and is silent.
+    /// Returns `true` if the board did as the rules require. Without INIT it has forgotten its number and is silent.
     pub fn as_expected(&self) -> bool {
         match self.after {
             Some(after) => after.status == self.expected,
@@ -30,12 +30,12 @@ pub fn expected_status(before: &BoardInfo, mask: u8, value: u8) -> Status {
     let new = old.set(mask, value);
     let kept = new & Status::ASTART;
     if !new.has(Status::INIT) || !old.has(Status::INIT) {
-        // The board loses its number, and with it application, PROG and pin.
+        // The board loses its number, and with the number its application, PROG and pin.
         return kept | Status::EXLRUN | (old & Status::IPINIT);
     }
     let started = new.has(Status::MSTART) && (old.has(Status::MSTART) || before.has_application());
     let just_started = started && !old.has(Status::MSTART);
-    // PROG is ignored while an application runs, and a start clears it.
+    // An application that runs makes the board ignore PROG, and a start clears it.
     let prog = new.has(Status::PROG) && !started && !just_started;
     let pins = (new & Status::OPINIT) | (old & Status::IPINIT);
     let running = old.has(Status::MCARUN) && started;
@@ -52,7 +52,7 @@ mod tests {
     use ucom::{Frame, Profile, Sequence, ToBoard};
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-    /// A board with its number, its application up or not.
+    /// Creates a board with its number and with or without a running application.
     fn board(application: bool, started: bool, history: &[(u8, u8)]) -> (Board, u64) {
         let mut flash = MemoryFlash::default();
         if application {
@@ -91,7 +91,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// D-22: the expected status is the status of a simulated board, for any two bytes.
+        /// D-22: for any two bytes the expected status is the status of a simulated board.
         #[test]
         fn d22_what_is_expected_is_what_a_board_does(mask: u8, value: u8, application: bool, started: bool, history in prop::collection::vec((any::<u8>(), any::<u8>()), 0..3)) {
             let history: Vec<(u8, u8)> = history.into_iter().map(|(m, v)| (m & !0x08, v & !0x40)).collect();

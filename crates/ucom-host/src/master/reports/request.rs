@@ -11,11 +11,11 @@ use crate::master::reports::seen::BoardSeen;
 use crate::master::reports::update::{UpdateOptions, UpdateReport};
 use ucom::{Admin, BoardInfo, Status};
 
-/// Names a procedure while it runs.
+/// Identifies a procedure while it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ProcedureId(pub(crate) u64);
 
-/// A procedure to start. `force`: also when another PC is on the bus, or another check refuses.
+/// Request to start a procedure. `force`: the procedure runs although another PC is on the bus or another check refuses.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
@@ -27,7 +27,7 @@ pub enum Request {
     Repair {
         /// Board number.
         board: u8,
-        /// The flash number that must stand there.
+        /// The flash number that the board at this position must have.
         flash_number: u16,
         /// See above.
         force: bool,
@@ -50,7 +50,7 @@ pub enum Request {
     },
     /// Sends one PC_SETSTATUS exactly by the formula, value bits outside the mask included; never repeated.
     RawStatus {
-        /// The board it goes to; `None`: all at once.
+        /// The board to send it to; `None`: all boards at once.
         board: Option<u8>,
         /// Boards to read before and after.
         seen: Vec<u8>,
@@ -58,7 +58,7 @@ pub enum Request {
         mask: u8,
         /// Second byte.
         value: u8,
-        /// See above; also when control loops run.
+        /// See above; with `force` also although control loops run.
         force: bool,
     },
     /// PC_RESET.
@@ -82,7 +82,7 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// The start order in reverse.
+    /// Stops a board in the reverse order of the start.
     Stop {
         /// The board.
         board: u8,
@@ -100,13 +100,13 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// Firmware.
+    /// Updates the firmware of boards.
     Update(UpdateOptions),
     /// Descriptions of inputs, outputs and parameters; changes nothing.
     Describe {
         /// The board.
         board: u8,
-        /// Read it again although it is known.
+        /// `true` to read it again although it is known.
         fresh: bool,
     },
     /// MCA_DUMP_CI; changes nothing.
@@ -145,8 +145,8 @@ impl Request {
         }
     }
 
-    /// Returns `true` if two boards with one number do not end the request: a stop stops both, and must not wait;
-    /// the others find them themselves and report more.
+    /// Returns `true` if two boards with one number do not end the request. A stop stops both boards and must not wait. The other
+    /// requests detect such boards themselves and report more.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
@@ -155,13 +155,13 @@ impl Request {
         }
     }
 
-    /// The boards that it works with, by bit: one procedure at a time works with a board.
+    /// Returns the boards that the request works with, by bit. Only one procedure at a time works with a board.
     pub(crate) fn claims(&self) -> u32 {
         let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
         match self {
             Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
             Self::RawStatus { .. } | Self::Conformance(_) => u32::MAX,
-            // The broadcast of a group reaches all, and one board's program data must not meet another's start.
+            // The broadcast of a group reaches all boards, and program data must not coincide with the start of another board.
             Self::Update(_) => u32::MAX,
             Self::Repair { board, .. }
             | Self::Info { board }

@@ -16,7 +16,7 @@ pub struct Setting {
 pub struct RunBoard {
     /// Board number.
     pub board: u8,
-    /// Inputs that differ from the board's initial ones.
+    /// Inputs that differ from the board's initial inputs.
     pub ci: Vec<Setting>,
     /// Parameters.
     pub par: Vec<Setting>,
@@ -27,9 +27,9 @@ pub struct RunBoard {
 pub struct RunOptions {
     /// The boards.
     pub boards: Vec<RunBoard>,
-    /// Enable the outputs at the end.
+    /// `true` to enable the outputs at the end.
     pub active: bool,
-    /// Also if the bus load would be too high or another PC is on the bus.
+    /// Permission to run although the bus load would be too high or another PC is on the bus.
     pub force: bool,
 }
 

@@ -13,7 +13,7 @@ pub struct Reports {
     pub ids: BTreeSet<u8>,
     /// Number of frames from each board.
     pub frames: BTreeMap<u8, u32>,
-    /// Those whose identifier has another id than the data, under `report.mode = flash7`.
+    /// Boards whose reports have different ids in identifier and data, with `report.mode = flash7`.
     pub disagree: BTreeSet<u8>,
 }
 
@@ -26,7 +26,7 @@ impl Reports {
         }
     }
 
-    /// Flash ids that differ only in bit 7: they share an identifier (D-07).
+    /// Returns flash ids that differ only in bit 7: they share an identifier (D-07).
     pub fn ambiguous(&self) -> Vec<(u8, u8)> {
         self.ids
             .iter()
@@ -47,10 +47,10 @@ pub struct ScanReport {
     pub findings: Vec<ScanFinding>,
 }
 
-/// Something about the chain that its user should know.
+/// A property of the chain that its user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScanFinding {
-    /// Boards without a number.
+    /// A board without a number.
     #[error("board with UCoM id 0x{ucom_id:02X} has no number: `ucom init`")]
     Unnumbered {
         /// Low byte of its flash number.
@@ -62,37 +62,37 @@ pub enum ScanFinding {
         /// Board number.
         board: u8,
     },
-    /// Two numbers, one flash number.
+    /// Two boards with numbers have the same flash number.
     #[error("boards {first} and {second} have the same flash number 0x{flash_number:04X}")]
     SameFlash {
         /// First board.
         first: u8,
-        /// The other.
+        /// The other board.
         second: u8,
         /// The number.
         flash_number: u16,
     },
-    /// Two flash ids that share an identifier.
+    /// Two flash ids share an identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
-        /// The lower one.
+        /// The lower id.
         low: u8,
-        /// The higher one.
+        /// The higher id.
         high: u8,
     },
     /// Identifier and data of a report disagree.
     #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may show why")]
     Disagrees {
-        /// By the data.
+        /// UCoM id in the data.
         ucom_id: u8,
     },
-    /// The flash numbers fit the reports only with their bytes exchanged (D-10).
+    /// The flash numbers fit the reports only after a swap of their bytes (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
-        /// The order that the profile has.
+        /// Byte order of the profile.
         endian: Endian,
     },
-    /// Answers that contradict each other.
+    /// The answers of a board contradict each other.
     #[error("the answers of board {board} contradict each other: two boards may have this number")]
     Contradicts {
         /// Board number.
@@ -103,12 +103,12 @@ pub enum ScanFinding {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash number of one.
+        /// Flash number of one board.
         first: u16,
-        /// Flash number of another; the same when they cannot be distinguished.
+        /// Flash number of another board; the same number if the boards cannot be distinguished.
         second: u16,
     },
-    /// A status that cannot be.
+    /// The status of a board is not possible.
     #[error("board {board}: {problem}")]
     Status {
         /// Board number.
@@ -116,7 +116,7 @@ pub enum ScanFinding {
         /// Reason.
         problem: &'static str,
     },
-    /// The description never came whole.
+    /// The description was never complete.
     #[error("the description of board {board} never came whole")]
     NoDescription {
         /// Board number.
@@ -129,7 +129,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error of other commands that refuse to work with such a chain.
+    /// Returns the error of other commands, which refuse to work with such a chain.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

@@ -1,13 +1,13 @@
-//! A board as it was seen.
+//! A board as seen on the bus.
 use ucom::BoardInfo;
 
-/// A board as it answered PC_INFO.
+/// Answer of a board to PC_INFO.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BoardSeen {
     /// Board number.
     pub number: u8,
     /// The numbers.
     pub info: BoardInfo,
-    /// Description; `None`: it never came whole.
+    /// Description; `None` if it was never complete.
     pub description: Option<String>,
 }

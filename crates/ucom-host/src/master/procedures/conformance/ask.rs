@@ -14,7 +14,7 @@ pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     all
 }
 
-/// Returns the frames with which the boards must report (D-07).
+/// Returns the report frames that the boards must send (D-07).
 pub(super) fn expected_reports(bench: &Bench<'_>) -> Option<Vec<Frame>> {
     if bench.profile().report_mode != ReportMode::Flash7 {
         return None;

@@ -133,7 +133,7 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// The numbers must be new, because the reset in this test gives `first.number` to the first board on the wire.
+/// Tests the autostart. The numbers must be new, because the reset in this test gives `first.number` to the first board on the wire.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("there is no such board".into()));

@@ -7,7 +7,7 @@ use ucom::{ErrorCode, Status};
 /// Reasons why a board was not updated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UpdateFailure {
-    /// A check refused it; nothing was erased.
+    /// A check refused the update; nothing was erased.
     #[error("{0}")]
     Refused(Box<Error>),
     /// No answer before anything was erased.
@@ -21,13 +21,13 @@ pub enum UpdateFailure {
     Device {
         /// The code.
         code: ErrorCode,
-        /// 1 or 2.
+        /// Cycle, 1 or 2.
         cycle: u32,
-        /// From 0, the header's block.
+        /// Block, from 0, the header's block.
         block: usize,
         /// Number of attempts.
         attempts: u32,
-        /// Something was erased.
+        /// `true` if something was erased.
         erased: bool,
     },
     /// The board did not take a block in time.
@@ -35,15 +35,15 @@ pub enum UpdateFailure {
         "no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts"
     )]
     Timeout {
-        /// 1 or 2.
+        /// Cycle, 1 or 2.
         cycle: u32,
-        /// From 0, the header's block.
+        /// Block, from 0, the header's block.
         block: usize,
         /// Time waited, ms.
         waited_ms: u64,
         /// Number of attempts.
         attempts: u32,
-        /// Something was erased.
+        /// `true` if something was erased.
         erased: bool,
     },
     /// DSP_PROGFINISHED came, or should have, and the board shows another program.
@@ -52,9 +52,9 @@ pub enum UpdateFailure {
         wanted_date.map_or_else(String::new, |date| format!(", 0x{date:04X}"))
     )]
     NotVerified {
-        /// On the board.
+        /// Program ID that the board shows.
         program_id: u16,
-        /// On the board.
+        /// Flash date that the board shows.
         date: u16,
         /// Program ID of the image.
         wanted_id: u16,
@@ -66,9 +66,9 @@ pub enum UpdateFailure {
         "the board reports that it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
     )]
     NotValid {
-        /// On the board.
+        /// Program ID that the board shows.
         program_id: u16,
-        /// On the board.
+        /// Flash date that the board shows.
         date: u16,
         /// Status of the board.
         status: Status,
@@ -76,16 +76,16 @@ pub enum UpdateFailure {
     /// The board shows the program, but the application did not start.
     #[error("the board shows the program, but: {0}")]
     NotRunning(Box<Error>),
-    /// The board showed the program already, but programming mode, in which it was found, could not be ended.
+    /// The board already showed the program, but was found in programming mode, and that mode could not be ended.
     #[error("the board shows the program already, but it may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
-    /// A step after something was erased failed.
+    /// A step failed after something was erased.
     #[error("{0}")]
     After(Box<Error>),
-    /// The frames of a group may have erased a board that had left it and does not answer.
+    /// Frames to a group may have erased a board that had dropped out and does not answer.
     #[error("it may be erased, the group's frames went past it: {0}")]
     MayBeErased(Box<Error>),
-    /// The user ended it.
+    /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
         /// State that the cancel left: the board's outcome.
@@ -94,7 +94,7 @@ pub enum UpdateFailure {
     /// Another board of the list failed before its turn came.
     #[error("not begun: board {after} failed before")]
     Skipped {
-        /// The one that failed.
+        /// The board that failed.
         after: u8,
     },
 }
@@ -106,7 +106,7 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Returns the kind; any failure or cancel after memory may have been erased is a fault.
+    /// Returns the kind. Any failure or cancel after memory may have been erased is a fault.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use crate::files::{FlashRecord, Image};
 
-/// An image with its place.
+/// An image and its load address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateImage {
-    /// Bytes in wire order; every plan and cycle shares them.
+    /// Bytes in wire order, shared by every plan and cycle.
     pub bytes: Arc<[u8]>,
     /// Load address, words.
     pub address_words: u32,
@@ -24,7 +24,7 @@ impl From<Image> for UpdateImage {
 pub struct UpdateTarget {
     /// Board number.
     pub board: u8,
-    /// The flash number it must have (U-1); `None`: any.
+    /// The flash number that the board must have (U-1); `None`: any.
     pub flash_number: Option<u16>,
 }
 
@@ -34,7 +34,7 @@ pub enum UpdateMode {
     /// Boards are updated in sequence.
     #[default]
     OneByOne,
-    /// All at once, by broadcast; boards that fall out of the group are updated one by one afterwards.
+    /// All at once, by broadcast. Boards that drop out of the group are updated one by one afterwards.
     Group,
 }
 
@@ -56,23 +56,23 @@ pub struct UpdateOptions {
     pub any_date: bool,
     /// Flash records of the boards, by flash number (D-62). Boards without a record are not known.
     pub records: BTreeMap<u16, FlashRecord>,
-    /// The header names the board's flash number: another board then refuses the image.
+    /// `true` if the header names the board's flash number, so that another board refuses the image.
     pub name_target: bool,
-    /// In sequence, or all at once.
+    /// Order of the updates.
     pub mode: UpdateMode,
-    /// Only the checks, the look for another PC among them: nothing but PC_INFO is sent.
+    /// `true` for the checks only, including the look for another PC. Only PC_INFO is sent.
     pub dry_run: bool,
-    /// Also when boards run (U-2), another PC is on the bus, or the board shows the program already (U-3).
+    /// Permission to update although boards run (U-2), another PC is on the bus, or the board already shows the program (U-3).
     pub force: bool,
-    /// Also when the board shows the program already (U-3), and nothing else.
+    /// Permission to update although the board already shows the program (U-3), and nothing else.
     pub rewrite: bool,
-    /// Start the application at the end.
+    /// `true` to start the application at the end.
     pub start: bool,
-    /// An image that cannot be verified is as good as a verified one: no failure (plan `raw`, `prog.header` or
-    /// `prog.checksum` `none`, without [`expect_program_id`](Self::expect_program_id)). This also holds for a board that
-    /// shows the program, but whose flash is not known (D-62).
+    /// `true` if an image that cannot be verified counts as verified, without a failure (plan `raw`, `prog.header` or `prog.checksum`
+    /// `none`, without [`expect_program_id`](Self::expect_program_id)). This also applies to a board that shows the program but whose
+    /// flash content is not known (D-62).
     pub accept_unverified: bool,
-    /// Go on with the next board after one has failed.
+    /// `true` to go on with the next board after a failure.
     pub keep_going: bool,
 }
 

@@ -10,14 +10,13 @@ pub enum UpdateOutcome {
     NotStarted,
     /// The user cancelled the update before anything was erased: the board is unchanged.
     Cancelled,
-    /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62); nothing was
-    /// sent.
+    /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62). No program data were sent.
     UpToDate,
-    /// The board shows the program, but no flash record covers load address and content (D-62); nothing was sent.
+    /// The board shows the program, but no flash record covers load address and content (D-62). No program data were sent.
     ProgramUpToDate,
     /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
     Incomplete,
-    /// The old program of the board may be lost, and the board does not report it.
+    /// The old program of the board may be lost, and the board has not reported its state.
     Unknown,
     /// The board reports the program as written, but PC_INFO did not confirm the new Program ID and date: PC_INFO showed
     /// others, did not answer, or the expected values are not known
@@ -31,7 +30,7 @@ pub enum UpdateOutcome {
 }
 
 impl UpdateOutcome {
-    /// The name in JSON.
+    /// Returns the name in JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::NotStarted => "not-started",

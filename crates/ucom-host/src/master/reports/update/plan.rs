@@ -15,12 +15,12 @@ pub(crate) struct Cycle {
 }
 
 impl Cycle {
-    /// Blocks with the header's.
+    /// Returns the number of blocks, including the header's.
     pub(crate) fn blocks(&self) -> usize {
         block_count(self.bytes.len()) + usize::from(self.header.is_some())
     }
 
-    /// The `i`-th block.
+    /// Returns the `i`-th block.
     pub(crate) fn block(&self, i: usize) -> Option<[u8; BLOCK_LEN]> {
         match (self.header, i.checked_sub(1)) {
             (Some(header), None) => Some(header),
@@ -30,7 +30,7 @@ impl Cycle {
     }
 }
 
-/// Program that a board shall show at the end.
+/// Program that a board must show at the end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expected {
     /// Program ID.
@@ -40,7 +40,7 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// The board shows it.
+    /// Returns `true` if the board shows this program.
     pub fn is(&self, known: &BoardInfo) -> bool {
         known.program_id == self.program_id && self.date.is_none_or(|date| date == known.date)
     }
@@ -49,7 +49,7 @@ impl Expected {
 /// Reasons why the program that a board must show after the update is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
-    /// Plan `raw`: the files hide their Program ID.
+    /// Plan `raw`: the Program ID is not visible in the files.
     RawPlan,
     /// `prog.header` is `none`: the board computes Program ID and date by itself.
     NoHeader,
@@ -74,10 +74,10 @@ impl Unverifiable {
     }
 }
 
-/// Image as it is sent.
+/// Image as sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedImage {
-    /// The cycles that carry it, first and last: 1, 2 or both.
+    /// First and last cycle that carry it: 1, 2 or both.
     pub cycles: (u32, u32),
     /// Target memory; `None`: only the file knows (plan `raw`).
     pub memory: Option<Memory>,
@@ -85,12 +85,12 @@ pub struct PlannedImage {
     pub address_words: Option<u32>,
     /// Length, bytes.
     pub bytes: usize,
-    /// Program ID (D-44); `None`: hidden, or not computed.
+    /// Program ID (D-44); `None`: not visible, or not computed.
     pub program_id: Option<u16>,
 }
 
 impl Unverifiable {
-    /// Returns the reason why PC_INFO cannot verify an update by this profile; `None`: it can.
+    /// Returns the reason why PC_INFO cannot verify an update with this profile; `None` if it can.
     fn by_profile(profile: &Profile) -> Option<Self> {
         match (profile.prog_plan, profile.prog_header, profile.prog_checksum) {
             (Plan::Raw, ..) => Some(Self::RawPlan),
@@ -112,7 +112,7 @@ impl UpdateImage {
     }
 }
 
-/// Returns `true` if updates by this profile send a header, which carries Program ID and flash date (D-41).
+/// Returns `true` if updates with this profile send a header, which carries Program ID and flash date (D-41).
 pub fn has_header(profile: &Profile) -> bool {
     profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
 }
@@ -133,7 +133,7 @@ fn parts<'a>(
     })
 }
 
-/// Data that a board gets, and the program that it shall show afterwards.
+/// Data for a board, and the program that the board must show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
@@ -141,14 +141,14 @@ pub struct UpdatePlan {
     pub images: Vec<PlannedImage>,
     /// Program that the board shows at the end; `None`: not known.
     pub expected: Option<Expected>,
-    /// Reason why it is not known.
+    /// Reason why the expected program is not known.
     pub unverifiable: Option<Unverifiable>,
-    /// The first cycle that may erase flash, 1 or 2: before it nothing is lost.
+    /// The first cycle that may erase flash, 1 or 2. Before that cycle nothing is lost.
     pub erases_from: u32,
 }
 
 impl UpdatePlan {
-    /// Creates the plan for a board, `target` in the header.
+    /// Creates the plan for a board, with `target` in the header.
     pub fn new(options: &UpdateOptions, target: u16, profile: &Profile) -> Result<Self, PlanError> {
         let plan = profile.prog_plan;
         let image = &options.image;
@@ -211,17 +211,17 @@ impl UpdatePlan {
         Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
     }
 
-    /// Returns the Program ID that the board shall show; `None`: not known.
+    /// Returns the Program ID that the board must show; `None`: not known.
     pub fn program_id(&self) -> Option<u16> {
         self.expected.map(|expected| expected.program_id)
     }
 
-    /// Bytes of both cycles on the wire.
+    /// Returns the bytes of both cycles on the wire.
     pub fn total_bytes(&self) -> u64 {
         self.cycles.iter().map(|c| (c.blocks() * BLOCK_LEN) as u64).sum()
     }
 
-    /// PC_PROG frames of one cycle, 0 or 1.
+    /// Returns the number of PC_PROG frames of one cycle, 0 or 1.
     pub fn frames(&self, cycle: usize) -> usize {
         self.cycles.get(cycle).map_or(0, |c| c.blocks() * 8)
     }
@@ -237,7 +237,7 @@ mod tests {
         UpdateOptions::new(vec![UpdateTarget { board: 1, flash_number: None }], image, 0x3AC1)
     }
 
-    /// The golden update: 1000 bytes, 17 blocks and 136 frames a cycle, Program ID 0x4B3F.
+    /// The golden update: 1000 bytes, 17 blocks and 136 frames per cycle, Program ID 0x4B3F.
     #[test]
     fn d41_golden_plan() {
         let bytes: Vec<u8> = (0..1000).map(|i| (37 * i + 11) as u8).collect();

@@ -19,14 +19,14 @@ pub struct UpdateResult {
     pub after: Option<BoardInfo>,
     /// Progress of the update.
     pub outcome: UpdateOutcome,
-    /// PC_INFO shows the Program ID and date of the image, and this tool wrote exactly this image to this address: now, or
-    /// earlier by the flash record.
+    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool wrote exactly this image to this address: now, or
+    /// earlier according to the flash record.
     pub verified: bool,
-    /// Attempts that were made.
+    /// Number of attempts.
     pub attempts: u32,
     /// Reason of the failure.
     pub failure: Option<UpdateFailure>,
-    /// From XRESET to the last answer, µs.
+    /// Time from XRESET to the last answer, µs.
     pub time_us: u64,
 }
 
@@ -49,13 +49,13 @@ impl UpdateResult {
 /// Results of all boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UpdateReport {
-    /// In the order of the list.
+    /// Results in the order of the list.
     pub boards: Vec<UpdateResult>,
     /// `true` if only questions were sent.
     pub dry_run: bool,
-    /// Program ID that the boards shall show; `None`: not known.
+    /// Program ID that the boards must show; `None`: not known.
     pub program_id: Option<u16>,
-    /// Reason why it is not known: the written program could then not be verified.
+    /// Reason why it is not known. The written program could then not be verified.
     pub unverifiable: Option<Unverifiable>,
     /// `true` if written but unverified programs count as done.
     pub accept_unverified: bool,
@@ -68,7 +68,7 @@ pub struct UpdateReport {
 }
 
 impl UpdateReport {
-    /// Returns the kind of failure: the gravest of any board. `None`: all is done.
+    /// Returns the kind of failure: the most serious of any board. `None`: all boards are done.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
@@ -95,7 +95,7 @@ impl UpdateReport {
         (message, "`rewrite` writes it")
     }
 
-    /// The flash date of a board that shows the program already, if it is not that of the image.
+    /// Returns the flash date of a board that already shows the program, if it differs from that of the image.
     fn flashed(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let before = result.before.filter(|before| has_header(profile) && before.date != self.date)?;
         let is_shown = matches!(result.outcome, UpdateOutcome::UpToDate | UpdateOutcome::ProgramUpToDate);
@@ -108,7 +108,7 @@ impl UpdateReport {
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
     }
 
-    /// Returns the evidence for a board that shows the program already; `None` for any other board.
+    /// Returns the evidence for a board that already shows the program; `None` for any other board.
     pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let same = match self.flashed(result, profile) {
             Some(flashed) => format!("same Program ID, {flashed}"),
@@ -125,11 +125,11 @@ impl UpdateReport {
 /// Progress of an update.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// The boards that get the image now.
+    /// Boards that receive the image now.
     pub boards: Vec<u8>,
-    /// 1 to `prog.attempts`.
+    /// Attempt, 1 to `prog.attempts`.
     pub attempt: u32,
-    /// 1 or 2.
+    /// Cycle, 1 or 2.
     pub cycle: u32,
     /// Bytes of both cycles that were taken in this attempt.
     pub bytes: u64,

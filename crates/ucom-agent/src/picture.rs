@@ -25,7 +25,7 @@ pub(crate) struct Values {
 /// Bus and boards at one time.
 #[derive(Clone)]
 pub(crate) struct Picture {
-    /// Time of the snapshot by the session's clock, µs; the next field is the time by the agent's clock.
+    /// Time of the snapshot by the session's clock, µs. The next field is the time by the agent's clock.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,

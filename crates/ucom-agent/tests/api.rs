@@ -1,4 +1,4 @@
-//! What a program does by HTTP alone: numbers, boards, values, control loops, inputs, events, and a Stop.
+//! A client that uses only HTTP: numbers, boards, values, control loops, inputs, events, and a Stop.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -18,7 +18,7 @@ fn value<'a>(values: &'a Value, list: &str, name: &str) -> &'a Value {
     all.iter().find(is).unwrap_or_else(|| panic!("{name} in {values}"))
 }
 
-/// D-24, D-51: boards get the numbers of their places, and are who they are.
+/// D-24, D-51: boards get numbers by position, and the list shows their identities.
 #[test]
 fn d24_a_chain_is_scanned_numbered_and_listed() {
     let served = Served::start(3);
@@ -40,7 +40,7 @@ fn d24_a_chain_is_scanned_numbered_and_listed() {
         .collect();
     let places = config.boards.iter().zip(1..).map(|(board, place)| (place, u64::from(board.flash_id)));
     assert_eq!(found, places.collect::<Vec<_>>(), "{boards}");
-    // Another chain than the expected one is an error of the job, with what is there.
+    // A chain that differs from the expected one is an error of the job. The error names the boards on the bus.
     let expected = json!({ "expected": [{ "board": 1, "flash_number": 9 }] });
     let job = served.job("POST /api/init", &key, Some(expected));
     assert_eq!(
@@ -60,7 +60,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
     let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
-    // What was neither set nor read is not known: whoever writes back what it read must not write zeros.
+    // A value that was neither set nor read is unknown: a client that writes back all values must not write zeros.
     let known = |of: &Value| {
         of["inputs"]
             .as_array()
@@ -76,7 +76,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let (_, values) = served.api("GET /api/boards/1/values", None, None);
     assert_eq!(known(&values).iter().filter(|known| **known).count(), 1, "{values}");
     assert_eq!(value(&values, "inputs", "set_position")["value"], 7.0, "{values}");
-    // Each board once, however often it is named; its inputs are read then.
+    // Each board runs once, even if it is named several times; its inputs are read then.
     let (mut peer, boards) = (served.chain.peer(), [vec![1; 200], vec![2]].concat());
     let job = served.job("POST /api/run", &key, Some(json!({ "boards": boards, "active": true })));
     assert_eq!(job["stage"], "finished", "{job}");
@@ -97,7 +97,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let offers: Vec<&str> =
         board["offers"]["inputs"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
     assert!(offers.iter().any(|name| name.starts_with("set_position")), "{offers:?}");
-    // An input by its name moves the axis; without the signal table words are numbers.
+    // An input by its name moves the axis. Without the signal table words are numbers.
     let set = |value: Value| {
         let request = "PUT /api/boards/1/inputs/set_position";
         served.api(request, Some(&key), Some(json!({ "value": value })))
@@ -115,7 +115,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         }
         patience.pause(format_args!("the position 1500: {values}"));
     }
-    // Words and text are values, too; what is none is named with what there is, and changes nothing.
+    // Words and texts are also valid values. An invalid value is refused with the valid ones, and changes nothing.
     assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
     for (name, given, status, part) in [
         ("set_positon", json!(1), 422, "set_position"),
@@ -134,21 +134,21 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         board["offers"]["parameters"][0].as_str().expect("a name").split(' ').next().unwrap_or_default();
     let (status, sent) = served.api(&format!("PUT /api/boards/1/parameters/{name}"), Some(&key), body);
     assert_eq!((status, sent["value"].as_f64()), (200, Some(120.0)), "{sent}");
-    // Outputs off, and one board stopped; the other one goes on.
+    // Outputs off, and one board stopped; the other board goes on.
     let off = served.api("PUT /api/boards/1/outputs", Some(&key), Some(json!({ "active": false })));
     assert_eq!(off.0, 204, "{}", off.1);
     served.board_when(1, "inactive", |board| board["active"] == false);
     let (status, stopped) = served.api("POST /api/boards/1/stop", Some(&key), None);
     assert_eq!((status, stopped["state"].as_str()), (200, Some("exloader")), "{stopped}");
     assert_eq!(served.board(2)["state"], "running");
-    // A reset takes its number.
+    // A reset takes the board's number away.
     let (status, reset) = served.api("POST /api/boards/1/reset", Some(&key), None);
     assert_eq!((status, reset["reports"].as_array().map(Vec::len)), (200, Some(1)), "{reset}");
     let (status, error) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, error["code"].as_str()), (409, Some("no-answer")), "{error}");
 }
 
-/// A Stop is taken from anyone, without token and lease, is on the bus at once, and each board confirms it.
+/// D-37: the agent takes a Stop from any client, without token and lease. The Stop is on the bus at once, and each board confirms it.
 #[test]
 fn d37_a_stop_needs_no_lease_and_stops_every_board() {
     let (served, key) = Served::numbered(3);
@@ -159,7 +159,7 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let http = served.clone();
         move || http.get("POST /api/stop").0
     });
-    // MCA_ADMIN_DATA to all, every flag 0; three times, as one frame can be lost.
+    // MCA_ADMIN_DATA to all, with all flags 0, three times, because one frame can be lost.
     for _ in 0..3 {
         frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
     }
@@ -172,19 +172,19 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let board = served.board_when(number, "stopped", |board| board["state"] == "exloader");
         assert_eq!(board["active"], false, "{board}");
     }
-    // What somebody else has stopped stays so for a while; then it may be begun again.
+    // After another client's Stop motion requests are refused for a while, then accepted again.
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     std::thread::sleep(Duration::from_millis(3100));
     served.run(&key, &[1]);
-    // One's own does not: with one's own key.
+    // A Stop with the client's own key does not cause this hold-off.
     assert_eq!(served.api("POST /api/stop", Some(&key), None).0, 200);
     served.board_when(1, "stopped", |board| board["state"] == "exloader");
     served.run(&key, &[1]);
     text_with(&served.log, &["\"halt\"", "\"command\":\"run\"", "\"joined\""]);
 }
 
-/// A Stop ends what is under way before it moves anything.
+/// A Stop ends a job in progress before the job moves anything.
 #[test]
 fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
     let (served, key) = Served::numbered(2);
@@ -200,7 +200,7 @@ fn a_run_that_is_stopped_while_it_begins_does_not_begin() {
     }
 }
 
-/// D-51: late after 1.5 s without a heartbeat, lost after 3 s, back with the next one.
+/// D-51: a board is late after 1.5 s without a heartbeat, lost after 3 s, and back with the next heartbeat.
 #[test]
 fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
     let (served, key) = Served::numbered(2);
@@ -230,7 +230,7 @@ fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
     assert!((1.4..1.6).contains(&(at[1] - at[0])) && at[2] < 6.7, "{at:?}");
 }
 
-/// D-37, D-50: a board that leaves its control loop by itself is an event, and its values are stale.
+/// D-37, D-50: a board that leaves its control loop by itself causes an event, and its values are stale.
 #[test]
 fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
     let (served, key) = Served::numbered(1);
@@ -252,7 +252,7 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     let (_, status) = other.api("GET /api/status", None, None);
     assert_eq!(status["competing_master"], true, "{status}");
     let theirs = other.lease("bob", 60.0, "stop");
-    // As long as it goes on, not only when it begins; a doctor asks nothing then.
+    // The status shows the other master all the time, not only at its first frame. A doctor then sends no questions.
     for _ in 0..40 {
         std::thread::sleep(Duration::from_millis(100));
         let (_, status) = other.api("GET /api/status", None, None);
@@ -269,10 +269,10 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     assert_eq!(job["stage"], "failed", "{job}");
     assert!(job["error"]["message"].as_str().is_some_and(|m| m.contains("PC")), "{job}");
     other.end();
-    // A bus without one is not concerned. Its lease begins here: a busy computer takes long for what is above.
+    // A bus without another master is not affected. The lease begins here, because the steps above take long on a busy computer.
     let (served, key) = Served::numbered(2);
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
-    // Nor is anything asked for a viewer.
+    // The agent sends no questions for a viewer either.
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     served.chain.fault("foreign-master");
     std::thread::sleep(Duration::from_millis(1000));
@@ -315,13 +315,13 @@ fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&bob), None).0, 409);
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     assert_eq!(served.api("GET /api/status", None, None).1["lease"]["holder"], "bob");
-    // Unless asked for otherwise, nothing runs on for a client that is gone.
+    // Unless the client chose otherwise, its boards do not continue to run after it disconnects.
     served.run(&bob, &[1]);
     let last = served.last_event();
     let (number, halt) = served.event(last, "halt", |event| event["kind"] == "halt");
     assert!(halt["by"].as_str().is_some_and(|by| by.contains("bob")), "{halt}");
     served.event(number, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1]));
-    // With the other policy it does.
+    // With the other policy they do.
     let carl = served.lease("carl", 1.0, "continue");
     std::thread::sleep(Duration::from_millis(3100));
     let carl = match served.api("PUT /api/lease", Some(&carl), None).1["held"].as_bool() {
@@ -358,7 +358,7 @@ fn a_stream_has_bus_boards_values_and_events_as_they_come() {
     assert!(last > 3, "{kinds:?}");
 }
 
-/// D-01: numbers are 0 to 31; others are refused before anything is sent, and the agent goes on.
+/// D-01: numbers are 0 to 31. Other numbers are refused before anything is sent, and the agent goes on.
 #[test]
 fn d01_numbers_that_no_board_can_have_are_refused() {
     let (served, key) = Served::numbered(1);
@@ -389,7 +389,7 @@ fn a_bus_that_is_gone_is_named() {
     served.event(0, "lost", |event| event["kind"] == "lost");
 }
 
-/// D-08, D-50: heartbeats are for what was commanded here, so no board of another PC is kept alive when that one dies.
+/// D-08, D-50: the agent sends heartbeats only for its own commands, so it keeps no board alive whose own PC is lost.
 #[test]
 fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none() {
     let (served, key) = Served::numbered(1);
@@ -397,7 +397,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     let is_master =
         |wanted: bool| until(format_args!("is_master {wanted}"), || status()["is_master"] == wanted);
     is_master(true);
-    // What runs needs them also when nobody commands.
+    // Running boards need heartbeats even if no client holds the lease.
     served.run(&key, &[1]);
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     std::thread::sleep(Duration::from_millis(500));
@@ -409,7 +409,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     };
     stop();
     is_master(false);
-    // Another PC is the master now: whoever stops, and whoever has the lease but does nothing.
+    // Another PC is the master now. Neither a Stop nor a lease without commands makes the agent the master.
     served.chain.fault("foreign-master");
     std::thread::sleep(Duration::from_millis(1500));
     for lease in [false, true] {
@@ -418,7 +418,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
         }
         stop();
         is_master(false);
-        // Not because the lease has lapsed meanwhile.
+        // The lease has not lapsed meanwhile.
         assert_eq!(status()["lease"].is_null(), !lease, "{}", status());
         let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
         let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);
@@ -430,7 +430,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     }
 }
 
-/// A disk that does not answer keeps neither a Stop nor heartbeats waiting, and no question either.
+/// A disk that does not answer delays neither a Stop nor heartbeats, nor a question.
 #[cfg(unix)]
 #[test]
 fn a_stop_does_not_wait_for_the_disk_with_the_names() {
@@ -440,7 +440,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     served.run(&key, &[1]);
     let kept = || std::fs::read_dir(dir.path()).expect("a directory").flatten().next();
     until("the names of board 1 on the disk", || kept().is_some());
-    // Whoever opens the file of the other board waits for ever.
+    // Opening the file of the other board blocks for ever.
     let name = kept().expect("a file").file_name().into_string().expect("a name");
     let date = name.split('-').nth(2).expect("a date");
     let board = served.board(2);
@@ -450,7 +450,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().is_ok_and(|made| made.success()));
     let asker = std::thread::spawn({
         let http = served.clone();
-        // Its names are read, and written.
+        // The names of board 2 are read and written.
         move || {
             [http.get("GET /api/boards/2/values").0, http.api("POST /api/boards/2/start", Some(&key), None).0]
         }
@@ -463,7 +463,7 @@ fn a_stop_does_not_wait_for_the_disk_with_the_names() {
         let received = peer.receive(Duration::from_millis(10)).expect("the bus is there");
         received.is_some_and(|frame| frame.id().value() == 0x600)
     });
-    // The disk is back.
+    // The disk answers again.
     drop(std::fs::OpenOptions::new().read(true).write(true).open(&pipe));
     assert!(stop, "a Stop waits for the disk");
     assert_eq!(asker.join().expect("it is answered"), [409, 200]);

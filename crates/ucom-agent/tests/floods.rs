@@ -1,4 +1,4 @@
-//! Clients that take all connections: in a program of its own, for they take many.
+//! Clients that use up all connections, in a separate program because these are many.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

@@ -1,4 +1,4 @@
-//! What was asked for before a Stop does nothing behind it, however long it was on its way, and whoever stopped.
+//! A request made before a Stop moves nothing after it, for any delay and any client that stopped.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -8,14 +8,14 @@ use std::time::Duration;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Behind these three seconds nothing is kept calm any more.
+/// Longer than the hold-off of three seconds after another client's Stop.
 const CALM: Duration = Duration::from_millis(3_300);
 
 fn last_halt(served: &Served) -> u64 {
     served.api("GET /api/status", None, None).1["last_halt"].as_u64().expect("a number")
 }
 
-/// Somebody stops the boards, with a key or without: the number of the Stop.
+/// Stops the boards, with or without a key, and returns the number of the Stop.
 fn stop(served: &Served, key: Option<&str>) -> u64 {
     let (status, sent) = served.api("POST /api/stop", key, None);
     assert_eq!(status, 200, "{sent}");
@@ -24,13 +24,13 @@ fn stop(served: &Served, key: Option<&str>) -> u64 {
     number
 }
 
-/// It was refused, with who stopped the boards.
+/// Checks that the request was refused, with the name of the client that stopped the boards.
 fn is_stopped((status, error): (u16, Value), by: &str) {
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     assert!(error["message"].as_str().is_some_and(|text| text.starts_with(by)), "{error}");
 }
 
-/// Begins a request, and leaves its body out.
+/// Begins a request without its body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let (address, token, length) = (served.address, &served.tokens.operator, body.len());
     let mut socket = TcpStream::connect(address).expect("it listens");
@@ -40,12 +40,12 @@ fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
          Content-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n"
     )
     .expect("it reads");
-    // The head is there.
+    // The agent has received the head.
     std::thread::sleep(Duration::from_millis(300));
     socket
 }
 
-/// Sends the body, and reads what comes of it.
+/// Sends the body, and returns the answer.
 fn finish(mut socket: TcpStream, body: &str) -> String {
     socket.write_all(body.as_bytes()).expect("it reads");
     let mut answer = String::new();
@@ -53,7 +53,7 @@ fn finish(mut socket: TcpStream, body: &str) -> String {
     answer
 }
 
-/// No application runs: nothing was sent that starts one.
+/// Checks that no application runs, so no start was sent.
 fn nothing_runs(served: &Served) {
     let (_, boards) = served.api("GET /api/boards", None, None);
     for board in boards.as_array().expect("boards") {
@@ -88,7 +88,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
         json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true }).to_string();
     let late = [("POST /api/run", &run), ("POST /api/updates", &update)]
         .map(|(request, body)| (begin(&served, request, &key, body), body));
-    // Also behind one's own, which keeps nothing calm.
+    // This also holds after the client's own Stop, which causes no hold-off.
     stop(&served, Some(&key));
     let last = served.last_event();
     for (socket, body) in late {
@@ -99,7 +99,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
     let begun = all["events"].as_array().expect("events").iter().any(|e| e["event"]["kind"] == "begun");
     assert!(!begun, "{all}");
     nothing_runs(&served);
-    // The same, asked for anew, does.
+    // A new request for the same run succeeds.
     served.run(&key, &[1, 2]);
 }
 
@@ -120,7 +120,7 @@ fn stops_that_no_agent_has_counted_are_refused_with_what_it_has() {
         let (status, error) = served.api(&format!("{request}?asked_after=7"), Some(&key), body.clone());
         let found = (status, &error["value"], &error["limit"]);
         assert_eq!(found, (400, &json!(7.0), &json!(1.0)), "{request}: {error}");
-        // Each of them is refused behind a Stop, too, whoever asked for that.
+        // Each of these is refused after a Stop as well, for any client that stopped.
         is_stopped(served.api(&format!("{request}?asked_after=0"), Some(&key), body), "anna");
     }
     nothing_runs(&served);
@@ -142,19 +142,19 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     let halt = stop(&served, Some(&key));
     is_stopped(set(&format!("?asked_after={before}"), 700), "anna");
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // It is no command to move: what ends something is done, whenever it was asked for.
+    // A request to switch outputs off moves nothing, so it is carried out even if it is older than the Stop.
     let off = json!({ "active": false });
     let (_, error) =
         served.api(&format!("PUT /api/boards/1/outputs?asked_after={before}"), Some(&key), Some(off));
     assert_ne!(error["code"], "stopped", "{error}");
-    // One's own Stop keeps nobody calm who knows of it, or names none.
+    // The client's own Stop causes no hold-off for a request that names this Stop, or none.
     let job =
         served.begin(&format!("POST /api/run?asked_after={halt}"), &key, Some(json!({ "boards": [1] })));
     assert_eq!(served.over(job)["stage"], "finished");
     assert_eq!(set("", 700).0, 200);
 }
 
-/// Messages that are late say so, however steadily they come.
+/// Every status carries its time, so a client can detect late messages even if they come steadily.
 #[test]
 fn each_status_has_the_time_when_it_was_made() {
     let served = Served::start(1);

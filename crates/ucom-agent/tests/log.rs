@@ -1,4 +1,4 @@
-//! The log of commands: what was done, whoever has gone meanwhile, and what came of it.
+//! The log of commands contains completed commands, even of clients that have disconnected, and their results.
 use crate::common;
 
 use std::io::Write as _;
@@ -9,7 +9,7 @@ use common::Served;
 use serde_json::{Value, json};
 use test_kit::patience::Patience;
 
-/// The first line that `is` so.
+/// Waits for the first line for which `is` returns `true`, and returns it.
 fn line(served: &Served, what: &str, is: impl Fn(&Value) -> bool) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -28,7 +28,7 @@ fn what_a_client_has_done_is_in_the_log_when_it_hangs_up() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 200);
     let first = served.board(1)["offers"]["parameters"][0].as_str().expect("a name").to_owned();
     let (name, token) = (first.split(' ').next().unwrap_or_default(), served.tokens.operator.clone());
-    // It goes before it is answered, until one was done all the same.
+    // The client disconnects before it gets an answer. Repeated until one command was carried out nevertheless.
     let done = (100..140).find(|word| {
         let body = json!({ "value": word }).to_string();
         let request = format!(
@@ -73,7 +73,7 @@ fn a_lapse_its_stop_and_what_became_of_jobs_are_in_the_log() {
     line(&served, "lapse", lease(Value::Null));
 }
 
-/// Who may not is in the log as well as who did, with what was asked for and why it was not done; who only asks is not.
+/// The log contains denied requests as well as completed ones, with the request and the reason. Read-only requests are not in it.
 #[test]
 fn what_was_denied_is_in_the_log() {
     let (served, key) = Served::numbered(1);

@@ -1,4 +1,4 @@
-//! What becomes of what a client has asked for when a Stop comes, its lease lapses, it goes, or others ask too.
+//! Effect on a client's requests of a Stop, of the end of its lease, of its disconnection and of other clients.
 use crate::common;
 
 use std::io::Write as _;
@@ -17,7 +17,7 @@ fn is(kind: &'static str) -> impl Fn(&Value) -> bool {
     move |event| event["kind"] == kind
 }
 
-/// Commands to a board that does not answer: what comes behind them waits for some seconds.
+/// Sends commands to a board that does not answer. Later commands then wait for some seconds.
 fn commands_to_nobody(served: &Served, key: &str, count: usize) -> Vec<JoinHandle<()>> {
     let ask = || {
         let (http, key) = (Http::clone(served), key.to_owned());
@@ -29,7 +29,7 @@ fn commands_to_nobody(served: &Served, key: &str, count: usize) -> Vec<JoinHandl
     all
 }
 
-/// The control loop of board 1 runs for a client with this policy, and its outputs are off.
+/// Runs the control loop of board 1, with outputs off, for a client with this policy; returns the client's key.
 fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
     let job = served.job("POST /api/run", key, Some(json!({ "boards": [1] })));
     assert_eq!(job["stage"], "finished", "{job}");
@@ -37,7 +37,7 @@ fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
     served.lease("bob", lasts_s, policy)
 }
 
-/// Somebody who looks at the leases while the job goes on changes nothing: the lapse ends it, and all boards are stopped.
+/// Another client reads the leases during the job without effect. The lapse ends the job, and all boards are stopped.
 #[test]
 fn a_run_whose_client_dies_meanwhile_is_stopped() {
     let (served, key) = Served::numbered(6);
@@ -59,7 +59,7 @@ fn a_run_whose_client_dies_meanwhile_is_stopped() {
     }
 }
 
-/// A board that could not be asked to stop after a run that did not come about is stopped at the lapse.
+/// A run was cancelled and one of its boards could not be stopped: the agent stops that board later.
 #[test]
 fn a_run_that_cannot_be_taken_back_counts_as_started() {
     let (served, key) = Served::numbered(3);
@@ -74,7 +74,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     assert_eq!(over["stage"], "cancelled", "{over}");
     let mut peer = served.chain.peer();
     let mut served = served;
-    // It is as good as started: the agent does not end without a Stop for it.
+    // The board counts as started: the agent does not end without a Stop for it.
     let ending = std::thread::spawn(move || {
         served.end();
         served
@@ -83,7 +83,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     drop(ending.join());
 }
 
-/// A long update does not keep a lease from lapsing, and goes on itself.
+/// A long update does not prevent the lapse of a lease, and the update continues.
 #[test]
 fn a_lease_lapses_in_the_middle_of_an_update() {
     use base64::Engine as _;
@@ -103,7 +103,7 @@ fn a_lease_lapses_in_the_middle_of_an_update() {
     assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
 }
 
-/// What a client asked for that commands no more is not done under the lease of another.
+/// A request of a client that has lost the lease is not carried out under the lease of another client.
 #[test]
 fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -116,7 +116,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let on = json!({ "active": true });
     let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), Some(on));
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
-    // Nor does a board of the other one lose its number.
+    // Nor does a board lose its number.
     let (status, error) = reset.join().expect("it is answered");
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
     let board = served.board(1);
@@ -124,7 +124,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
 }
 
-/// A program that has hung up does not move anything any more; what it asked to end is ended.
+/// A request of a disconnected client moves nothing any more. A request that ends motion is carried out.
 #[test]
 fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     let (served, key) = Served::numbered(2);
@@ -147,12 +147,12 @@ fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     hang_up(2, false);
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
     served.board_when(2, "off", |board| board["active"] == false);
-    // Asked for later, and done now: whatever waited before it has had its turn.
+    // This later request has been carried out, so all earlier requests have had their turn.
     assert_eq!(served.api("PUT /api/boards/2/outputs", Some(&key), Some(json!({ "active": false }))).0, 204);
     assert_eq!(served.board(1)["active"], false);
 }
 
-/// One's own Stop takes nothing away from somebody else's.
+/// The client's own Stop does not shorten the hold-off after another client's Stop.
 #[test]
 fn the_calm_of_a_stop_lasts_behind_another_one() {
     let (served, key) = Served::numbered(1);
@@ -162,13 +162,13 @@ fn the_calm_of_a_stop_lasts_behind_another_one() {
     }
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
-    // Nor is an update begun behind it.
+    // An update is not begun after it either.
     let body = json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true });
     let (status, error) = served.api("POST /api/updates", Some(&key), Some(body));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
 }
 
-/// A job that waits for its turn is cancelled like one that goes on.
+/// A job that waits for its turn can be cancelled like a running job.
 #[test]
 fn a_job_that_waits_is_cancelled_and_one_that_is_refused_never_was() {
     let (served, key) = Served::numbered(1);
@@ -191,7 +191,7 @@ fn a_job_that_waits_is_cancelled_and_one_that_is_refused_never_was() {
     assert_eq!(ended, [(Some(job), Some("cancelled")), (Some(job + 1), Some("finished"))]);
 }
 
-/// A board that says nothing when it is stopped is not taken for stopped.
+/// A board that is silent during a Stop does not count as stopped.
 #[test]
 fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
     let (served, key) = Served::numbered(2);
@@ -210,7 +210,7 @@ fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
     assert_eq!((&stopped["boards"], &stopped["not_stopped"]), (&json!([1, 2]), &json!([])), "{stopped}");
 }
 
-/// Those who only look keep no command waiting, not even one of them that asks a silent board again and again.
+/// Read-only requests do not delay commands, even if they repeatedly ask a silent board.
 #[test]
 fn questions_keep_no_command_waiting() {
     let (served, key) = Served::numbered(2);
@@ -228,12 +228,12 @@ fn questions_keep_no_command_waiting() {
         let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), body);
         assert_eq!(status, 204, "{error}");
     }
-    // One question that goes on may be waited for.
+    // A command waits at most for the one question in progress.
     assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
 
-/// At the agent's end boards are stopped before a job takes back what it has begun on others.
+/// When the agent ends, it stops running boards before a job undoes its own steps on other boards.
 #[test]
 fn the_end_stops_what_runs_before_a_job_is_undone() {
     let (mut served, key) = Served::numbered(5);
@@ -252,7 +252,7 @@ fn the_end_stops_what_runs_before_a_job_is_undone() {
     drop(ending.join());
 }
 
-/// A command whose turn comes when its request is about to be given up is not done instead of being done unseen.
+/// A command whose turn comes shortly before its request times out is refused, because the client would not see its effect.
 #[test]
 fn what_waits_too_long_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -265,12 +265,12 @@ fn what_waits_too_long_does_not_move_anything() {
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
 }
 
-/// A board that does not receive the reset of an init runs on: it is stopped, and the init is none that has succeeded.
+/// D-24: a board that does not receive the reset of an init continues to run. The board is stopped, and the init does not succeed.
 #[test]
 fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     let (served, key) = Served::numbered(2);
     served.run(&key, &[1, 2]);
-    // It receives again while the reports are awaited, for 1 s behind the reset.
+    // The board receives frames again within the 1 s after the reset in which reports are collected.
     served.chain.fault("deaf board=2 for_s=0.9");
     let job = served.job("POST /api/init", &key, Some(json!({})));
     assert_eq!((&job["stage"], &job["error"]["code"]), (&json!("failed"), &json!("init")), "{job}");
@@ -282,7 +282,7 @@ fn d24_a_board_that_misses_the_reset_of_an_init_is_stopped() {
     assert_eq!(again["stage"], "finished", "{again}");
 }
 
-/// Inputs of a board that runs are repeated, and one alone needs no answer. A board without power takes none.
+/// D-34: inputs of a running board are repeated, so a single input needs no answer. A board without power accepts no input.
 #[test]
 fn d34_an_input_of_a_board_without_power_is_no_success() {
     let (served, key) = Served::numbered(1);
@@ -293,13 +293,13 @@ fn d34_an_input_of_a_board_without_power_is_no_success() {
     let (status, error) = set();
     assert_eq!(status, 200, "{error}");
     served.chain.fault("power-loss board=1 for_s=60");
-    // Its last outputs are as new as those of a board that runs, for half a second.
+    // For half a second the last outputs are as recent as those of a running board.
     std::thread::sleep(Duration::from_millis(600));
     let (status, error) = set();
     assert_eq!(status, 409, "{error}");
 }
 
-/// Who commands does not go while something begins for it: its outputs would be enabled later, with nobody there.
+/// A client cannot release its lease while its run begins: outputs would be enabled later without a lease holder.
 #[test]
 fn the_lease_is_not_let_go_while_a_run_begins() {
     let (served, key) = Served::numbered(1);
@@ -311,12 +311,12 @@ fn the_lease_is_not_let_go_while_a_run_begins() {
     assert_eq!(served.board(1)["active"], true);
 }
 
-/// Waits until the agent is not the master any more: no client holds the lease, and nothing runs.
+/// Waits until the agent is no longer the master: no client holds the lease, and no board runs.
 fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
-/// Those who only look do not keep the heartbeats going, however much they ask: boards of nobody become safe (D-50).
+/// D-50: read-only requests do not keep the heartbeats going, at any rate. Boards without a lease holder become safe.
 #[test]
 fn d50_questions_do_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -325,7 +325,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
         let (http, enough) = (Http::clone(&served), asked_enough.clone());
         std::thread::spawn(move || {
             while !enough.load(Ordering::Relaxed) {
-                // Its application is not started: it has no names.
+                // The application is not started, so its names are not known.
                 assert_eq!(http.api_as(None, "GET /api/boards/1/values", None, None).0, 409);
             }
         })
@@ -338,7 +338,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
 
-/// What was begun and has been taken back does not count as started.
+/// A run that was begun and undone does not count as started.
 #[test]
 fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     let (served, key) = Served::numbered(2);
@@ -350,7 +350,7 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     heartbeats_end(&served);
 }
 
-/// A board whose loop another PC has started does not count as this agent's when that loop is stopped from here.
+/// D-50: another PC has started the loop of a board. A stop of that loop by this agent does not make the board this agent's.
 #[test]
 fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -358,7 +358,7 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     for (id, awaited) in [(0x301, 0x501), (0x541, 0x601)] {
         let id = can_link::Id::standard(id).expect("11 bits");
         peer.send(&can_link::CanFrame::classic(id, &[]).expect("no data")).expect("the bus is there");
-        // Whatever its data.
+        // Any data are accepted.
         frame_when(&mut *peer, &format!("{awaited:03X}"), |frame| frame.id().value() == awaited);
     }
     let (status, error) = served.api("POST /api/boards/1/stop?level=loop", Some(&key), None);
@@ -366,7 +366,7 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     served.board_when(1, "started", |board| board["state"] == "started");
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     heartbeats_end(&served);
-    // One that was started from here counts on, when the other PC has been silent for a while (D-08).
+    // A board that this agent has started still counts. The other PC must have been silent for a while (D-08).
     std::thread::sleep(Duration::from_millis(1_500));
     let key = served.lease("anna", 60.0, "continue");
     served.run(&key, &[1]);

@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! The tests of the crate in one program, which needs one link step: each file here is a module of it.
 mod api;
 mod attacks;
 mod common;

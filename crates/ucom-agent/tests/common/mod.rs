@@ -1,4 +1,4 @@
-//! An agent of a simulated chain in this process, and requests to it as anybody could send them.
+//! An agent with a simulated chain in this process, and HTTP requests to it.
 
 use std::net::TcpListener;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ use ucom_agent::api::Agent;
 use ucom_agent::{Config, Owner};
 use ucom_sim::{ChainConfig, ChainServer, ChainSim};
 
-/// A simulated chain, on a bus that others can join.
+/// A simulated chain on a bus that other members can join.
 pub struct Chain {
     pub url: String,
     faults: Sender<(String, Sender<()>)>,
@@ -45,22 +45,22 @@ impl Chain {
                 let given: Vec<_> = lines.try_iter().collect();
                 given.iter().for_each(|(line, _)| server.fault(line));
                 server.turn(Duration::from_millis(20));
-                // It begins in a turn: whoever waits for it goes on now.
+                // The fault begins during the turn. Dropping the sender resumes the waiting test.
                 drop(given);
             }
         });
         Self { url: url.recv().expect("it listens"), faults, ended, thread: Some(thread) }
     }
 
-    /// Begins a fault, which has begun when this returns.
+    /// Begins a fault, and returns when it has begun.
     pub fn fault(&self, line: &str) {
         let (begun, begins) = channel();
         self.faults.send((line.into(), begun)).expect("it goes on");
-        // Nothing is ever sent: what waits here ends with the other side.
+        // The channel carries no message: this wait ends when the other side drops its sender.
         begins.recv().unwrap_or_default();
     }
 
-    /// Joins the bus as a device that knows nothing but frames.
+    /// Joins the bus as a device that only sends and receives frames.
     pub fn peer(&self) -> Box<dyn CanBus + Send> {
         can_link::open(&self.url).expect("the bus opens")
     }
@@ -79,7 +79,7 @@ impl Drop for Chain {
     }
 }
 
-/// Waits on a bus for a frame with this identifier and these data.
+/// Waits on a bus for a frame with this identifier and these data; returns the time waited.
 pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     let begun = Instant::now();
     let what = format!("{id:03X}#{data:02X?}");
@@ -87,14 +87,14 @@ pub fn frame(peer: &mut dyn CanBus, id: u32, data: &[u8]) -> Duration {
     begun.elapsed()
 }
 
-/// Waits on a bus for a frame that `is` so.
+/// Waits on a bus for a frame for which `is` returns `true`.
 pub fn frame_when(peer: &mut dyn CanBus, what: &str, is: impl Fn(&CanFrame) -> bool) {
     let mut patience = Patience::begin();
     let mut next = || patience.wait(what, |time| peer.receive(time)).expect("the bus is there");
     while !next().is_some_and(|frame| is(&frame)) {}
 }
 
-/// An agent that ends with the test.
+/// An agent that ends together with its test.
 pub struct Served {
     pub chain: Chain,
     pub tokens: Tokens,
@@ -114,12 +114,12 @@ impl std::ops::Deref for Served {
 }
 
 impl Served {
-    /// Of a simulated chain of so many boards without numbers.
+    /// Starts an agent with a simulated chain of `boards` boards without numbers.
     pub fn start(boards: usize) -> Self {
         Self::start_as(boards, Config::default())
     }
 
-    /// The same of an agent that knows this beforehand.
+    /// Like `start`, with a configuration of the agent.
     pub fn start_as(boards: usize, config: Config) -> Self {
         let chain = Chain::start(boards);
         let dir = tempfile::tempdir().expect("a directory");
@@ -142,12 +142,12 @@ impl Served {
         Self { chain, tokens, log: log_path, http, ended, thread: Some(thread), _dir: dir }
     }
 
-    /// Of a chain with numbers, and who has given them: the lease is held.
+    /// Starts an agent with a numbered chain. Also returns the key of the lease, which is held.
     pub fn numbered(boards: usize) -> (Self, String) {
         Self::numbered_as(boards, Config::default())
     }
 
-    /// The same of an agent that knows this beforehand.
+    /// Like `numbered`, with a configuration of the agent.
     pub fn numbered_as(boards: usize, config: Config) -> (Self, String) {
         let served = Self::start_as(boards, config);
         let key = served.lease("anna", 60.0, "continue");
@@ -156,7 +156,7 @@ impl Served {
         (served, key)
     }
 
-    /// Takes the lease.
+    /// Takes the lease and returns its key.
     pub fn lease(&self, name: &str, lasts_s: f64, policy: &str) -> String {
         let body = json!({ "name": name, "lasts_s": lasts_s, "policy": policy });
         let (status, grant) = self.api("POST /api/lease", None, Some(body));
@@ -164,14 +164,14 @@ impl Served {
         grant["key"].as_str().expect("a key").to_owned()
     }
 
-    /// Begins a job: its number.
+    /// Begins a job and returns its number.
     pub fn begin(&self, request: &str, key: &str, body: Option<Value>) -> u64 {
         let (status, job) = self.api(request, Some(key), body);
         assert_eq!(status, 202, "{request}: {job}");
         job["number"].as_u64().expect("a number")
     }
 
-    /// A job when it is over.
+    /// Waits for the end of a job and returns the job.
     pub fn over(&self, number: u64) -> Value {
         let mut patience = Patience::begin();
         loop {
@@ -184,12 +184,12 @@ impl Served {
         }
     }
 
-    /// Begins a job and waits for its end.
+    /// Begins a job, waits for its end and returns the job.
     pub fn job(&self, request: &str, key: &str, body: Option<Value>) -> Value {
         self.over(self.begin(request, key, body))
     }
 
-    /// Control loops of these boards run, and their outputs are enabled.
+    /// Runs the control loops of these boards with enabled outputs.
     pub fn run(&self, key: &str, boards: &[u8]) {
         let body = json!({ "boards": boards, "active": true });
         let job = self.job("POST /api/run", key, Some(body));
@@ -200,7 +200,7 @@ impl Served {
         self.api(&format!("GET /api/boards/{number}"), None, None).1
     }
 
-    /// The board when it `is` so.
+    /// Waits until `is` returns `true` for the board, and returns the board.
     pub fn board_when(&self, number: u8, what: &str, is: impl Fn(&Value) -> bool) -> Value {
         let mut patience = Patience::begin();
         loop {
@@ -216,7 +216,7 @@ impl Served {
         self.api("GET /api/status", None, None).1["last_event"].as_u64().expect("a number")
     }
 
-    /// Lets the agent end.
+    /// Ends the agent.
     pub fn end(&mut self) {
         self.ended.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {

@@ -31,7 +31,7 @@ pub struct Entry<E> {
 pub struct Excerpt<E> {
     /// Events, oldest first.
     pub events: Vec<Entry<E>>,
-    /// Number to continue from; up to this number there are no further events of the request.
+    /// Number to continue from. The excerpt is complete up to this number.
     pub last: u64,
     /// `true` if some requested events were dropped from the journal.
     pub missed: bool,

@@ -30,10 +30,10 @@ pub struct CommandLog {
     written: Receiver<()>,
     /// Number of lines that wait for the disk.
     waiting: Arc<AtomicUsize>,
-    /// Number of lines that found no place since the last line that did.
+    /// Number of lines that were dropped since the last line that was queued.
     lost: u64,
     lost_in_all: u64,
-    /// Number of lines that the disk did not take.
+    /// Number of lines that the disk did not accept.
     unwritten: Arc<AtomicU64>,
     repeats: Repeats,
 }
@@ -129,7 +129,7 @@ impl CommandLog {
 }
 
 impl CommandLog {
-    /// Returns the number of lines that found no place or that the disk did not take.
+    /// Returns the number of lines that were dropped or that the disk did not accept.
     pub fn lost_in_all(&self) -> u64 {
         self.lost_in_all + self.unwritten.load(Ordering::Relaxed)
     }

@@ -2,9 +2,8 @@
 
 use std::time::Duration;
 
-/// Processor time of this thread. While another program runs on the processor, this clock stands still. The caches that
-/// other programs have filled still slow the thread down, so that the smallest of many measurements is the nearest to
-/// the truth.
+/// Processor time of this thread. The clock stands still while another program runs on the processor. Caches that other programs have
+/// filled still slow the thread down, so the smallest of many measurements is nearest to the true time.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);
 

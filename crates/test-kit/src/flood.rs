@@ -23,8 +23,8 @@ struct Flood {
     reads: bool,
 }
 
-/// Checks that stops of every kind are answered in every flood. `command` is a request that needs the lease, `stops`
-/// are requests that stop something without a lease.
+/// Checks that Stops of every kind are answered in every flood. `command` is a request that needs the lease; `stops` are requests that
+/// stop something without a lease.
 pub fn stops_are_answered_in_every_flood(http: &Http, command: &str, stops: &[&str]) {
     for flood in floods(http, command) {
         answered_in(http, &flood, stops);

@@ -24,7 +24,7 @@ fn shows_variables(line: &str) -> bool {
         .any(|start| line.starts_with(start))
 }
 
-/// Body of a fuzz target; it panics if a promise is broken.
+/// Body of a fuzz target; it panics if a property is violated.
 pub type Body = fn(&[u8]);
 
 /// A fuzz target: the name of its file in `fuzz/fuzz_targets`, and its body.
@@ -33,9 +33,7 @@ pub type Target = (&'static str, Body);
 /// Runs each body over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the file that
 /// runs is printed, so a failing test shows it.
 ///
-/// # Panics
-/// If a body does, if the target does not exist, or if no input is kept for it: a misspelt name would otherwise test
-/// nothing.
+/// If a body panics, if the target does not exist, or if no input is kept for it. Otherwise a misspelt name would test nothing.
 pub fn run_kept_inputs(targets: &[Target]) {
     for (target, body) in targets {
         let files = kept_inputs(target);

@@ -1,18 +1,18 @@
-//! How long tests wait for what they observe: one time, which grows while the computer is late.
+//! Timeouts of tests. All tests wait equally long, and longer while the computer is slow.
 use std::fmt::Display;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Time that a test waits on a computer that is never late.
 const TIME: Duration = Duration::from_secs(60);
-/// Longest time that a test waits, however late the computer is. Reads that block have it as their timeout.
+/// Longest time that a test waits, on any computer. Blocking reads use it as their timeout.
 pub const LONGEST: Duration = Duration::from_secs(300);
 /// Time between two observations.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Seconds that the limit grows for each second that the waiting thread is late.
 const GROWTH: u32 = 4;
 
-/// One wait of a test. A computer that is late with the waiting thread is late with the programs that the test waits for.
+/// Wait of a test. If the computer is late with the waiting thread, it is also late with the programs that the test waits for.
 #[derive(Debug)]
 pub struct Patience {
     begun: Instant,
@@ -25,14 +25,14 @@ impl Patience {
         Self { begun: Instant::now(), late: Duration::ZERO }
     }
 
-    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time is over; `format_args!` is formatted
-    /// only then.
+    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time has passed; `format_args!` is formatted only
+    /// then.
     #[track_caller]
     pub fn pause(&mut self, missing: impl Display) {
         self.wait(missing, std::thread::sleep);
     }
 
-    /// Like `pause`, but waits by `wait`: it blocks for at most the given time, and returns what it observed.
+    /// Like `pause`, but waits with `wait`, which blocks for at most the given time. Returns the result of `wait`.
     #[track_caller]
     pub fn wait<T>(&mut self, missing: impl Display, wait: impl FnOnce(Duration) -> T) -> T {
         let (waited, late) = (self.begun.elapsed(), self.late);
@@ -40,7 +40,7 @@ impl Patience {
         self.slice(wait)
     }
 
-    /// Receives the next value of a channel. Returns `None` when the time is over or no sender is left.
+    /// Receives the next value of a channel. Returns `None` when the time has passed or no sender is left.
     pub fn receive<T>(&mut self, from: &Receiver<T>) -> Option<T> {
         while self.begun.elapsed() < self.limit() {
             match self.slice(|time| from.recv_timeout(time)) {
@@ -63,7 +63,7 @@ impl Patience {
     }
 }
 
-/// Waits until `reached`. Panics with `what` when the time is over.
+/// Waits until `reached` returns `true`. Panics with `what` when the time has passed.
 #[track_caller]
 pub fn until(what: impl Display, mut reached: impl FnMut() -> bool) {
     let mut patience = Patience::begin();

@@ -16,7 +16,7 @@ pub fn listen(cleanup: &CleanupList) -> std::io::Result<Stop> {
     let cleanup = cleanup.clone();
     Stop::listen_with(move || {
         let words = cleanup.words();
-        // Files that were created and not written.
+        // Removes files that were created but not written.
         cli_kit::output_file::abandon();
         print_within(PRINT_TIMEOUT, move || {
             let _ = std::io::stderr().write_all(words.as_bytes());

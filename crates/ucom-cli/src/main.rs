@@ -38,7 +38,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let exit = exit::of(failure.kind);
             if !failure.is_shown() {
-                // Text already in stdout has no reader.
+                // Output already waits in stdout without a reader, so the failure is printed without JSON.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }

@@ -79,7 +79,7 @@ fn a_broken_init_wire_is_reported_with_its_place() {
     assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
 }
 
-/// D-T21: two boards with one flash id are one report and two boards.
+/// D-T21: two boards with one flash id appear as one report and two boards.
 #[test]
 fn d07_equal_flash_ids_are_found_out() {
     let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
@@ -95,7 +95,7 @@ fn status_bits_are_set_and_cleared_by_name() {
     assert_eq!(status["boards"][0]["status_byte"], 0x5B);
     let status = sim.json(&["status", "2", "--clear", "astart"], 0);
     assert_eq!(status["boards"][0]["status_byte"], 0x1B);
-    // D-T8: the walk of the status byte.
+    // D-T8: the status byte through all states.
     let byte = |words: &[&str]| sim.ucom(words).ends(0).json()["boards"][0]["status_byte"].clone();
     assert_eq!(byte(&["--json", "xreset", "1"]), 0x1F);
     assert_eq!(byte(&["--json", "start", "1"]), 0x8B);
@@ -136,7 +136,7 @@ fn names_inputs_and_motion() {
     );
 }
 
-/// P-17, D-08, D-50: while a PC runs the boards a second one is refused; when the first dies the boards become safe.
+/// P-17, D-08, D-50: while a PC runs the boards, a second PC is refused. After the loss of the first PC the boards become safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -225,7 +225,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
     }
 }
 
-/// P-20: a board that reads the protocol differently is measured.
+/// P-20: the probe measures a board that reads the protocol differently.
 #[test]
 fn p20_probe_finds_big_endian_boards() {
     let chain = tempfile::tempdir().unwrap();
@@ -249,7 +249,7 @@ fn an_interrupted_motion_is_stopped() {
     peer.wait("601#01010000");
     peer.wait("381#");
     signal(&moving, "-INT");
-    // Run = 0 of the PC, before the board's time of 1.5 s is over.
+    // Run = 0 of the PC, before the board's own timeout of 1.5 s.
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
@@ -257,7 +257,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(output.code, 0, "{}", output.err);
 }
 
-/// D-15, D-34: an input that is set while our loop does not run is sent alone; other inputs are not written.
+/// D-15, D-34: an input that is set while our loop does not run is sent alone. Other inputs are not written.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -267,7 +267,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     assert_eq!(peer.wait("341#"), "341#0000DC05");
 }
 
-/// D-36: boards with the same image, Program ID and date are not moved by each other's names.
+/// D-36: boards with the same image, Program ID and date are not moved by the names of another such board.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
     let sim = Sim::numbered(&[]);
@@ -316,7 +316,7 @@ fn several_boards_are_changed_only_when_all_answer() {
     sim.ucom(&["init"]).ends(0);
     let output = sim.json(&["status", "1", "--clear", "INIT"], 0);
     assert_eq!(output["boards"][0]["status"], json!(["EXLRUN", "IPINIT"]));
-    // The next board has lost its start signal by this.
+    // Board 2 still has its number, but its application is not started.
     let output = sim.json(&["io", "all"], 4);
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
@@ -326,7 +326,7 @@ fn several_boards_are_changed_only_when_all_answer() {
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);
     let mut peer = sim.peer();
-    // Until they have booted.
+    // Time for the boards to boot.
     peer.all(600);
     peer.send("240#");
     let reports: Vec<String> = peer.all(600).into_iter().filter(|f| f.starts_with("441#")).collect();
@@ -336,7 +336,7 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames are sent unchanged; frames that change boards only with that confirmation, and then all or none.
+/// Single frames are sent unchanged. Frames that change boards need a confirmation, and then all are sent or none.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -367,7 +367,7 @@ fn a_name_given_twice_is_refused() {
     assert!(peer.all(100).iter().all(|f| !f.starts_with("3C1#") && !f.starts_with("341#")));
 }
 
-/// Boards without a number reveal how they report, and no more; the command reports that.
+/// Boards without a number reveal only the form of their reports, and the command says so.
 #[test]
 fn a_probe_of_boards_without_numbers_reports_how_little_it_is() {
     let sim = Sim::start(&["--boards", "2"]);

@@ -53,7 +53,7 @@ fn running_loops_are_stopped_first() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// D-22: the formula, literally; the result that the rules require is shown next to the actual one.
+/// D-22: the formula is applied literally, and the result that the rules require is shown next to the actual one.
 #[test]
 fn d22_raw_status_sets_bits_outside_the_mask() {
     let sim = Sim::numbered(&["--boards", "2"]);

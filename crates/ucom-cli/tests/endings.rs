@@ -68,7 +68,7 @@ fn outputs_that_nobody_reads() {
     ended_by(run, "-INT").ends(0);
 }
 
-/// The first Ctrl-C cancels; the second one ends at once with 5 and shows the remaining steps.
+/// The first Ctrl-C cancels. The second ends the process at once with exit code 5 and shows the remaining steps.
 #[test]
 fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -96,7 +96,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     }
 }
 
-/// Signals that come almost together count as one, and one signal cancels in order.
+/// Signals that come almost together count as one, and one signal cancels in the normal order.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -169,14 +169,14 @@ fn a_reset_of_nobody_is_refused() {
     sim.ucom(&["info", "1"]).ends(0);
 }
 
-/// D-26, D-51: a board that has rebooted during the run counts as lost, and is not reported as stopped: 5, and its
-/// number.
+/// D-26, D-51: a board that has rebooted during the run counts as lost and is not reported as stopped. The exit code is 5, and the
+/// board's number is named.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
     let child = sim.spawn(&["--json", "run", "1,2", "--active", "--on-lost", "report"]);
     sim.peer().wait("602#01010000");
-    // Until the start is over.
+    // Time for the start to end.
     std::thread::sleep(Duration::from_millis(700));
     sim.fault("crash board=2");
     std::thread::sleep(Duration::from_millis(500));
@@ -248,7 +248,7 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
     }
 }
 
-/// No reader of stderr, and a full pipe: the second Ctrl-C ends the process all the same, and so does a failure.
+/// Without a reader of stderr and with a full pipe, the second Ctrl-C ends the process nevertheless, and so does a failure.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -274,8 +274,7 @@ fn a_blocked_stderr_does_not_keep_the_process() {
     }
 }
 
-/// A command that acts on boards completes, and ends with 5 if its result was lost; a command that only prints ends at
-/// once.
+/// A command that acts on boards completes, and ends with exit code 5 if its result was lost. A command that only prints ends at once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
@@ -314,7 +313,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// The second Ctrl-C ends every command in the same way: 5, and the remaining steps.
+/// The second Ctrl-C ends every command in the same way: with exit code 5 and the remaining steps.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -63,8 +63,7 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     }
 }
 
-/// A recorder that is killed loses at most one second, in each format; the missing rest is reported if the format shows
-/// it.
+/// A recorder that is killed loses at most one second in each format. The missing remainder is reported if the format shows it.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -39,7 +39,7 @@ fn d40_a_text_is_never_flashed() {
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// No hint about a damaged record file leads to its characters on the board; `--raw` does not either.
+/// No hint about a damaged record file leads to its characters on the board, and `--raw` does not either.
 #[test]
 fn d46_raw_does_not_flash_records() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -99,8 +99,8 @@ fn count_records_and_gaps() {
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
-/// S-records of the boards' tool chain count words, those of other tools bytes: the records show it, or `--addresses`
-/// sets it.
+/// S-records of the boards' tool chain count words, those of other tools count bytes. The unit follows from the records, or from
+/// `--addresses`.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);

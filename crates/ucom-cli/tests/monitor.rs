@@ -15,7 +15,7 @@ fn monitor(sim: &Sim) -> std::process::Command {
     command
 }
 
-/// At 80 columns flash number, program and status bits are visible, at 40 state, bits and keys; `s` stops all control
+/// At 80 columns flash number, program and status bits are visible; at 40 columns state, bits and keys. The key `s` stops all control
 /// loops.
 #[test]
 fn the_view_shows_boards_and_its_stop_key_stops() {

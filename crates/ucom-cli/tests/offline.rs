@@ -125,7 +125,7 @@ fn files_are_kept_and_nothing_is_made_up() {
         assert_eq!(error["code"], "exists", "{words:?}: {}", output.out);
         assert!(error["hint"].as_str().unwrap().contains("--overwrite"), "{words:?}: {}", output.out);
     }
-    // No board is connected: even with --overwrite there is no data to write.
+    // No board answers here: even with --overwrite no file is written without data.
     for words in [&["--json", "probe", "--out", &toml, "--overwrite"][..], &["--json", "probe"]] {
         let output = ucom(&[words, &bus].concat()).ends(3);
         assert_eq!(output.json()["error"]["code"], "no-boards", "{}", output.out);
@@ -153,7 +153,7 @@ fn wrong_usage_is_json_where_that_is_asked_for() {
     assert!(output.err.contains(".asc") && !file.exists(), "{}", output.err);
 }
 
-/// A recording whose writer was killed: its complete part is reported, and that it is incomplete.
+/// A recording whose writer was killed: its complete part is decoded, and the command reports that it is incomplete.
 #[test]
 fn a_recording_that_is_cut_off_is_decoded_up_to_there() {
     let dir = tempfile::tempdir().unwrap();

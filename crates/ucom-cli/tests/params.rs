@@ -125,14 +125,14 @@ fn outputs_are_opened_before_anything_is_sent() {
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
     assert_eq!(peer.all(100), [""; 0]);
-    // There is no board 9: the files opened for it are removed.
+    // Board 9 does not exist: the files opened for it are removed.
     let file = sim.path("new");
     sim.ucom(&["par", "9", "--save", &file]).ends(3);
     sim.ucom(&["dbc", "9", "--out", &file]).ends(3);
     assert!(!std::path::Path::new(&file).exists());
 }
 
-/// D-35: no answer confirms a parameter, so the application must still answer afterwards; else the value is unknown.
+/// D-35: parameters have no answer, so the application must still answer afterwards. Otherwise the value is unknown.
 #[test]
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();

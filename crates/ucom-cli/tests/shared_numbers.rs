@@ -55,7 +55,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
         "{doctor}"
     );
-    // After a new numbering all is well.
+    // After a new numbering there is no error.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }

@@ -175,7 +175,7 @@ fn running(page: &mut Page) {
         let mut sim = numbered(&["--boards", "2"]);
         let child = sim.start(run);
         sim.peer().wait("382#");
-        // Until the start is over.
+        // Time for the start to end.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
         result_last(of_a_moment(sim.all_of(child)))

@@ -70,13 +70,13 @@ fn d46_refusals_change_nothing() {
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
-    // While a board runs.
+    // Refused while a board runs.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
     ended_by(run, "-INT").ends(0);
     assert_eq!(program_id(&sim, "1"), before);
-    // No such board.
+    // The board does not exist.
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
@@ -121,7 +121,7 @@ fn file_in(sim: &Sim) -> String {
     sim.file("session.bin", &image(4000, 6))
 }
 
-/// P-12: Ctrl-C in mid-block: SETSTATUS(04,00) leaves, exit code 5 after the erase, the board is usable.
+/// P-12: Ctrl-C in the middle of a block: SETSTATUS(04,00) is sent, the exit code after the erase is 5, and the board is usable.
 #[test]
 fn p12_cancel_leaves_the_board_usable() {
     let sim = chain("1");
@@ -139,7 +139,7 @@ fn p12_cancel_leaves_the_board_usable() {
     sim.ucom(&["update", "1", &sim.file("small.bin", &image(2000, 8))]).ends(0);
 }
 
-/// P-13: kill -9 in mid-update, the next run recovers.
+/// P-13: after kill -9 during an update, the next run recovers.
 #[test]
 fn p13_a_killed_update_is_recovered_by_the_next() {
     let sim = chain("1");
@@ -148,8 +148,8 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let update = sim.spawn(&["update", "1", &file]);
     peer.wait_for(1100, "181#");
     ended_by(update, "-KILL");
-    // Frames that the killed process had handed to its adapter are still sent, on a busy machine for some time: until
-    // then it is on the bus.
+    // Frames that the killed process has passed to its adapter are still sent, on a busy machine for some time. Until then another PC is
+    // on the bus.
     while !peer.all(1000).is_empty() {}
     let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
@@ -168,7 +168,8 @@ fn d46_power_loss_in_mid_update() {
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
 
-/// D-46: the bus fails after the erase: exit code 5 and the whole report, with boards that are done; before it: 3.
+/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, with boards that are done. Before the erase the
+/// code is 3.
 #[test]
 fn d46_a_bus_that_fails_leaves_the_report() {
     // READYs of board 2 before the simulator is killed; the first cycle has 961.
@@ -236,7 +237,7 @@ fn d08_a_dry_run_sees_another_pc() {
     assert_eq!(report["boards"][0]["error"]["code"], "foreign-master", "{report}");
 }
 
-/// One transfer for several boards; the board outside the group keeps its program.
+/// A single transfer serves several boards. The board outside the group keeps its program.
 #[test]
 fn d46_a_group_is_one_transfer() {
     let sim = chain("4");
@@ -252,7 +253,7 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// Two images: each goes to the target of the profile's plan, and the report has both; wrong combinations are refused.
+/// Two images: each goes to the target of the profile's plan, and the report has both. Wrong combinations are refused.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();

@@ -41,7 +41,7 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: the same bytes at another address are written; without a record no frame is sent, and no board is verified.
+/// D-62: the same bytes at another address are written. Without a record no frame is sent, and no board is verified.
 #[test]
 fn d62_another_address_is_written() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -89,7 +89,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // The first block of the first cycle: the erase starts only with the second cycle.
+    // This is the first block of the first cycle. The erase begins only with the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());

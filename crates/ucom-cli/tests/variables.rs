@@ -94,7 +94,7 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
         assert!(error["hint"].as_str().unwrap().starts_with("type --"), "{error}");
         assert_eq!(peer.all(50), [""; 0], "{words:?}");
     }
-    // A typed option counts, and the variable is irrelevant; `stop` is never refused.
+    // A typed option counts, and the variable has no effect. `stop` is never refused.
     with(&sim, ("UCOM_COUNT", "x"), &["monitor", "--count", "1"]).ends(0);
     with(&sim, ("UCOM_CONTROL_ONLY", "1"), &["stop", "all"]).ends(0);
 }

@@ -5,9 +5,9 @@ use super::texts::{Texts, latin1};
 use ucom::Dimensions;
 use ucom::node::{Application, Text};
 
-/// From the start of the program until it serves requests, µs.
+/// Time from the start of the program until it serves requests, µs.
 const UP_US: u64 = 60_000;
-/// Longest stretch of time that axes are moved in one go, s.
+/// Longest time for which axes are moved at once, s.
 const MOST_S: f64 = 5.0;
 
 /// Program of a board: its model, connected to the words of the protocol.
@@ -20,7 +20,7 @@ pub(super) struct SimApplication {
     par: Vec<u16>,
     so: Vec<u16>,
     up_at: u64,
-    /// Up to when the model has moved.
+    /// Time up to which the model has moved, µs.
     moved_us: u64,
     running: bool,
     active: bool,
@@ -46,9 +46,9 @@ impl SimApplication {
         }
     }
 
-    /// The axes move whether a program runs or not.
+    /// Moves the axes up to `now_us`, even if no program runs.
     pub fn pass(&mut self, now_us: u64) {
-        // After that time an axis without drive has come to rest.
+        // By then an axis without drive has come to rest.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;

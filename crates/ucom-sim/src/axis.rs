@@ -1,34 +1,34 @@
 //! Motor axis that a board's application moves in a simulated chain.
 use serde::Deserialize;
 
-/// Step of the integration, s. Small against the fastest gains that the words of the protocol can hold.
+/// Step of the integration, s. The step is small compared with the fastest gains that the words of the protocol can hold.
 const STEP_S: f64 = 0.000_5;
 /// Speed below which friction stops the axis, °/s.
 const STANDS_DEG_S: f64 = 0.5;
 /// Ambient temperature, °C.
 pub(super) const AMBIENT_C: f64 = 24.0;
-/// Above this the axis limits its current, °C.
+/// Temperature above which the axis limits its current, °C.
 const HOT_C: f64 = 80.0;
 
 /// Properties of an axis.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct AxisConfig {
-    /// Word before the names of its inputs and outputs; empty on a board with one axis.
+    /// Prefix of the names of its inputs and outputs; empty on a board with one axis.
     pub name: String,
-    /// Stops, degrees.
+    /// Lower stop, degrees.
     pub min_deg: f64,
-    /// Stops, degrees.
+    /// Upper stop, degrees.
     pub max_deg: f64,
     /// Position at power-up, degrees.
     pub start_deg: f64,
-    /// Acceleration by current, °/s² for each mA.
+    /// Acceleration by current, °/s² per mA.
     pub acceleration_per_ma: f64,
     /// Viscous friction, 1/s.
     pub damping_per_s: f64,
     /// Dry friction, °/s².
     pub friction_deg_s2: f64,
-    /// Acceleration by gravity at 90°, °/s²; negative if the axis rights itself.
+    /// Acceleration by gravity at 90°, °/s²; negative if gravity moves the axis upright.
     pub gravity_deg_s2: f64,
 }
 
@@ -47,22 +47,22 @@ impl Default for AxisConfig {
     }
 }
 
-/// The command to the controller of an axis.
+/// Command to the controller of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Command {
-    /// Degrees.
+    /// Set position, degrees.
     pub set_position: f64,
-    /// Share of the largest current, 0..1.
+    /// Share of the largest current, 0 to 1.
     pub stiffness: f64,
-    /// °/s.
+    /// Speed limit, °/s.
     pub speed_limit: f64,
-    /// mA/°.
+    /// Proportional gain, mA/°.
     pub kp: f64,
-    /// mA·s/°.
+    /// Derivative gain, mA·s/°.
     pub kd: f64,
     /// Limits of the set point, degrees.
     pub limits: (f64, f64),
-    /// mA.
+    /// Largest current, mA.
     pub current_max: f64,
 }
 
@@ -70,13 +70,13 @@ pub(super) struct Command {
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     config: AxisConfig,
-    /// Degrees.
+    /// Position, degrees.
     pub position: f64,
-    /// °/s.
+    /// Velocity, °/s.
     pub velocity: f64,
-    /// mA.
+    /// Current, mA.
     pub current: f64,
-    /// °C.
+    /// Temperature, °C.
     pub temperature: f64,
     /// Moving set point, degrees.
     pub reference: f64,
@@ -98,7 +98,7 @@ impl Axis {
         &self.config
     }
 
-    /// Advances the axis; without a command the outputs are safe: no current, and the set point is the position of the axis.
+    /// Advances the axis. Without a command the outputs are safe: the current is 0, and the set point follows the axis.
     pub fn advance(&mut self, seconds: f64, command: Option<&Command>) {
         let mut rest = seconds;
         while rest > 0.0 {
@@ -120,7 +120,7 @@ impl Axis {
             self.velocity = 0.0;
         } else {
             let way = if self.velocity.abs() < STANDS_DEG_S { push } else { self.velocity };
-            // Implicit in the damping: stable for every step.
+            // The damping is integrated implicitly, which is stable for every step.
             let free = self.velocity + dt * (push - c.friction_deg_s2 * way.signum());
             self.velocity = free / (1.0 + dt * c.damping_per_s);
         }
@@ -129,12 +129,12 @@ impl Axis {
             self.position = self.position.clamp(c.min_deg, c.max_deg);
             self.velocity = 0.0;
         }
-        // 2 A settle at some 60 K above ambient, with a time constant of 40 s.
+        // 2 A lead to about 60 K above ambient temperature, with a time constant of 40 s.
         let heat = 15.0 * (self.current / 1000.0).powi(2);
         self.temperature += dt * (heat - (self.temperature - AMBIENT_C)) / 40.0;
     }
 
-    /// The current of a position controller with a set point that moves no faster than allowed.
+    /// Returns the current of a position controller whose set point moves no faster than allowed.
     fn control(&mut self, dt: f64, c: &Command) -> f64 {
         let goal = c.set_position.max(c.limits.0).min(c.limits.1);
         let way = (goal - self.reference).clamp(-c.speed_limit * dt, c.speed_limit * dt);
@@ -168,7 +168,7 @@ mod tests {
         axis.advance(2.0, Some(&COMMAND));
         assert!((axis.position - 20.0).abs() < 1.0, "{}", axis.position);
         assert!(axis.velocity.abs() < 0.1, "{}", axis.velocity);
-        // Beyond the limit it stops at the limit.
+        // A set position beyond the limit moves the axis to the limit.
         axis.advance(5.0, Some(&Command { set_position: 300.0, ..COMMAND }));
         assert!((axis.position - 50.0).abs() < 2.0, "{}", axis.position);
     }
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!((axis.velocity, axis.reference), (0.0, axis.position));
     }
 
-    /// Gains that fit into the words of the protocol never lead to values that are not finite.
+    /// Extreme gains within the words of the protocol never lead to values that are not finite.
     #[test]
     fn wild_gains_stay_finite_and_within_the_stops() {
         let mut axis = Axis::new(&AxisConfig { gravity_deg_s2: 5000.0, ..Default::default() });

@@ -11,17 +11,17 @@ use ucom::node::{Node, NodeConfig, Phase, Pins, Record};
 use ucom::profile::{Endian, HeaderForm};
 use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard, checksum};
 
-/// While a frame waits for the bus, time passes inside the board in steps of this, µs.
+/// Step in which time passes inside the board while a frame waits for the bus, µs.
 const WAIT_US: u64 = 500;
-/// Delay of a board with the number of another one relative to that board, µs: no two boards answer in the same bit time
-/// for long, because such frames destroy each other.
+/// Delay of a board relative to another board with the same number, µs. Two boards that answer in the same bit time would destroy each
+/// other's frames.
 const BEHIND_US: u64 = 5_000;
 
 pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
-    /// First of the chain: the incoming pin is strapped.
+    /// `true` for the first board of the chain, whose incoming pin is strapped active.
     strapped: bool,
-    /// Faults that hold at present.
+    /// Faults that are active.
     pub unpowered: bool,
     pub silent: bool,
     pub deaf: bool,
@@ -30,12 +30,12 @@ pub(super) struct Board {
     behind_us: u64,
     /// Delayed frames, with the time of their reception.
     coming: VecDeque<(u64, u32, Format, Payload)>,
-    /// The frame that waits for the bus.
+    /// Frame that waits for the bus.
     waiting: Option<Frame>,
-    /// An acknowledgement that does not leave.
+    /// Acknowledgement that does not leave the board.
     held: Option<Frame>,
     next_us: u64,
-    /// A state that no board can have, if it occurred.
+    /// State that no board can have, if it occurred.
     pub violation: Option<&'static str>,
 }
 
@@ -104,7 +104,7 @@ impl Board {
     /// Applies the faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // Its controller takes the frame as acknowledged.
+            // The board's controller counts the frame as acknowledged.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -152,7 +152,7 @@ impl Board {
         }
     }
 
-    /// A frame of another member was on the bus.
+    /// Receives a frame of another member from the bus.
     pub fn receive(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) {
         if !self.unpowered && !self.deaf {
             if let (1.., Some(payload)) = (self.behind_us, Payload::new(data)) {
@@ -166,12 +166,12 @@ impl Board {
         }
     }
 
-    /// Level of the outgoing pin.
+    /// Returns the level of the outgoing pin.
     pub fn outgoing(&self) -> bool {
         !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
     }
 
-    /// The wire from the board before has this level; broken or unpowered, it is inactive.
+    /// Sets the level of the wire from the previous board. A broken wire, or one from an unpowered board, is inactive.
     pub fn set_incoming(&mut self, now_us: u64, level: bool) {
         let level = self.strapped || level;
         if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
@@ -206,7 +206,7 @@ impl Board {
         }
     }
 
-    /// Takes this number, as by a PC_INIT that another board has taken already.
+    /// Gives the board this number, as a PC_INIT would that another board has already taken.
     pub fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -217,7 +217,7 @@ impl Board {
             let forget = ToBoard::SetStatus { mask: Status::INIT.0, value: 0 };
             self.node.receive(now_us, &forget.encode(own, &profile));
         }
-        // Only for this moment its incoming pin is active.
+        // The incoming pin is active only for this moment.
         let level = self.node.pins.input.swap(true, Ordering::SeqCst);
         self.node.receive(now_us, &ToBoard::Init.encode(number, &profile));
         self.node.pins.input.store(level, Ordering::SeqCst);
@@ -240,7 +240,7 @@ impl Board {
     }
 }
 
-/// State of a board of the chain; for tests and displays, nothing of it goes over the bus.
+/// State of a board of the chain, for tests and displays. The bus does not carry this state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoardState {
     /// `true` if the board has power.
@@ -253,17 +253,17 @@ pub struct BoardState {
     pub number: Option<u8>,
     /// Program ID and date of the valid application.
     pub program: Option<(u16, u16)>,
-    /// Something drives its axes.
+    /// `true` if the axes are driven.
     pub driven: bool,
 }
 
-/// An application as the factory programs it: made from the description, so that boards have different ones.
+/// Returns an application as the factory programs it. The image is made from the description, so that boards have different applications.
 fn image(config: &BoardConfig) -> Vec<u8> {
     let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();
     image.extend([0, 0]);
     let Some(wanted) = config.program_id else { return image };
-    // The last word adjusts the checksum to the one that the file requires.
+    // The last word adjusts the checksum to the value that the file requires.
     for word in 0..=u16::MAX {
         image.truncate(254);
         image.extend(word.to_le_bytes());

@@ -9,17 +9,17 @@ pub const FAULT_HELP: &str = include_str!("fault.txt");
 pub enum FaultKind {
     /// A board has no power.
     PowerLoss,
-    /// No frame of a board reaches the bus.
+    /// No frame of the board reaches the bus.
     Silent,
-    /// A board receives nothing.
+    /// The board receives no frames.
     Deaf,
-    /// A board's application crashes; it reboots by its watchdog (D-26).
+    /// The application crashes, and the watchdog reboots the board (D-26).
     Crash,
     /// The init wire after a board is broken.
     WireBroken,
-    /// A board takes the number of the one before it, as when a PC_INIT was repeated blindly (D-24).
+    /// A board takes the number of the previous board, as after a blind repetition of PC_INIT (D-24).
     SameNumber,
-    /// A board's acknowledgement of its number does not leave it (D-24).
+    /// The acknowledgement of a board's number does not leave the board (D-24).
     AckHeld,
     /// A board's flash memory cannot be written.
     FlashBroken,
@@ -29,9 +29,9 @@ pub enum FaultKind {
     ForeignFrames,
     /// A share of the frames between chain and clients is lost.
     Lost(f64),
-    /// In a share of the frames a bit is turned over.
+    /// A bit is flipped in a share of the frames.
     Corrupted(f64),
-    /// A share of the frames comes twice.
+    /// A share of the frames is doubled.
     Doubled(f64),
     /// A share of the frames is destroyed on the wire; error counters rise, up to bus-off.
     Disturbed(f64),
@@ -46,7 +46,7 @@ pub enum Trigger {
     Frame {
         /// Identifier.
         id: u16,
-        /// From 1.
+        /// Count, from 1.
         count: u64,
     },
 }
@@ -60,14 +60,14 @@ pub struct Fault {
     pub board: usize,
     /// Trigger.
     pub trigger: Trigger,
-    /// Duration, µs; `None` for ever.
+    /// Duration, µs; `None`: without end.
     pub duration_us: Option<u64>,
 }
 
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
-    /// Not TOML of this form; the text shows the place and the reason.
+    /// The text is not TOML of this form; the message shows the place and the reason.
     #[error("{0}")]
     Form(String),
     /// The kind does not exist.
@@ -88,7 +88,7 @@ pub enum FaultError {
         /// The key.
         key: &'static str,
     },
-    /// A key that means nothing here.
+    /// A key that has no meaning for this kind.
     #[error("fault {fault}: {key} means nothing for {kind}; remove it")]
     Superfluous {
         /// Number in the file, from 1.
@@ -98,7 +98,7 @@ pub enum FaultError {
         /// The key.
         key: &'static str,
     },
-    /// A value that cannot be.
+    /// A value that is out of range.
     #[error("fault {fault}: {key} must be {range}")]
     Range {
         /// Number in the file, from 1.
@@ -110,7 +110,7 @@ pub enum FaultError {
     },
 }
 
-/// The kinds that concern one board.
+/// Kinds that concern one board.
 const OF_A_BOARD: [(&str, FaultKind); 8] = [
     ("power-loss", FaultKind::PowerLoss),
     ("silent", FaultKind::Silent),
@@ -126,10 +126,10 @@ const OF_A_BOARD: [(&str, FaultKind); 8] = [
 const OF_THE_BUS: [(&str, FaultKind); 2] =
     [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
 
-/// The kind with its share, 0 to 1.
+/// Creates a kind from its share, 0 to 1.
 type OfAShare = fn(f64) -> FaultKind;
 
-/// Those that meet a share of the frames.
+/// Kinds that concern a share of the frames.
 const OF_A_SHARE: [(&str, OfAShare); 4] = [
     ("lost", FaultKind::Lost),
     ("corrupted", FaultKind::Corrupted),
@@ -137,7 +137,7 @@ const OF_A_SHARE: [(&str, OfAShare); 4] = [
     ("disturbed", FaultKind::Disturbed),
 ];
 
-/// The names of all kinds.
+/// Returns the names of all kinds.
 fn kinds() -> Vec<&'static str> {
     let whole = OF_A_BOARD.iter().chain(&OF_THE_BUS).map(|(name, _)| *name);
     whole.chain(OF_A_SHARE.map(|(name, _)| name)).collect()
@@ -163,13 +163,13 @@ struct Entry {
 }
 
 impl Fault {
-    /// The faults of a file.
+    /// Reads the faults of a file.
     pub fn from_toml(text: &str) -> Result<Vec<Self>, FaultError> {
         let file: File = toml::from_str(text).map_err(|e| FaultError::Form(e.to_string()))?;
         file.fault.into_iter().enumerate().map(|(i, entry)| entry.checked(i + 1)).collect()
     }
 
-    /// A fault that begins now, of a line such as `power-loss board=2 for_s=1`.
+    /// Reads a fault that begins now from a line such as `power-loss board=2 for_s=1`.
     pub fn from_line(line: &str) -> Result<Self, FaultError> {
         let mut words = line.split_whitespace();
         let kind = words.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Chain files: which boards a simulated chain has, in the order of the wire.
+//! Chain files: the boards of a simulated chain, in the order of the wire.
 
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use ucom::profile::{Profile, ProfileError};
 pub const HEAD: &str = include_str!("head.toml");
 /// Text of `ucom help sim` before the built-in chain.
 const FORM: &str = include_str!("file.txt");
-/// Boards that a bus can number.
+/// Number of boards that a bus can number.
 const MOST_BOARDS: usize = 31;
-/// Axes whose words a DSP of that time could serve.
+/// Number of axes for which a DSP of that time could serve the words.
 const MOST_AXES: usize = 8;
 
 /// Board of a chain.
@@ -28,7 +28,7 @@ pub struct BoardConfig {
     pub date: u16,
     /// `true` if the board has an application.
     pub application: bool,
-    /// Autostart is enabled.
+    /// `true` if autostart is enabled.
     pub autostart: bool,
     /// Axes that its application moves.
     pub axes: Vec<AxisConfig>,
@@ -39,7 +39,7 @@ pub struct BoardConfig {
 /// The boards of a chain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ChainConfig {
-    /// In the order of the wire.
+    /// Boards in the order of the wire.
     pub boards: Vec<BoardConfig>,
 }
 
@@ -51,13 +51,13 @@ pub enum ChainFileError {
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's error.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// Not TOML of this form; the text shows the place and the reason.
+    /// The text is not TOML of this form; the message shows the place and the reason.
     #[error("{0}")]
     Form(String),
-    /// More boards than have numbers.
+    /// More boards than numbers.
     #[error("{count} boards; a bus numbers at most {MOST_BOARDS}")]
     Boards {
         /// Number of boards.
@@ -71,7 +71,7 @@ pub enum ChainFileError {
         /// Number of axes.
         count: usize,
     },
-    /// The figures of an axis cannot be.
+    /// The values of an axis are not possible.
     #[error("board {board}: axis {axis}: {what}")]
     Axis {
         /// Position in the file, from 1.
@@ -91,7 +91,7 @@ pub enum ChainFileError {
         /// Characters.
         count: usize,
     },
-    /// A key of the board's profile.
+    /// A key of the board's profile is not valid.
     #[error("board {board}: profile: {key}: {source}")]
     Profile {
         /// Position in the file, from 1.
@@ -133,7 +133,7 @@ fn nameless() -> String {
     "UCoM2".into()
 }
 
-/// 2008-03-14 as a FAT date.
+/// Returns 2008-03-14 as a FAT date.
 const fn some_day() -> u16 {
     0x386E
 }
@@ -152,7 +152,7 @@ pub fn help() -> String {
 }
 
 impl ChainConfig {
-    /// A chain of a text; boards have `profile` unless they have one of their own.
+    /// Reads a chain from a text. Boards have `profile` unless they have their own.
     pub fn from_toml(text: &str, profile: &Profile) -> Result<Self, ChainFileError> {
         let file: File = toml::from_str(text).map_err(|e| ChainFileError::Form(e.to_string()))?;
         let count = file.board.len();
@@ -164,7 +164,7 @@ impl ChainConfig {
         Ok(Self { boards })
     }
 
-    /// A chain of a file.
+    /// Reads a chain file.
     pub fn read(path: &Path, profile: &Profile) -> Result<Self, ChainFileError> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| ChainFileError::Io { path: path.into(), source })?;
@@ -174,13 +174,13 @@ impl ChainConfig {
         })
     }
 
-    /// The built-in head.
+    /// Returns the built-in head.
     pub fn head(profile: &Profile) -> Self {
-        // The file is part of the program, and a test reads it.
+        // The file is part of the program, and a test reads it, so this cannot fail.
         Self::from_toml(HEAD, profile).unwrap_or_default()
     }
 
-    /// Returns the chain with `count` boards: the last ones left out, or more boards of one axis each.
+    /// Returns the chain with `count` boards: the last ones are left out, or boards with one axis each are added.
     #[must_use]
     pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
         self.boards.truncate(count);
@@ -201,7 +201,7 @@ impl ChainConfig {
         self
     }
 
-    /// Returns the chain with these flash ids along the wire; boards beyond the list keep theirs.
+    /// Returns the chain with these flash ids along the wire. Boards beyond the list keep their flash ids.
     #[must_use]
     pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
         for (board, id) in self.boards.iter_mut().zip(ids) {
@@ -248,7 +248,7 @@ impl Board {
     }
 }
 
-/// `a.b = 1` and `[a] b = 1` are the same key.
+/// Flattens tables: `a.b = 1` and `[a] b = 1` are the same key.
 fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, String)>) {
     for (name, value) in table {
         let name = if prefix.is_empty() { name } else { format!("{prefix}.{name}") };

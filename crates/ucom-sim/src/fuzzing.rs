@@ -3,9 +3,9 @@
 use ucom::node::{Application, Flash, Node, NodeConfig, Phase, Pins, Store};
 use ucom::{Frame, FromBoard, Profile};
 
-/// A board with a history: each step is a byte that defines how much time passes, if the board is asked in that time and
-/// how long the frame is; two bytes of identifier; and up to eight of data. The board never contradicts itself and sends
-/// only allowed frames.
+/// Runs a board through a history. Each step has a byte that defines the time that passes, whether the board is polled in that time, and
+/// the length of the frame. Two bytes of identifier and up to eight of data follow. The board never contradicts itself and sends only
+/// allowed frames.
 pub fn node(data: &[u8]) {
     use crate::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
@@ -36,7 +36,7 @@ pub fn node(data: &[u8]) {
     }
 }
 
-/// Advances the time: polls the board at its deadlines, and puts its frames onto the bus.
+/// Advances the time: polls the board at its deadlines, and puts its frames on the bus.
 fn pass<F: Flash, P: Pins, S: Store, A: Application>(
     board: &mut Node<F, P, S, A>,
     now: &mut u64,

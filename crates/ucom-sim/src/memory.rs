@@ -1,5 +1,5 @@
-//! A board in memory: flash with times and faults, a pin on a wire, a store, and an application that can be
-//! watched. For tests, examples and simulations.
+//! A board in memory: flash with times and faults, a pin on a wire, a store, and an application that records its calls. For tests,
+//! examples and simulations.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,8 +11,8 @@ use crate::texts::Texts;
 
 /// Flash, data flash and exloader RAM in memory.
 ///
-/// Bits can only be cleared by writing, as in a real flash. `fail_after` makes operations fail, `cut_after`
-/// cuts the power inside one: half of it is done, and nothing after it until [`MemoryFlash::power_up`].
+/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power inside one operation:
+/// half of it is done, and no further operation until [`MemoryFlash::power_up`].
 #[derive(Clone, Debug)]
 pub struct MemoryFlash {
     /// Application area of the program flash.
@@ -27,9 +27,9 @@ pub struct MemoryFlash {
     pub write_us: u64,
     /// First operation, counted from 0, that fails; later ones fail, too.
     pub fail_after: Option<u64>,
-    /// The operation, counted from 0, in which the power goes.
+    /// The operation, counted from 0, during which the power is lost.
     pub cut_after: Option<u64>,
-    /// A byte of the program flash that stays erased after any write: only reading back finds it.
+    /// A byte of the program flash that stays erased after every write, which only reading back detects.
     pub stuck_byte: Option<usize>,
     /// Operations started so far.
     pub operations: u64,
@@ -41,7 +41,7 @@ pub struct MemoryFlash {
 }
 
 impl Default for MemoryFlash {
-    /// 32 Ki words of program flash from word 0, 4 Ki words of data flash, 2 Ki words of RAM.
+    /// Returns 32 Ki words of program flash from word 0, 4 Ki words of data flash, and 2 Ki words of RAM.
     fn default() -> Self {
         let area = |words| Area { start: 0, words };
         Self::new(area(0x8000), area(0x1000), area(0x800))
@@ -49,7 +49,7 @@ impl Default for MemoryFlash {
 }
 
 impl MemoryFlash {
-    /// Erased flash with the given areas.
+    /// Creates erased flash with the given areas.
     pub fn new(program: Area, data: Area, ram: Area) -> Self {
         let cells = [program, data, ram].map(|area| vec![0xFF; 2 * area.words as usize]);
         Self {
@@ -83,12 +83,12 @@ impl MemoryFlash {
         self.busy_until = 0;
     }
 
-    /// Everything in a memory, in wire order.
+    /// Returns the contents of a memory in wire order.
     pub fn bytes(&self, memory: Memory) -> &[u8] {
         &self.cells[slot(memory)]
     }
 
-    /// Puts an application there as if it had been programmed.
+    /// Stores an application as if it had been programmed.
     pub fn install(&mut self, record: ucom::node::Record, image: &[u8]) {
         let start = 2 * record.address.saturating_sub(self.program.start) as usize;
         if let Some(place) = self.cells[0].get_mut(start..start + image.len()) {
@@ -97,7 +97,7 @@ impl MemoryFlash {
         }
     }
 
-    /// Starts an operation: 2 does all of it, 1 half, 0 nothing.
+    /// Starts an operation. Returns 2 if all of it is done, 1 for half, 0 for nothing.
     fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
         if self.dark {
             return Err(FlashError);
@@ -192,17 +192,17 @@ impl Flash for MemoryFlash {
     }
 }
 
-/// An init pin on a wire: the outgoing pin of one board is the incoming one of the next.
+/// An init pin on a wire: the outgoing pin of one board is the incoming pin of the next.
 #[derive(Clone, Debug, Default)]
 pub struct WirePins {
-    /// The wire from the board before.
+    /// Wire from the previous board.
     pub input: Arc<AtomicBool>,
-    /// The wire to the next board.
+    /// Wire to the next board.
     pub output: Arc<AtomicBool>,
 }
 
 impl WirePins {
-    /// Pins of a chain; the first incoming pin is strapped active.
+    /// Returns the pins of a chain; the first incoming pin is strapped active.
     pub fn chain(boards: usize) -> Vec<Self> {
         let mut input = Arc::new(AtomicBool::new(true));
         let next = |_| {
@@ -230,7 +230,7 @@ impl Pins for WirePins {
 pub struct MemoryStore {
     /// ASTART.
     pub autostart: bool,
-    /// Latin-1.
+    /// Description, Latin-1.
     pub description: Vec<u8>,
 }
 
@@ -251,7 +251,7 @@ impl Store for MemoryStore {
 /// Application without a process: buffers, texts, and a record of the calls.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryApplication {
-    /// From start to up, µs.
+    /// Time from the start until the application is up, µs.
     pub start_us: u64,
     /// Description, and the names of the inputs, outputs and parameters.
     pub texts: Texts,
@@ -341,7 +341,7 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
-    // The snapshot is what the trait calls so.
+    // The snapshot is named `so` in the trait.
     #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so

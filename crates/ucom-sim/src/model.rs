@@ -30,7 +30,7 @@ pub(super) struct Model {
     par_names: Vec<String>,
     initial_ci: Vec<u16>,
     initial_par: Vec<u16>,
-    /// Set points that were beyond their limits are reported once.
+    /// `true` for set points beyond their limits, which are reported once.
     limited: Vec<bool>,
 }
 
@@ -82,7 +82,7 @@ impl Model {
         &self.initial_par
     }
 
-    /// Advances by `seconds`; outputs are enabled when `active`. Returns a text to be reported, if any.
+    /// Advances by `seconds`, with outputs enabled if `active`. Returns a text to report, if any.
     pub fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
@@ -100,7 +100,7 @@ impl Model {
         reported
     }
 
-    /// The outputs, in the order of their names.
+    /// Returns the outputs in the order of their names.
     pub fn outputs(&self) -> impl Iterator<Item = u16> {
         self.axes.iter().flat_map(|a| {
             [
@@ -114,7 +114,7 @@ impl Model {
     }
 }
 
-/// A figure as a word of 16 bits, two's complement; beyond its range the nearest.
+/// Returns a value as a word of 16 bits in two's complement. A value out of range gives the nearest word.
 fn word(value: f64) -> u16 {
     value.round() as i16 as u16
 }

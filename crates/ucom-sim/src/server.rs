@@ -11,26 +11,26 @@ use ucom::{Format, Frame};
 
 use crate::{ChainSim, Fault};
 
-/// The name of the bus.
+/// Name of the bus.
 const CHANNEL: &str = "can0";
-/// A computer that was busy for longer than this makes virtual time stand still, or boards would lose their PC.
+/// If the computer was busy for longer than this, virtual time stands still. Otherwise boards would lose their PC.
 const CATCH_UP_US: u64 = 200_000;
 
-/// Clients of the socketcand protocol outside, boards inside, and a bus between them, by the clock of this computer.
+/// Server with clients of the socketcand protocol outside, boards inside, and a bus between them, in real time.
 pub struct ChainServer<'a> {
     gateway: SocketcandGateway,
     bus: TimedBus,
     chain: ChainSim,
-    /// The chain's members on the bus, in its order.
+    /// Members of the chain on the bus, in its order.
     inside: Vec<MemberId>,
     clients: BTreeMap<ClientId, MemberId>,
     /// Disconnected clients whose frames still wait for the bus.
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// Frames for clients, made of the last frame on the wire, and the time when it ended, ns.
+    /// Frames for clients, made from the last frame on the wire, and the time when that ended, ns.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
-    /// Clients to which bus-off of their controller was reported.
+    /// Clients that were told about the bus-off of their controllers.
     off: BTreeSet<ClientId>,
     /// Time of the last report that a controller has left the bus, ns.
     off_reported_ns: Option<u64>,
@@ -38,8 +38,8 @@ pub struct ChainServer<'a> {
 }
 
 impl<'a> ChainServer<'a> {
-    /// Listens for clients at an address; port 0 takes a free one. The bus has `bitrate` bit/s and draws by `seed`; `note` takes
-    /// messages for the operator while it serves.
+    /// Listens for clients at an address; port 0 takes a free port. The bus has `bitrate` bit/s and uses the seed `seed`. `note` takes
+    /// messages for the operator while the server runs.
     ///
     /// # Errors
     /// The address cannot be used for listening.
@@ -70,7 +70,7 @@ impl<'a> ChainServer<'a> {
         })
     }
 
-    /// The CAN URL for clients on this host.
+    /// Returns the CAN URL for clients on this host.
     pub fn url(&self) -> String {
         self.gateway.url(CHANNEL)
     }
@@ -95,7 +95,7 @@ impl<'a> ChainServer<'a> {
         let due_us = self.due_us().saturating_sub(self.now_us());
         let mut patience = Duration::from_micros(due_us).min(patience);
         while let Some(event) = self.gateway.next(patience) {
-            // A frame that comes now is on the bus now, not at the time of the last clock reading.
+            // A frame that arrives now is on the bus now, not at the time of the last clock reading.
             let now_us = self.now_us();
             self.advance(now_us);
             self.received(event.client, event.event);
@@ -103,7 +103,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Virtual time by the clock, µs.
+    /// Returns the virtual time by the clock, µs.
     fn now_us(&mut self) -> u64 {
         let now = self.start_us + self.started.elapsed().as_micros() as u64;
         let reached = self.bus.now_ns() / 1000;
@@ -114,13 +114,13 @@ impl<'a> ChainServer<'a> {
         now
     }
 
-    /// Returns the time of the next event without the clients, µs.
+    /// Returns the time of the next event apart from clients, µs.
     fn due_us(&self) -> u64 {
         let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
         bus.min(self.chain.next_due_us())
     }
 
-    /// Lets virtual time pass.
+    /// Advances virtual time.
     fn advance(&mut self, to_us: u64) {
         loop {
             let at_us = self.due_us().clamp(self.bus.now_ns() / 1000, to_us);
@@ -174,9 +174,9 @@ impl<'a> ChainServer<'a> {
                 if let (Some(i), Ok(protocol)) = (board, plain(frame)) {
                     self.chain.sent(i, &protocol);
                 }
-                // Frames of several members that are alike bit for bit are one on the wire (D-07).
+                // Frames of several members that are equal bit for bit are one frame on the wire (D-07).
                 if !self.carried.as_ref().is_some_and(|(at, last, _)| (at, last) == (&event.at_ns, frame)) {
-                    // Frames of clients have already passed these faults before they reached the bus.
+                    // Frames of clients have already passed these faults.
                     let copies = if board.is_some() { through(&mut self.chain, frame) } else { vec![*frame] };
                     self.carried = Some((event.at_ns, *frame, copies));
                 }
@@ -202,7 +202,7 @@ impl<'a> ChainServer<'a> {
         self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
     }
 
-    /// A controller is in another state: a client receives the report that its own has left the bus, and that it is back.
+    /// Handles a change of a controller's state. A client receives reports that its own controller has left the bus, and that it is back.
     fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
         let off = state == ErrorState::BusOff;
         if let Some(client) = self.client_of(member)
@@ -215,8 +215,8 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Reports that a controller has left the bus; it recovers by itself. At most one report per second: on a bad wire this happens
-    /// all the time.
+    /// Reports that a controller has left the bus; it recovers by itself. There is at most one report per second, because a bad wire
+    /// causes bus-off again and again.
     fn report_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
@@ -252,7 +252,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Injects the fault of a line, as `kill 3`, and notes it, or the error in the line.
+    /// Injects the fault in a line, such as `kill 3`. Notes the fault, or the error in the line.
     pub fn fault(&mut self, line: &str) {
         if line.is_empty() {
             return;
@@ -273,12 +273,12 @@ fn through(chain: &mut ChainSim, frame: &CanFrame) -> Vec<CanFrame> {
     chain.through(frame.data()).iter().filter_map(|data| CanFrame::classic(id, data).ok()).collect()
 }
 
-/// A frame of a board as one of the bus.
+/// Converts a frame of a board to a frame of the bus.
 fn on_wire(frame: &Frame) -> Option<CanFrame> {
     CanFrame::classic(Id::standard(frame.id().into()).ok()?, frame.data()).ok()
 }
 
-/// A frame of the bus as a board's.
+/// Converts a frame of the bus to a frame of a board.
 fn plain(frame: &CanFrame) -> Result<Frame, ()> {
     let id = u16::try_from(frame.id().value()).map_err(|_| ())?;
     Frame::new(id, frame.data()).ok_or(())

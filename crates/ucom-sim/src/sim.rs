@@ -24,13 +24,13 @@ pub struct ChainSim {
     random: u64,
     /// Faults that have not begun.
     waiting: Vec<Fault>,
-    /// Faults that hold, and when they end.
+    /// Active faults, and the times when they end.
     holding: Vec<(u64, Fault)>,
-    /// Number of times that each identifier was on the bus; for faults triggered by one.
+    /// Number of times that each identifier was on the bus, for faults triggered by a frame.
     seen: BTreeMap<u16, u64>,
     /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
-    /// Members whose frames in transmission are void: their controller was reset.
+    /// Members whose frames in transmission are void, because their controllers were reset.
     void: Vec<usize>,
     lost: f64,
     corrupted: f64,
@@ -41,7 +41,7 @@ pub struct ChainSim {
 }
 
 impl ChainSim {
-    /// A chain at power-up. `profile` defines how the fault `foreign-master` sends.
+    /// Creates a chain at power-up. `profile` defines how the fault `foreign-master` sends.
     pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
         let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
         let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
@@ -67,7 +67,7 @@ impl ChainSim {
         sim
     }
 
-    /// Boards, and one more.
+    /// Returns the number of boards, plus one.
     pub fn members(&self) -> usize {
         self.boards.len() + 1
     }
@@ -77,12 +77,12 @@ impl ChainSim {
         self.boards.iter().map(Board::state)
     }
 
-    /// A status that no board can have, with the board's position: a mistake in the node (section 4.1).
+    /// Returns a status that no board can have, with the board's position. Such a status shows an error in the node (section 4.1).
     pub fn violation(&self) -> Option<(usize, &'static str)> {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
 
-    /// Returns the time of the next event, µs; a time in the past means at once.
+    /// Returns the time of the next event, µs; a time in the past means "at once".
     pub fn next_due_us(&self) -> u64 {
         let boards = self.boards.iter().map(Board::next_us);
         let begin = self.waiting.iter().filter_map(|fault| match fault.trigger {
@@ -94,7 +94,7 @@ impl ChainSim {
         boards.chain(begin).chain(end).chain(others).min().unwrap_or(u64::MAX)
     }
 
-    /// Time goes on; never back. Members whose queues on the bus must be emptied are returned.
+    /// Advances the time, never backwards. Returns the members whose queues on the bus must be emptied.
     pub fn advance(&mut self, now_us: u64) -> Vec<usize> {
         self.now_us = self.now_us.max(now_us);
         self.faults();
@@ -102,7 +102,7 @@ impl ChainSim {
         std::mem::take(&mut self.void)
     }
 
-    /// The next frame of a member, if it has one now.
+    /// Returns the next frame of a member, if it has one now.
     pub fn poll(&mut self, member: usize) -> Option<Frame> {
         match self.boards.get_mut(member) {
             Some(board) if board.next_us() > self.now_us => None,
@@ -111,7 +111,7 @@ impl ChainSim {
         }
     }
 
-    /// A member's frame was on the bus.
+    /// Reports that a member's frame was on the bus.
     pub fn sent(&mut self, member: usize, frame: &Frame) {
         match self.boards.get_mut(member) {
             Some(board) => board.sent(self.now_us, frame),
@@ -119,31 +119,31 @@ impl ChainSim {
         }
     }
 
-    /// A member's controller gave a frame up.
+    /// Reports that a member's controller gave up a frame.
     pub fn not_sent(&mut self, member: usize, frame: &Frame) {
         if let Some(board) = self.boards.get_mut(member) {
             board.not_sent(self.now_us, frame);
         }
     }
 
-    /// A member receives a frame of any format.
+    /// Passes a frame of any format to a member.
     pub fn receive(&mut self, member: usize, id: u32, format: Format, data: &[u8]) {
         if let Some(board) = self.boards.get_mut(member) {
             board.receive(self.now_us, id, format, data);
         } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
             && let Some(frame) = Frame::new(id, data)
         {
-            // The last member receives each frame but its own once: there they are counted for triggers.
+            // The last member receives each frame except its own once, so frames are counted there for triggers.
             self.count(&frame);
         }
     }
 
-    /// Returns `true` if a member takes part in the bus: without power it does not even acknowledge.
+    /// Returns `true` if a member takes part in the bus. Without power it does not even acknowledge.
     pub fn is_powered(&self, member: usize) -> bool {
         self.boards.get(member).is_none_or(|board| !board.unpowered)
     }
 
-    /// Begins a fault, now or when it is due: the time of its trigger counts from now.
+    /// Begins a fault now or when it is due. The time of its trigger counts from now.
     pub fn inject(&mut self, mut fault: Fault) {
         match &mut fault.trigger {
             Trigger::At(at) => *at += self.now_us,
@@ -152,9 +152,10 @@ impl ChainSim {
         self.waiting.push(fault);
     }
 
-    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients: returns them not at all, once or twice.
+    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients. Returns the data not at all, once or
+    /// twice.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // Always draws the same number of random values: one setting does not change the others' faults.
+        // Always draws the same number of random values, so that one setting does not change the effect of others.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();
@@ -170,7 +171,7 @@ impl ChainSim {
         vec![data; times]
     }
 
-    /// Share of the frames that are destroyed on the wire, 0 to 1: the caller's bus destroys them.
+    /// Returns the share of frames to destroy on the wire, 0 to 1. The caller's bus destroys them.
     pub fn disturbance(&self) -> f64 {
         self.disturbed
     }
@@ -182,7 +183,7 @@ impl ChainSim {
         }
     }
 
-    /// Levels of the init pins along the chain.
+    /// Sets the levels of the init pins along the chain.
     fn wires(&mut self) {
         for i in 1..self.boards.len() {
             let level = self.boards[i - 1].outgoing() && !self.broken[i - 1];
@@ -190,7 +191,7 @@ impl ChainSim {
         }
     }
 
-    /// A board takes the number of the one before it, if that has one.
+    /// Gives a board the number of the previous board, if that has one.
     fn share_number(&mut self, i: usize) {
         let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
         if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
@@ -198,7 +199,7 @@ impl ChainSim {
         }
     }
 
-    /// A number from 0 to below 1.
+    /// Returns a random number from 0 to below 1.
     fn chance(&mut self) -> f64 {
         // xorshift64, Marsaglia 2003.
         self.random ^= self.random << 13;

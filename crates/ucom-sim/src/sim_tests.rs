@@ -1,4 +1,4 @@
-//! Chains in virtual time on a bus of these tests: one frame each 100 µs, the lowest identifier first.
+//! Chains in virtual time on a bus of these tests: one frame per 100 µs, the lowest identifier first.
 use super::*;
 use ucom::node::Phase;
 use ucom::{Format, Frame, Profile};
@@ -85,11 +85,11 @@ fn the_same_seed_gives_the_same_frames() {
     };
     let first = run(1);
     assert!(first.len() > 300 && first == run(1));
-    // Only the back-off of unasked flags is drawn by chance: it moves with the seed.
+    // Only the back-off of unasked flags is random: it depends on the seed.
     assert_ne!(first, run(2));
 }
 
-/// D-26: a board that crashes reports unasked and has no number; the wire after it goes dark.
+/// D-26: a board that crashes reports unasked and has no number; the wire after it becomes inactive.
 #[test]
 fn d26_a_crash_is_one_report_and_a_lost_number() {
     let mut bench = Bench::new(3, "", 1);
@@ -159,7 +159,7 @@ fn faults_between_chain_and_clients_follow_their_shares() {
     assert!(line("lost share=0").iter().all(|f| *f == [vec![0x55; 8]]));
 }
 
-/// D-24: a board that takes the number of the one before it answers to it as well, until the chain is renumbered.
+/// D-24: a board that takes the number of the previous board also answers to it, until the chain is renumbered.
 #[test]
 fn d24_two_boards_with_one_number() {
     let mut bench = Bench::new(3, "", 1);

@@ -16,7 +16,7 @@ pub struct Texts {
 }
 
 impl Texts {
-    /// Texts of a description and names; characters that Latin-1 does not have become `?`.
+    /// Creates texts from a description and names. Characters that Latin-1 does not have become `?`.
     pub fn new<T: AsRef<str>>(application: &str, ci: &[T], so: &[T], par: &[T]) -> Self {
         let list = |names: &[T]| names.iter().map(|name| latin1(name.as_ref())).collect();
         Self { application: latin1(application), ci: list(ci), so: list(so), par: list(par) }
@@ -34,7 +34,7 @@ impl Texts {
     }
 }
 
-/// Characters that Latin-1 does not have become `?`.
+/// Converts to Latin-1. Characters that Latin-1 does not have become `?`.
 pub(super) fn latin1(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(c).unwrap_or(b'?')).collect()
 }

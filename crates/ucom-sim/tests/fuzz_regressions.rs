@@ -1,4 +1,4 @@
-//! The bodies of the fuzz targets over the inputs that are kept, over some made by hand, and over some at random.
+//! Runs the bodies of the fuzz targets on the kept inputs, on some made by hand, and on random ones.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,7 +11,7 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// A number, a start and a run, then the same once more with frames that are too short.
+/// A number, a start and a run, a frame that is too short, and every truncation of this history.
 #[test]
 fn a_history() {
     let mut history = Vec::new();

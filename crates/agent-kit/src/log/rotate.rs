@@ -10,7 +10,7 @@ pub(super) trait Target: Write {
     ///
     /// # Errors
     ///
-    /// There is no room.
+    /// The line does not fit into the file.
     fn make_room(&mut self, _line: usize) -> io::Result<bool> {
         Ok(false)
     }
@@ -48,15 +48,14 @@ impl Target for Rotated {
         if self.length == 0 || self.length.saturating_add(line as u64) <= self.limit / 2 {
             return Ok(false);
         }
-        // A file that is larger than this limit allows comes from an earlier version or another program; it is not
-        // replaced.
+        // A file larger than this limit is from an earlier version or another program and is not replaced.
         if std::fs::metadata(before).is_ok_and(|found| found.is_file() && found.len() > self.limit) {
             let mut kept = before.clone().into_os_string();
             kept.push(format!(".kept-{}", host_kit::unix_time().as_secs()));
             std::fs::rename(before, kept)?;
         }
         match std::fs::rename(path, before) {
-            // The file was moved or removed from outside: the next line begins a new one.
+            // The file was moved or removed by another program: the next line begins a new file.
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             renamed => renamed.map_err(|error| {
                 let (path, before) = (path.display(), before.display());

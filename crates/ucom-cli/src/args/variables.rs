@@ -2,11 +2,11 @@
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Which variables count, and which once did.
+/// Variables in effect, and variables of earlier versions.
 pub const VARIABLES: Variables = Variables {
     json: "UCOM_JSON",
     retired: &[
-        // They made a command reset, number, program, start, move, overrule a check or write over a file.
+        // These variables made a command reset, number, program, start, move, override a check or overwrite a file.
         Retired::less("UCOM_FORCE", "", "force"),
         Retired::less("UCOM_FORCE", "", "overwrite"),
         Retired::less("UCOM_ACTIVE", "run", "active"),
@@ -32,7 +32,7 @@ pub const VARIABLES: Variables = Variables {
         Retired::less("UCOM_SET", "status", "set"),
         Retired::less("UCOM_START", "update", "start"),
         Retired::less("UCOM_UNVERIFIED", "update", "unverified"),
-        // They limited a command, or said what it sends: without them it would do something else.
+        // These variables limited a command, or set the data that it sends. Without them the command would do something else.
         Retired::other("UCOM_ADDRESSES", "update", "addresses"),
         Retired::other("UCOM_CI", "run", "ci"),
         Retired::other("UCOM_COUNT", "", "count"),
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option brings no variable with it that acts: each one is in this list, with the reason why it may exist.
+    /// No new option gets a variable that acts: each variable is in this list, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{Caution, File, Format, Limit, Output, Place, Simulator};

@@ -1,4 +1,4 @@
-//! The commands, one file each or one file a family.
+//! The commands, one file each or one file per family.
 
 mod boards;
 mod chain;

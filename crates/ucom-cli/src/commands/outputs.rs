@@ -12,7 +12,7 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
 
-/// Waits for the reader of stdout while it reads.
+/// Waits until the reader of stdout has read all output, as long as it reads.
 pub fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
@@ -87,13 +87,13 @@ fn head(all: &BTreeMap<u8, Known>) -> Result<String, Failure> {
     Ok(format!("time_s,board,{first}"))
 }
 
-/// A field of a CSV table (RFC 4180).
+/// Returns a field of a CSV table (RFC 4180).
 fn quoted(text: &str) -> String {
     let plain = !text.contains([',', '"', '\n', '\r']);
     if plain { text.into() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
-/// A snapshot as a line.
+/// Returns a snapshot as a line.
 fn row(
     args: &SoArgs,
     all: &BTreeMap<u8, Known>,

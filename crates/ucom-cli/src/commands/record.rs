@@ -45,7 +45,7 @@ impl Silence {
         Self { since: Instant::now(), over: out.is_json() }
     }
 
-    /// Must be called at each poll of the bus; `came`: a frame has arrived.
+    /// Checks for silence; called at each poll of the bus. `came` is `true` if a frame has arrived.
     pub fn look(&mut self, came: bool, out: &Output) {
         if !came && self.since.elapsed() < SILENCE {
             return;

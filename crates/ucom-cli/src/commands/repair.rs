@@ -10,7 +10,7 @@ use ucom_host::session::SessionError;
 use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
-/// Repairs the board; its flash number must be the named one, else that of the inventory.
+/// Repairs the board. Its flash number must be the named one, or else that of the inventory.
 pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {

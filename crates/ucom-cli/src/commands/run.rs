@@ -119,7 +119,7 @@ fn start(
     }
 }
 
-/// Requests the texts of the boards, if wanted.
+/// Requests the texts of the boards, if the user wants them.
 fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), Failure> {
     let on = |wanted: bool| wanted.then_some(true);
     for board in boards.iter().filter(|_| args.debug || args.global_debug) {
@@ -130,7 +130,7 @@ fn want_texts(driver: &mut Driver, args: &RunArgs, boards: &[u8]) -> Result<(), 
     Ok(())
 }
 
-/// Supervises until Ctrl-C, `stop`, the end of the time, or of the last board's loop.
+/// Supervises boards until Ctrl-C, `stop`, the end of the time, or the end of the last board's loop.
 fn supervise(
     driver: &mut Driver,
     args: &RunArgs,

@@ -1,4 +1,4 @@
-//! `ucom sim`: a simulated chain with a server of the socketcand protocol.
+//! `ucom sim`: a simulated chain with a server for the socketcand protocol.
 
 use std::time::Duration;
 

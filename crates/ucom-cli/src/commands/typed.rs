@@ -17,8 +17,8 @@ pub fn typed() -> Receiver<String> {
     receiver
 }
 
-/// Hands over every line until the end, or until `take` returns `false`. A byte that is not text makes an invalid line,
-/// which is reported; a later `stop` is still read.
+/// Passes on every line until the end, or until `take` returns `false`. A byte that is not text makes an invalid line, which is reported.
+/// A later `stop` is still read.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {

@@ -26,7 +26,7 @@ pub fn update(args: &UpdateArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     };
     let targets = targets(args, &numbers)?;
     let several = targets.len() > 1;
-    // Before any question and any frame: images and targets.
+    // Images and targets are shown before any question and any frame.
     files.notes.iter().for_each(|note| driver.note(note.clone()));
     driver.note(format!("onto {}", targets.iter().map(target).collect::<Vec<_>>().join(", ")));
     let options = UpdateOptions {
@@ -102,7 +102,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
     Failure::shown(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
-/// Returns the required flash number of each board: the named one, else that of the inventory.
+/// Returns the required flash number of each board: the named one, or else that of the inventory.
 fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = args.flash_id {
         return match numbers {

@@ -58,7 +58,7 @@ impl<'a> Bar<'a> {
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
             let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
-            // Too many wait: the next step contains the same progress, and more.
+            // If too many steps wait, this one is dropped: the next step contains the same progress, and more.
             let _ = self.steps.try_send(step);
         }
     }
@@ -67,7 +67,7 @@ impl<'a> Bar<'a> {
     pub fn end(self) {
         let Self { steps, ended, .. } = self;
         drop(steps);
-        // The thread never sends; it ends.
+        // The thread sends no message; the channel closes when it ends.
         let _ = ended.recv_timeout(PRINT_TIMEOUT);
     }
 }

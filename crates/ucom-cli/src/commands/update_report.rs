@@ -18,7 +18,7 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
-        // Scripts ask most for the outcome of one board; of several, if it is the same for all.
+        // Scripts mostly read the outcome of one board, or of several boards if it is equal for all.
         "outcome": match report.boards.as_slice() {
             [first, rest @ ..] if rest.iter().all(|b| b.outcome == first.outcome) => json!(first.outcome.name()),
             _ => Value::Null,

@@ -1,4 +1,4 @@
-//! Runs the `ucom` command as a user does, and a simulated chain for it to talk to.
+//! Runs the `ucom` command as a user does, with a simulated chain.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -58,7 +58,7 @@ impl Sim {
         sim
     }
 
-    /// `ucom` on its bus.
+    /// Returns the command `ucom` on its bus.
     pub fn command(&self) -> Command {
         let mut command = command();
         command.env("UCOM_BUS", &self.url).env("UCOM_INVENTORY", self.path("inventory.toml"));
@@ -112,7 +112,7 @@ impl Sim {
         Peer { bus: can_link::open(&self.url).expect("the bus opens") }
     }
 
-    /// Kills it, like a power cut; its directory stays.
+    /// Kills the simulator, as in a power cut. Its directory stays.
     pub fn kill(mut self) -> tempfile::TempDir {
         self.child.kill().expect("kill");
         self.child.wait().expect("it ends");
@@ -213,7 +213,7 @@ pub fn image(bytes: usize, seed: u8) -> Vec<u8> {
     (0..bytes).map(|i| (i * 37 + 11) as u8 ^ seed).collect()
 }
 
-/// The image of the protocol's example, whose Program ID is 0x4B3F.
+/// Returns the image of the protocol's example, whose Program ID is 0x4B3F.
 pub fn golden() -> Vec<u8> {
     (0..1000_usize).map(|i| (37 * i + 11) as u8).collect()
 }

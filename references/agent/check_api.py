@@ -1,11 +1,11 @@
-"""A program that has nothing of ours but the agent's address and docs/openapi.json, against `jtc serve --sim`.
+"""Checks `jtc serve --sim` with clients that know only the agent's address and docs/openapi.json.
 
 usage: check_api.py JTC
 
-A client is generated from the description by openapi-python-client, and a second one is put together by Schemathesis from the same file:
-the first takes the lease, keeps a trajectory, runs, pauses, goes on and reads the result, while another stops it and the commands `jtc
-status`, `jtc monitor` and `jtc traj stop` look and stop from elsewhere; the second sends requests of all kinds, right and wrong, and
-compares every answer with the description. Needs openapi-python-client and schemathesis.
+openapi-python-client generates a first client from the description, and Schemathesis builds a second one from the same file. The first
+takes the lease, stores a trajectory, runs it, pauses, resumes and reads the result. Meanwhile another client stops it, and the commands
+`jtc status`, `jtc monitor` and `jtc traj stop` read and stop it from another terminal. The second sends valid and invalid requests of all
+kinds, and compares every answer with the description. Needs openapi-python-client and schemathesis.
 """
 
 import contextlib
@@ -18,9 +18,9 @@ import urllib.request
 import served
 
 DESCRIPTION = "openapi.json"
-# Bd: a log is there within the time that a request of Schemathesis has.
+# Bd. At this rate a log arrives within the time that a request of Schemathesis may take.
 RATE = "3000000"
-# Of a recording in MCAP, first bytes and last.
+# First and last bytes of a recording in MCAP.
 MCAP = b"\x89MCAP0\r\n"
 
 
@@ -43,7 +43,7 @@ def programs(jtc, directory):
         status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
 
-        # The whole of it: run, pause, slower, on, result.
+        # The whole sequence: run, pause, slower, resume, result.
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=3))
         assert status == 202, job
         number, _ = anna.event("executing")
@@ -57,7 +57,7 @@ def programs(jtc, directory):
             number, event = anna.event("state", number)
             if event.trajectory == "Pause":
                 break
-        # Others look meanwhile, from another terminal.
+        # Other clients read meanwhile, from another terminal.
         shown = run_jtc("status", "--json")
         assert shown.returncode == 0 and json.loads(shown.stdout)["trajectory"] == "Pause", shown
         seen = run_jtc("monitor", "--json", "--count", "20")
@@ -69,14 +69,14 @@ def programs(jtc, directory):
         assert all(joint.max_error_mrad < 20 for joint in done.result.joints), done.result
         assert anna.command("set_speed", body=anna.model("SpeedObject", percent=100))[0] == 204
 
-        # A second one stops it, without a lease; then the command does.
+        # A second client stops the arm without a lease; then the command does.
         for stop in [lambda: bob.ask("stop")[0] == 200, lambda: run_jtc("traj", "stop").returncode == 0]:
-            # What somebody else has stopped is not begun again for three seconds.
+            # After another client's Stop motion requests are refused for three seconds.
             time.sleep(3.2)
             shown = anna.ask("get_status")[1]
             after = shown.last_event
             request = anna.model("RunRequest", trajectory=3, approach=True, repeat=5)
-            # What was asked for before a Stop moves nothing, however late it comes.
+            # A request made before a Stop moves nothing, after any delay.
             status, denied = anna.command("run", body=request, asked_after=shown.last_halt - 1)
             assert status == 409 and denied.code == "denied", denied
             status, job = anna.command("run", body=request, asked_after=shown.last_halt)
@@ -92,8 +92,8 @@ def programs(jtc, directory):
 
 
 def everything_else(jtc, directory):
-    """What a controller is given and asked for beside motions: settings, absent joints, flight recorder, arm, plans."""
-    # The log of the flight recorder takes its time on a slow line.
+    """Requests to a controller other than motions: settings, absent joints, flight recorder, arm, plans."""
+    # Reading the log of the flight recorder takes long on a slow line.
     with served.serving(jtc, directory, "--baud", RATE) as agent:
         anna = served.Generated(served.generated(DESCRIPTION, directory, "whole_arm_client"), agent)
         assert anna.take("anna", lasts_s=60.0).held
@@ -119,7 +119,7 @@ def everything_else(jtc, directory):
             status, found = anna.ask("get_absent")
             assert (status, found.to_dict()) == (200, {"absent": absent}), found
 
-        # The arm as it is, under another name, and as it was.
+        # The arm as it is, then under another name, then as it was.
         status, arm = anna.ask("get_arm")
         assert status == 200 and arm.hash_ == anna.ask("get_info")[1].hash_
         for text in (arm.text.replace('name = "avena"', 'name = "other"', 1), arm.text):
@@ -131,7 +131,7 @@ def everything_else(jtc, directory):
         status, denied = anna.command("put_arm", body=anna.model("ArmRequest", text=arm.text[:1000]))
         assert status == 422 and anna.ask("get_arm")[1].text == arm.text, denied
 
-        # Planned, kept, run; and then in the flight recorder.
+        # The motion is planned, stored and run, and is then in the flight recorder.
         status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
         way = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.3,-0.2,0.2,0,0,0\n0,0,0,0,0,0.2\n"
@@ -141,7 +141,7 @@ def everything_else(jtc, directory):
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=9))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
         assert anna.ask("get_log_status")[1].state == "recording"
-        # Reading it holds up what it records: operators do.
+        # Reading the log stops the recording, so only operators may do that.
         asked = urllib.request.Request(f"{agent.url}/api/log")
         with contextlib.suppress(urllib.error.HTTPError):
             urllib.request.urlopen(asked, timeout=60).close()
@@ -149,7 +149,7 @@ def everything_else(jtc, directory):
         asked.add_header("Authorization", f"Bearer {agent.tokens['operator']}")
         with urllib.request.urlopen(asked, timeout=60) as response:
             log = response.read()
-        # The magic of the format stands at both ends.
+        # The magic bytes of the format are at both ends.
         assert log.startswith(MCAP) and log.endswith(MCAP), log[:20]
         path = directory / "log.mcap"
         path.write_bytes(log)

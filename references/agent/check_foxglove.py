@@ -1,10 +1,10 @@
-"""The client of the Foxglove WebSocket protocol that Foxglove and Lichtblick are built on, with their decoders, at `jtc serve --sim`.
+"""Checks `jtc serve --sim` with the Foxglove WebSocket client and the decoders that Foxglove and Lichtblick are built on.
 
 usage: check_foxglove.py JTC
 
-Its packages come from npm, pinned by foxglove/package-lock.json, and run in the Node.js of the Python environment. It subscribes to every
-channel as those programs do; what it decodes is compared with `/api/status`, while the arm rests and while it moves, for `jtc traj run` and
-for a job of the agent, and its service calls pause and stop the arm.
+The client's packages come from npm, pinned by foxglove/package-lock.json, and run in the Node.js of the Python environment. The client
+subscribes to every channel as those programs do. The decoded messages are compared with `/api/status`, while the arm rests and while it
+moves, for `jtc traj run` and for a job of the agent. The client's service calls pause and stop the arm.
 """
 
 import contextlib
@@ -27,7 +27,7 @@ TOPICS = {"/joint_states", "/joint_commands", "/jtc/control", "/jtc/state", "/ro
 
 
 class Viewer:
-    """The running viewer; what it prints is taken line by line."""
+    """The running viewer; its output is read line by line."""
 
     def __init__(self, process):
         self.process, self.lines = process, queue.Queue()
@@ -39,12 +39,12 @@ class Viewer:
             self.lines.put(json.loads(line))
 
     def forget(self):
-        """Passes over what was received until now."""
+        """Skips everything that was received until now."""
         while not self.lines.empty():
             self.lines.get()
 
     def until(self, wanted):
-        """The first object for which `wanted` returns something, and that."""
+        """Returns the first object for which `wanted` returns something, and that result."""
         end = time.monotonic() + served.PATIENCE_S
         while time.monotonic() < end:
             with contextlib.suppress(queue.Empty):
@@ -55,7 +55,7 @@ class Viewer:
         raise AssertionError("the viewer did not receive it")
 
     def message(self, topic, wanted=lambda message: True):
-        """The next message of a topic that is as wanted."""
+        """Returns the next message of a topic for which `wanted` is true."""
         return self.until(lambda line: line.get("topic") == topic and wanted(line["message"]) and line["message"])
 
     def call(self, service):
@@ -66,13 +66,13 @@ class Viewer:
 
 @contextlib.contextmanager
 def viewing(packages, url):
-    """A viewer at this address of an agent."""
+    """Runs a viewer at this address of an agent."""
     command = [served.SCRIPTS / "node", packages / "viewer.cjs", url.replace("http://", "ws://")]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             viewer = Viewer(process)
             yield viewer
-            # It closes its socket and ends.
+            # The viewer closes its socket and ends.
             process.stdin.close()
             assert process.wait(served.ENDING_S) == 0
             viewer.reader.join()
@@ -81,7 +81,7 @@ def viewing(packages, url):
 
 
 def installed(directory):
-    """The viewer with its packages, as the lock file has them."""
+    """Returns the viewer with its packages, as the lock file has them."""
     packages = directory / "packages"
     shutil.copytree(SOURCE, packages)
     command = [served.SCRIPTS / "npm", "ci", "--ignore-scripts", "--no-fund", "--no-audit", "--silent"]
@@ -91,7 +91,7 @@ def installed(directory):
 
 
 def check_rest(viewer, arm):
-    """Each channel once, of an arm that rests."""
+    """Checks each channel once, with an arm at rest."""
     assert viewer.until(lambda line: line.get("info"))["capabilities"] == ["services"]
     assert set(viewer.until(lambda line: line.get("topics"))) == TOPICS
     urdf = xml.etree.ElementTree.fromstring(viewer.message("/robot_description")["data"])
@@ -114,7 +114,7 @@ def check_rest(viewer, arm):
 
 
 def check_motion(viewer, arm):
-    """Commanded and measured while it moves; its service calls pause and stop."""
+    """Compares commanded and measured positions during a motion, and pauses and stops it by service calls."""
     number = arm.json("POST", "/api/runs", {"trajectory": 3, "repeat": 50})["number"]
     viewer.forget()
     try:
@@ -132,7 +132,7 @@ def check_motion(viewer, arm):
 
 
 def check_commanded(viewer, jtc, directory, agent):
-    """What is commanded while a program of its own moves the arm, by the agent's line."""
+    """Checks the commanded positions while another program moves the arm through the agent."""
     motion = directory / "motion.csv"
     motion.write_text(served.sway(0.2, 4))
     command = [jtc, "traj", "run", motion, "--port", agent.url]

@@ -1,11 +1,11 @@
-"""Programs of other people that watch `jtc serve --sim`: a reader of Prometheus' text format, and a client of the Foxglove WebSocket
-protocol that is written from its specification alone.
+"""Checks `jtc serve --sim` with programs of other projects: a reader of Prometheus' text format, and a client of the Foxglove WebSocket
+protocol that was written from its specification only.
 
 usage: check_metrics.py JTC
 
-The metrics are compared with `/api/status` and with what this script has done; the messages on the Foxglove channels are decoded with the
-schemas that came with them and compared with the same, also while the arm moves. A client that never reads does not disturb another one and
-is put out; pages of origins that are allowed look and do nothing else. Needs prometheus-client, websockets and mcap-ros2-support.
+The metrics are compared with `/api/status` and with the actions of this script. The messages on the Foxglove channels are decoded with
+the schemas that came with them and compared in the same way, also while the arm moves. A client that never reads does not disturb another
+client and is disconnected. Pages of allowed origins have read-only access. Needs prometheus-client, websockets and mcap-ros2-support.
 """
 
 import asyncio
@@ -28,15 +28,15 @@ import served
 
 ORIGIN = "https://app.example"
 NAMES = ["foxglove.websocket.v1", "foxglove.sdk.v1"]
-# One that never reads is put out after 10 s without a pong; the machine may be slow.
+# A client that never reads is disconnected after 10 s without a pong; the machine may be slow.
 GONE_S = 60.0
 
 
 class Agent(served.Requests):
-    """Requests to an agent, and its metrics."""
+    """Sends requests to an agent, and reads its metrics."""
 
     def metrics(self):
-        """Samples by name and labels, as Prometheus would keep them."""
+        """Returns samples by name and labels, as Prometheus would store them."""
         status, text, headers = self.ask("GET", "/metrics")
         assert status == 200 and headers["Content-Type"].startswith("text/plain; version=0.0.4"), (status, headers)
         found = {}
@@ -56,12 +56,12 @@ def states(metrics, name):
 
 
 def check_metrics(arm):
-    """Every number of the page that something else shows, too."""
+    """Compares every number of the page that is also shown elsewhere."""
     for _ in range(20):
         status = arm.json("GET", "/api/status")
         metrics = arm.metrics()
         again = arm.json("GET", "/api/status")
-        # Not where a path ended and was given once more in between.
+        # Skips samples between which a path ended and was sent again.
         (before, point), (after, then) = [(s["controller"]["trajectory"], s["controller"]["point"]) for s in (status, again)]
         if before == after and point <= then:
             break
@@ -110,7 +110,7 @@ class Viewer:
         return self
 
     async def take(self):
-        """The next message: topic, stamp (ns), decoded contents; or nothing, where it was of another kind."""
+        """Returns the next message: topic, stamp (ns), decoded contents; `None` for a message of another kind."""
         message = await asyncio.wait_for(self.socket.recv(), 20)
         if isinstance(message, str):
             message = json.loads(message)
@@ -138,7 +138,7 @@ class Viewer:
         assert message[0] == 1, message[0]
         subscription, stamp = struct.unpack_from("<IQ", message, 1)
         if subscription in self.left:
-            # It was on its way when it was not wanted any more.
+            # The message was sent before the agent received the end of the subscription.
             return None
         topic = self.subscribed[subscription]
         return topic, stamp, self.decode(self.channels[topic], message[13:])
@@ -198,7 +198,7 @@ def socket(url, path="/", token=None, origin=None, **options):
 
 
 async def check_channels(arm):
-    """An arm at rest, by each channel, beside /api/status."""
+    """Compares each channel with /api/status, with an arm at rest."""
     for path, names in [("/", NAMES), ("/api/foxglove", NAMES[1:]), ("/", NAMES[:1])]:
         async with socket(arm.url, path, subprotocols=names) as ws:
             assert ws.subprotocol in names
@@ -220,7 +220,7 @@ async def check_channels(arm):
         joints = arm.json("GET", "/api/status")["controller"]["joints"]
         assert "/joint_commands" not in seen, "nobody has commanded anything"
         assert len(seen["/robot_description"]) == 1, "the description is sent once"
-        # 25 a second at most, and an arm that reports as often.
+        # At most 25 per second, from an arm that reports at least as often.
         count = len(seen["/joint_states"])
         assert 20 <= count <= 5 * 25 + 2, count
         of_states = [stamp for topic, stamp in stamps if topic == "/joint_states"]
@@ -232,7 +232,7 @@ async def check_channels(arm):
         assert list(last.name) == names
         for value, joint in zip(last.position, joints, strict=True):
             assert abs(value - joint["position_rad"]) < 1e-3, (list(last.position), joints)
-        # Each link hangs on one that the description has, and the chain is whole.
+        # The parent of each link is in the description, and the chain is complete.
         transforms = seen["/tf"][-1].transforms
         assert [t.child_frame_id for t in transforms] == links[1:]
         assert [t.header.frame_id for t in transforms] == links[:-1]
@@ -243,12 +243,12 @@ async def check_channels(arm):
         assert words["state"] == "HoldPos" and words["simulated"] and words["errors"] == [], words
         assert seen["/jtc/state"][-1].state == 2
         assert [round(t) for t in seen["/jtc/control"][-1].temperature] == [j["temperature_c"] for j in joints]
-        # A second time only what is asked for.
+        # A second subscription receives only the requested topics.
         for topic in topics:
             await viewer.unsubscribe(topic)
         await viewer.subscribe("/robot_description")
         assert (await viewer.until("/robot_description")).data == seen["/robot_description"][0].data
-        # What makes no sense is refused in words, and goes on.
+        # Invalid messages are refused with a reason, and the connection stays open.
         for wrong in ["{", "[]", '{"op":"subscribe","subscriptions":[{"id":9,"channelId":99}]}', '{"op":"fetchAsset"}']:
             before = len(viewer.warnings)
             await ws.send(wrong)
@@ -259,11 +259,11 @@ async def check_channels(arm):
 
 
 async def check_motion(arm):
-    """An arm that moves: commanded and measured, a client that never reads beside it, a pause and a stop."""
+    """Checks an arm in motion: commanded and measured positions, a client that never reads, a pause and a stop."""
     number = arm.json("POST", "/api/runs", {"trajectory": 3, "repeat": 50})["number"]
     async with socket(arm.url) as ws, socket(arm.url, ping_interval=None, max_queue=1) as deaf:
         viewer = await Viewer.greeted(ws)
-        # It asks for everything, and reads no more.
+        # This client subscribes to all channels and then reads no more.
         channels = (await Viewer.greeted(deaf)).channels.values()
         wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in channels]
         deaf.transport.pause_reading()
@@ -286,14 +286,14 @@ async def check_motion(arm):
         assert len(errors) > 300 and max(errors) < 0.02, (len(errors), max(errors, default=None))
         check_metrics(arm)
         assert max(gaps) < 3, "the one that reads is not disturbed"
-        # In the midst of the path, not while it is given once more.
+        # In the middle of the path, not while it is sent again.
         await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Execute" and 1000 < words["point"] < 3000)
         halt = await viewer.call("pause", 1)
         assert halt["sent"] == "pause"
         await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Pause")
         assert (await viewer.call("stop", 2)) == {"sent": "stop", "halt": halt["halt"] + 1}
         assert await asyncio.to_thread(arm.over, number) == "stopped"
-        # The one that does not read is put out, whatever the system keeps for it.
+        # The client that does not read is disconnected, although the system buffers some data for it.
         end = time.monotonic() + GONE_S
         while arm_sockets(arm.url) > 1 and time.monotonic() < end:
             await viewer.take()
@@ -308,14 +308,14 @@ async def check_motion(arm):
 
 
 def arm_sockets(url):
-    """Connections to the agent that are established, by the system's own list."""
+    """Returns the established connections to the agent, by the system's own list."""
     port = int(url.rsplit(":", 1)[1])
     rows = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
     return sum(row.split()[1].endswith(f":{port:04X}") and row.split()[3] == "01" for row in rows)
 
 
 async def refused(arm, **options):
-    """The status that a socket is refused with."""
+    """Returns the status of a refused socket."""
     try:
         async with socket(arm.url, **options):
             return 101
@@ -324,7 +324,7 @@ async def refused(arm, **options):
 
 
 async def check_origins(arm, tokens, log):
-    """Pages of an allowed origin look, and nothing else; others do not even look."""
+    """Checks that pages of an allowed origin have read-only access, and other pages no access."""
     page = Agent(arm.url, tokens["operator"])
     for path in ("/api/status", "/metrics"):
         status, text, headers = page.ask("GET", path, Origin=ORIGIN)
@@ -361,7 +361,7 @@ async def check_origins(arm, tokens, log):
 
 
 def watched(jtc, directory):
-    """An agent at rest and in motion, and what its metrics count in between."""
+    """Checks an agent at rest and in motion, and the metrics that count meanwhile."""
     log = directory / "commands.jsonl"
     with served.serving(jtc, directory, "--allow-origin", ORIGIN, "--command-log", log) as agent:
         arm = Agent(agent.url, agent.tokens["operator"])

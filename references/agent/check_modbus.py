@@ -1,9 +1,10 @@
-"""A PLC played with pymodbus, against `jtc serve --sim --modbus`: it knows the tables of docs/modbus.md and the HTTP API, no code.
+"""Checks `jtc serve --sim --modbus` with a PLC played by pymodbus, which knows only the tables of docs/modbus.md and the HTTP API.
 
 usage: check_modbus.py JTC
 
-JTC is the command `jtc`. The PLC finds its registers by the names in the page. It recovers the arm, starts trajectory 3, pauses, goes on, changes
-the speed, compares what it reads with /api/status, stops, loses its connection, repeats commands, and writes what is wrong. Needs pymodbus.
+JTC is the command `jtc`. The PLC finds its registers by their names on the page. The PLC recovers the arm, starts trajectory 3, pauses,
+resumes, changes the speed, compares its registers with /api/status, stops, loses its connection, repeats commands, and writes invalid
+values. Needs pymodbus.
 """
 
 import contextlib
@@ -21,17 +22,17 @@ from pymodbus.exceptions import ModbusException
 import served
 
 PAGE = served.DOCS / "modbus.md"
-# One code of each table that is used here, by the page's own numbers.
+# The codes used here, by the numbers in the page's tables.
 DONE, SEQUENCE, VALUE, NO_TRAJECTORY, BUSY, HELD, STOPPED, COIL, NOT_READY = 1, 2, 3, 4, 5, 6, 7, 8, 9
 START, PAUSE, RESUME, STOP, TEACH, TEACH_OFF, PUMP_ON, PUMP_OFF, CLEAR, RECOVER, DEFAULTS, SPEED, RELEASE = range(1, 14)
 RUNNING, FINISHED, STOPPED_JOB, FAILED = 1, 2, 3, 4
-# Long enough for a busy computer; where it is to run out it is short.
+# Long enough for a busy computer; the second value is for tests in which the watchdog expires.
 WATCHDOG_MS, SHORT_MS = 10_000, 2000
 WORDS = {"u16": 1, "u32": 2, "f32": 2}
 
 
 def tables():
-    """Name to (address, count, form) of each table of the page."""
+    """Returns name to (address, count, form) for each table of the page."""
     found, title = {}, None
     for line in PAGE.read_text().splitlines():
         if line.startswith("### "):
@@ -52,7 +53,7 @@ INPUTS_END = max(address + count * WORDS[form] for address, count, form in INPUT
 
 
 class Plc:
-    """A PLC with a connection of its own, that asks ten times a second in the background as a cycle does."""
+    """A PLC with its own connection, which sends ten requests per second in the background, like a PLC cycle."""
 
     def __init__(self, port, cyclic=True):
         self.client = ModbusTcpClient("127.0.0.1", port=port, timeout=5, retries=0)
@@ -69,18 +70,18 @@ class Plc:
             time.sleep(0.1)
 
     def do(self, function, *arguments, **named):
-        """The response of the server; one that is an exception is returned too."""
+        """Returns the response of the server, also if it is an exception."""
         with self.lock:
             return getattr(self.client, function)(*arguments, **named)
 
     def leave(self):
-        """Gone without a word."""
+        """Closes the connection without a message."""
         self.open = False
         with self.lock:
             self.client.close()
 
     def inputs(self):
-        """All input registers by name, from one request."""
+        """Returns all input registers by name, from one request."""
         response = self.do("read_input_registers", 0, count=INPUTS_END)
         assert not response.isError(), response
         words, values = response.registers, {}
@@ -105,7 +106,7 @@ class Plc:
         return self.do("write_coil", COILS[name][0], on)
 
     def command(self, command, trajectory=0, speed=100, repeat=1, approach=0, watchdog=WATCHDOG_MS, policy=1):
-        """Writes all eight registers at once and waits for the answer; returns its result and the registers as they were then."""
+        """Writes all eight registers at once and waits for the answer; returns its result and the registers at that time."""
         sequence = (self.inputs()["acknowledged"] + 1) % 65536
         response = self.write("watchdog_ms", watchdog, policy, trajectory, speed, repeat, approach, command, sequence)
         assert not response.isError(), response
@@ -126,14 +127,14 @@ class Plc:
 
 
 class Agent(served.Requests):
-    """Requests to an agent, and the port of its Modbus server."""
+    """Sends requests to an agent, and knows the port of its Modbus server."""
 
     def __init__(self, agent):
         super().__init__(agent.url, agent.tokens["operator"])
         self.port = int(agent.ready["modbus"].rsplit(":", 1)[1])
 
     def http(self, request, body=None, key=None):
-        """Status and body of the answer."""
+        """Returns status and body of the answer."""
         method, path = request.split(" ")
         status, text, _ = self.ask(method, path, body, **({"Lease-Key": key} if key else {}))
         return status, json.loads(text) if text else None
@@ -145,14 +146,14 @@ class Agent(served.Requests):
 
 @contextlib.contextmanager
 def serving(jtc, directory):
-    """`jtc serve --sim` with a Modbus server."""
+    """Runs `jtc serve --sim` with a Modbus server."""
     options = ["--baud", "921600", "--modbus", "127.0.0.1:0", "--trajectories", directory / "motions"]
     with served.serving(jtc, directory, *options, "--command-log", directory / "commands.jsonl") as agent:
         yield Agent(agent)
 
 
 def motion(seconds, amplitude=0.3):
-    """There and back of two joints, smooth, as CSV."""
+    """Returns a smooth motion of two joints, there and back, as CSV."""
     lines, steps = ["t,q1,q2,q3,q4,q5,q6"], round(seconds / 0.02)
     for n in range(steps + 1):
         q = amplitude * math.sin(math.pi * n / steps) ** 4
@@ -165,7 +166,7 @@ def recover(agent, plc):
     assert result == DONE and now["lease"] == 1, now
     now = plc.job_over()
     assert now["job_stage"] == FINISHED and now["job_error"] == 0, now
-    # "Finished" comes with HoldPos; the drives are all enabled a moment later.
+    # "Finished" comes with HoldPos. All drives are enabled shortly after that.
     plc.until(lambda now: plc.bits()["ready"])
     assert agent.http("GET /api/status")[1]["lease"]["holder"].startswith("the PLC")
     result, now = plc.command(CLEAR)
@@ -173,14 +174,14 @@ def recover(agent, plc):
 
 
 def runs(agent, plc):
-    """Starts, pauses, goes on, changes the speed; what is read is what HTTP says."""
+    """Starts, pauses, resumes and changes the speed; compares the registers with HTTP."""
     assert plc.command(START, trajectory=9)[0] == NO_TRAJECTORY
     result, now = plc.command(START, trajectory=3, approach=1)
     assert result == DONE and now["job"] > 0, now
     job = now["job"]
     plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 2000)
     assert plc.bits()["executing"] and not plc.bits()["ready"]
-    # One thing at a time.
+    # Only one command at a time.
     for other in (START, CLEAR, PUMP_ON, TEACH, RECOVER, RELEASE):
         result, now = plc.command(other, trajectory=3)
         assert result == BUSY and now["job"] == job, (other, now)
@@ -201,7 +202,7 @@ def runs(agent, plc):
     now = plc.job_over()
     assert (now["job"], now["job_stage"], now["job_runs"], now["job_error"]) == (job, FINISHED, 1, 0), now
     assert plc.command(RESUME)[0] == NOT_READY
-    # Finished, and standing: both see the same.
+    # Finished and at rest: registers and HTTP agree.
     time.sleep(0.5)
     controller, positions = agent.joints()
     now = plc.inputs()
@@ -213,7 +214,7 @@ def runs(agent, plc):
 
 
 def repeats(agent, plc):
-    """Nothing moves without a new number, nor with one that is not the next."""
+    """Checks that only the next sequence number starts a motion."""
     now = plc.inputs()
     job, acknowledged = now["job"], now["acknowledged"]
     for sequence in (acknowledged, acknowledged, (acknowledged + 2) % 65536, (acknowledged - 1) % 65536):
@@ -223,7 +224,7 @@ def repeats(agent, plc):
         now = plc.inputs()
         assert now["job"] == job and now["acknowledged"] == acknowledged and now["trajectory_state"] != 3, now
         assert now["result"] == (SEQUENCE if sequence != acknowledged else now["result"]), now
-    # Half of it, in an odd order, is nothing yet; the number makes it a command, once.
+    # A part of the registers, in an unusual order, is not a command yet. The sequence number makes it a command, once.
     for name, value in (("command", START), ("trajectory", 3), ("approach", 1), ("speed", 100)):
         assert not plc.do("write_register", HOLDINGS[name][0], value).isError()
     assert plc.inputs()["job"] == job
@@ -236,13 +237,13 @@ def repeats(agent, plc):
     now = plc.job_over()
     assert now["job"] == job + 1 and now["job_stage"] == STOPPED_JOB, now
     assert plc.command(START, trajectory=3, approach=1)[0] == COIL
-    # The same again is no edge.
+    # A repeated value is not an edge.
     assert not plc.coil("stop", True).isError() and not plc.coil("stop", False).isError()
     plc.until(lambda now: plc.bits()["ready"])
 
 
 def nonsense(agent, plc):
-    """The standard's exceptions; nothing is written by a request that has one."""
+    """Checks the standard's exceptions: a request with an exception writes nothing."""
     before = plc.do("read_holding_registers", 0, count=len(HOLDINGS)).registers
     job = plc.inputs()["job"]
     end = len(HOLDINGS)
@@ -270,7 +271,7 @@ def nonsense(agent, plc):
         response = plc.do(function, *arguments, **named)
         assert response.isError() and response.exception_code == code, (function, arguments, response)
     assert plc.do("read_holding_registers", 0, count=end).registers == before
-    # What pymodbus would never send: half a frame, other protocols, lengths that are none.
+    # Requests that pymodbus never sends: half a frame, other protocols, invalid lengths.
     pieces = [b"\0\1\0\0\0\6\1\5\0\0\1\0", b"\0\1\0\0\0\7\1\x0f\0\0\xff\xff\0", b"\0\1\0\0\0\x09\1\x10\0\0\x80\1\2\0\0"]
     for piece in pieces:
         with socket.create_connection(("127.0.0.1", agent.port), timeout=5) as raw:
@@ -287,7 +288,7 @@ def nonsense(agent, plc):
 
 
 def two(agent, plc):
-    """Another connection reads, stops, and does not command."""
+    """Checks a second connection, which may read and stop, but not command."""
     other = Plc(agent.port, cyclic=False)
     assert plc.command(START, trajectory=3, approach=1)[0] == DONE
     plc.until(lambda now: now["trajectory_state"] == 3)
@@ -298,14 +299,14 @@ def two(agent, plc):
     assert not other.coil("stop", True).isError()
     now = plc.job_over()
     assert now["job_stage"] == STOPPED_JOB, now
-    # As long as it is pressed, and three seconds after that was.
+    # Refused while the coil is set, and for three seconds after that.
     assert plc.command(START, trajectory=3, approach=1)[0] == COIL
     assert not other.coil("stop", False).isError()
     assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
     job = now["job"]
     time.sleep(3.6)
     assert plc.inputs()["job"] == job and plc.inputs()["trajectory_state"] != 3
-    # A Stop by HTTP is somebody else's, too.
+    # A Stop by HTTP counts as another client's as well.
     agent.http("POST /api/stop")
     assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
     time.sleep(3.6)
@@ -313,7 +314,7 @@ def two(agent, plc):
 
 
 def held(agent, plc):
-    """Somebody has the lease by HTTP: nothing of the PLC is done, and its reading goes on."""
+    """Checks that the PLC's commands are refused while an HTTP client holds the lease, and that reading continues."""
     assert plc.command(RELEASE)[0] == DONE and plc.inputs()["lease"] == 0
     grant = agent.http("POST /api/lease", {"name": "anna", "lasts_s": 30})[1]
     assert grant["held"], grant
@@ -322,7 +323,7 @@ def held(agent, plc):
         assert result in (HELD, NOT_READY) and (command in (RESUME,) or result == HELD), (command, now)
         assert now["lease"] == 2 and now["trajectory_state"] != 3, now
     agent.http("DELETE /api/lease", key=grant["key"])
-    # Released, and so without a watchdog: it commands nothing then.
+    # Released and without a watchdog, the PLC cannot command.
     assert plc.command(RELEASE)[0] == DONE
     assert plc.command(PUMP_ON, watchdog=0)[0] == VALUE and plc.inputs()["lease"] == 0
     assert plc.command(PUMP_ON)[0] == DONE
@@ -332,7 +333,7 @@ def held(agent, plc):
     assert plc.command(START, trajectory=3)[0] == NOT_READY
     assert plc.command(TEACH_OFF)[0] == DONE
     plc.until(lambda now: plc.bits()["ready"])
-    # A trajectory that the check refuses: joint and point are numbers.
+    # The check refuses the trajectory; joint and point are in the registers as numbers.
     far = "t,q1,q2,q3,q4,q5,q6\n0,0,9,0,0,0,0\n1,0,9,0,0,0,0\n"
     assert agent.http("PUT /api/trajectories/4", {"name": "far", "text": far})[0] == 200
     assert plc.command(START, trajectory=4)[0] == DONE
@@ -343,11 +344,11 @@ def held(agent, plc):
 
 
 def watchdog(agent, plc):
-    """The connection is lost in a motion: it pauses; the PLC comes again and goes on."""
+    """Loses the connection during a motion, which pauses; then the PLC connects again and resumes."""
     result, now = plc.command(START, trajectory=3, approach=1, watchdog=SHORT_MS)
     assert result == DONE, now
     plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 300)
-    # Somebody who looks all the time keeps nobody else's lease.
+    # A client that only reads, even all the time, does not renew another client's lease.
     viewer = Plc(agent.port)
     job, left = now["job"], time.monotonic()
     plc.leave()
@@ -360,7 +361,7 @@ def watchdog(agent, plc):
     again = Plc(agent.port)
     now = again.inputs()
     assert now["lease"] == 0 and now["job_stage"] == RUNNING, now
-    # The registers are as they were left; what is written again begins nothing.
+    # The registers are unchanged, and writing the same values again begins nothing.
     sequence = again.do("read_holding_registers", HOLDINGS["sequence"][0], count=1).registers[0]
     assert not again.write("watchdog_ms", SHORT_MS, 1, 3, 100, 1, 1, START, sequence).isError()
     assert again.command(RESUME, watchdog=SHORT_MS)[0] == STOPPED, "the watchdog's pause is somebody else's"
@@ -368,20 +369,20 @@ def watchdog(agent, plc):
     assert again.inputs()["trajectory_state"] == 2
     assert again.command(RESUME, watchdog=SHORT_MS)[0] == DONE
     again.until(lambda now: now["trajectory_state"] == 3)
-    # Silent, and connected: that is the same.
+    # A PLC that stays connected but is silent has the same effect.
     again.open = False
     end = time.monotonic() + served.PATIENCE_S
     while agent.joints()[0]["trajectory"] != "Pause":
         assert time.monotonic() < end, "it does not pause"
         time.sleep(0.1)
-    # The command stop ends it.
+    # The command stop ends the motion.
     assert again.command(STOP)[0] == DONE
     now = again.job_over()
     assert (now["job"], now["job_stage"]) == (job, STOPPED_JOB), now
     again.leave()
-    # The watchdog's pause is behind us by more than three seconds then.
+    # After this the hold-off of three seconds after the watchdog's pause has passed.
     time.sleep(3.6)
-    # The other policies: it stops, or goes on to its end.
+    # The other policies: the motion stops, or continues to its end.
     for policy, stage in ((2, STOPPED_JOB), (0, FINISHED)):
         plc = Plc(agent.port)
         assert plc.command(START, trajectory=3, approach=1, watchdog=SHORT_MS, policy=policy)[0] == DONE
@@ -395,14 +396,14 @@ def watchdog(agent, plc):
 
 
 def restarted(jtc, directory, sequence, motions):
-    """An agent that was started again, and a PLC that goes on writing what it wrote before."""
+    """Checks an agent after a restart, with a PLC that continues to write its old registers."""
     with serving(jtc, directory) as agent:
         plc = Plc(agent.port)
         if plc.inputs()["acknowledged"] != (sequence - 1) % 65536:
             assert not plc.write("watchdog_ms", WATCHDOG_MS, 1, 3, 100, 1, 1, START, sequence).isError()
             now = plc.until(lambda now: now["result"] != 0)
             assert now["result"] == SEQUENCE and now["job"] == 0, now
-        # Trajectories outlast it; the arm of this one is not up yet.
+        # Trajectories survive the restart; the arm of this agent is not up yet.
         assert [kept["number"] for kept in agent.http("GET /api/trajectories")[1]] == motions
         plc.until(lambda now: plc.bits()["controller_there"])
         assert plc.command(START, trajectory=3)[0] == NOT_READY
@@ -410,7 +411,7 @@ def restarted(jtc, directory, sequence, motions):
 
 
 def commanded(jtc, directory):
-    """A PLC at an agent from its start to its restart."""
+    """Runs a PLC at an agent from its start to its restart."""
     assert len(COILS) == 2 and len(HOLDINGS) == 8 and len(INPUTS) > 20, MAP
     with serving(jtc, directory) as agent:
         assert agent.http("PUT /api/trajectories/3", {"name": "there and back", "text": motion(6)})[0] == 200

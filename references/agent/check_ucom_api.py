@@ -1,11 +1,11 @@
-"""A program that has nothing of ours but the agent's address and docs/ucom-openapi.json, against `ucom serve --sim`.
+"""Checks `ucom serve --sim` with clients that know only the agent's address and docs/ucom-openapi.json.
 
 usage: check_ucom_api.py UCOM
 
-A client is generated from the description by openapi-python-client, and a second one is put together by Schemathesis from the same file:
-the first takes the lease, numbers the chain, runs boards, gives an input and waits until the axis is there, updates a board, and another
-one stops all of them without a lease; the second sends requests of all kinds, right and wrong, with and without a lease, and compares
-every answer with the description. Needs openapi-python-client and schemathesis.
+openapi-python-client generates a first client from the description, and Schemathesis builds a second one from the same file. The first
+takes the lease, numbers the chain, runs boards, sets an input, waits until the axis is there, and updates a board. Another client stops
+all boards without a lease. The second sends valid and invalid requests of all kinds, with and without a lease, and compares every answer
+with the description. Needs openapi-python-client and schemathesis.
 """
 
 import base64
@@ -21,10 +21,10 @@ def agent(ucom, directory):
 
 
 class Chain(served.Generated):
-    """The generated client, with jobs of boards."""
+    """The generated client, with jobs for boards."""
 
     def job(self, operation, **values):
-        """A job when it is over."""
+        """Runs a job and returns it after its end."""
         status, job = self.command(operation, **values)
         assert status == 202, (operation, status, job)
         return self.over(job.number)
@@ -40,7 +40,7 @@ def programs(ucom, directory):
         job = anna.job("init", body=anna.model("InitRequest"))
         assert job.stage == "finished" and [board.number for board in job.chain.boards] == [1, 2], job
 
-        # Control loops, an input by its name, and the axis that goes there: hundredths of a degree.
+        # Control loops, an input by its name, and the axis that moves there, in hundredths of a degree.
         job = anna.job("run", body=anna.model("RunRequest", boards=[1, 2], active=True))
         assert job.stage == "finished" and all(board.active for board in job.run.boards), job
         status, sent = anna.command("set_input", number=1, name="set_position", body=anna.model("ValueRequest", value=1500))
@@ -56,7 +56,7 @@ def programs(ucom, directory):
             assert time.monotonic() < end, position
             time.sleep(0.05)
 
-        # Somebody else stops all of them, without a lease.
+        # Another client stops all boards, without a lease.
         status, stopped = bob.ask("stop")
         assert status == 200, stopped
         _, event = bob.event("stopped", stopped.last_event)
@@ -64,10 +64,10 @@ def programs(ucom, directory):
         status, boards = bob.ask("list_boards")
         assert [board.state for board in boards] == ["exloader", "exloader"], boards
 
-        # An update, by the checksum of the protocol's page.
+        # An update, with the checksum on the protocol page.
         image = base64.b64encode(bytes((37 * i + 11) % 256 for i in range(1000))).decode()
         request = anna.model("UpdateRequest", boards=[{"board": 2}], image=image, format="bin")
-        # What somebody else begins behind a Stop is refused for three seconds.
+        # After another client's Stop motion requests are refused for three seconds.
         time.sleep(3.2)
         job = anna.job("update", body=request)
         assert job.stage == "finished", job

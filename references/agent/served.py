@@ -1,7 +1,8 @@
-"""What the checks of the agents share: a served arm or chain that ends with its block, and clients that know its HTTP API alone.
+"""Shared code of the agents' checks: a served arm or chain for one `with` block, and clients that know only its HTTP API.
 
-`run` calls the checks of a script and `serving` starts an agent for one. `Requests` reaches it by method and path, `Generated` by the client
-that openapi-python-client makes of the agent's description, and Schemathesis asks everything else (`requests_of_all_kinds`).
+`run` calls the checks of a script, and `serving` starts an agent for one of them. `Requests` sends requests by method and path, and
+`Generated` uses the client that openapi-python-client makes from the agent's description. Schemathesis sends all other requests
+(`requests_of_all_kinds`).
 """
 
 import contextlib
@@ -25,13 +26,13 @@ DOCS = pathlib.Path(__file__).resolve().parents[2] / "docs"
 SCRIPTS = pathlib.Path(sys.executable).parent
 SEED = 20261123
 PATIENCE_S = 60.0
-# From the request to end until the agent has ended.
+# Time from the request to end until the agent has ended.
 ENDING_S = 20.0
 
 
 def run(*checks):
-    """Calls each check with the program that the script is given and an empty folder of its own."""
-    # A script that is terminated leaves its blocks, and so ends the agents that it has started.
+    """Calls each check with the program that the script was given and with its own empty folder."""
+    # A terminated script leaves its `with` blocks, and so ends the agents that it has started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
     program = pathlib.Path(sys.argv[1]).resolve()
     for check in checks:
@@ -43,11 +44,11 @@ def run(*checks):
 class Agent:
     """A running agent."""
 
-    # What it printed when it was ready.
+    # Output of the agent when it was ready.
     ready: dict
-    # By role.
+    # Tokens by role.
     tokens: dict
-    # For commands that are to find the same folders.
+    # Environment for commands that must find the same folders.
     environment: dict
 
     @property
@@ -57,7 +58,8 @@ class Agent:
 
 @contextlib.contextmanager
 def serving(program, directory, *options):
-    """`PROGRAM serve --sim` on a free port, with its folders below `directory`: an `Agent`. It ends with the block, also one that fails."""
+    """Runs `PROGRAM serve --sim` on a free port, with its folders below `directory`, as an `Agent`. The agent ends with the block, even
+    if that fails."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("JTC_", "UCOM_"))}
     for name in ("state", "run", "cache"):
         (directory / name).mkdir(exist_ok=True)
@@ -78,13 +80,13 @@ def serving(program, directory, *options):
             try:
                 ended = process.wait(ENDING_S)
             finally:
-                # One that does not end is not left behind; for one that has ended this is nothing.
+                # Kills an agent that does not end; has no effect on one that has ended.
                 process.kill()
             assert ended == 0, f"the agent ended with {ended}"
 
 
 def over(ask, number):
-    """The job of this number when it is over; `ask` returns its stage and the job as they are now."""
+    """Waits for the end of the job with this number and returns the job; `ask` returns its present stage and the job."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         stage, job = ask()
@@ -95,13 +97,13 @@ def over(ask, number):
 
 
 class Requests:
-    """Requests to an agent by method and path, with a token and, once `key` is set, with a lease."""
+    """Sends requests to an agent by method and path, with a token and, once `key` is set, with a lease."""
 
     def __init__(self, url, token):
         self.url, self.token, self.key = url, token, None
 
     def ask(self, method, path, body=None, **headers):
-        """Status, text and headers of the answer."""
+        """Returns status, text and headers of the answer."""
         data = None if body is None else json.dumps(body).encode()
         headers |= {"Content-Type": "application/json"} if data else {}
         headers |= {"Authorization": f"Bearer {self.token}"} if self.token else {}
@@ -114,13 +116,13 @@ class Requests:
             return error.code, error.read().decode(), error.headers
 
     def json(self, method, path, body=None):
-        """The body of the answer to a request that succeeds."""
+        """Returns the body of the answer to a request that must succeed."""
         status, text, _ = self.ask(method, path, body)
         assert status < 300, (method, path, status, text)
         return json.loads(text) if text else None
 
     def over(self, number):
-        """The stage in which a job ends."""
+        """Waits for the end of a job and returns its stage."""
 
         def ask():
             stage = self.json("GET", f"/api/jobs/{number}")["stage"]
@@ -130,7 +132,7 @@ class Requests:
 
     @contextlib.contextmanager
     def renewing(self):
-        """The lease does not lapse within the block, however long a busy computer takes for it."""
+        """Renews the lease within the block, also on a busy computer."""
         done = threading.Event()
 
         def renew():
@@ -147,7 +149,8 @@ class Requests:
 
 
 def generated(description, directory, name):
-    """The client that openapi-python-client makes of a description in docs/: a package of this name below `directory`, imported."""
+    """Returns the client that openapi-python-client makes from a description in docs/: an imported package of this name below
+    `directory`."""
     command = [SCRIPTS / "openapi-python-client", "generate", "--path", DOCS / description, "--meta", "none"]
     path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"
     subprocess.run(
@@ -161,7 +164,7 @@ def generated(description, directory, name):
 
 
 class Generated:
-    """A generated client with the operator's token, and what every request of it needs."""
+    """A generated client with the operator's token, and the arguments of every request."""
 
     def __init__(self, package, agent):
         client = importlib.import_module(f"{package.__name__}.client")
@@ -170,28 +173,28 @@ class Generated:
         self.key = None
 
     def model(self, kind, **values):
-        """A body of the description's kind."""
+        """Returns a body of a type in the description."""
         return getattr(importlib.import_module(f"{self.package.__name__}.models"), kind).from_dict(values)
 
     def ask(self, operation, **values):
-        """Status and parsed body of an operation."""
+        """Returns status and parsed body of an operation."""
         module = importlib.import_module(f"{self.package.__name__}.api.default.{operation}")
         response = module.sync_detailed(client=self.client, **values)
         return int(response.status_code), response.parsed
 
     def command(self, operation, **values):
-        """The same, with the key of the lease."""
+        """Like `ask`, with the key of the lease."""
         return self.ask(operation, lease_key=self.key, **values)
 
     def take(self, name, **values):
-        """Takes the lease, which later commands are sent with; the grant."""
+        """Takes the lease, which later commands use; returns the grant."""
         status, grant = self.ask("take_lease", body=self.model("LeaseRequest", name=name, **values))
         assert status == 200, grant
         self.key = grant.key
         return grant
 
     def over(self, number, renewing=False):
-        """A job when it is over; a lease that is shorter than the job is to be renewed meanwhile."""
+        """Waits for the end of a job and returns the job; `renewing` renews a lease that is shorter than the job."""
 
         def ask():
             status, job = self.ask("get_job", number=number)
@@ -203,7 +206,7 @@ class Generated:
         return over(ask, number)
 
     def event(self, kind, after=0):
-        """Number and contents of the first event of a kind behind a number: no number is left out."""
+        """Returns number and contents of the first event of a kind after a number; checks that no number is left out."""
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
             status, found = self.ask("get_events", after=after, wait_s=2.0)
@@ -217,9 +220,9 @@ class Generated:
 
 
 def requests_of_all_kinds(description, examples, serve, directory):
-    """Requests that Schemathesis makes of a description in docs/, right and wrong, to an agent that `serve` starts, without a lease and with.
+    """Runs Schemathesis' valid and invalid requests for a description in docs/ on an agent that `serve` starts, with and without a lease.
 
-    Every answer is compared with the description; `examples` is how many requests it makes up for each operation, at the most.
+    Every answer is compared with the description; `examples` is the largest number of generated requests per operation.
     """
     for lease in (False, True):
         with serve() as agent:
@@ -227,10 +230,12 @@ def requests_of_all_kinds(description, examples, serve, directory):
             command = [SCRIPTS / "schemathesis", "run", DOCS / description, "--url", agent.url, "--seed", str(SEED)]
             command += ["-H", f"Authorization: Bearer {token}", "--max-examples", str(examples)]
             command += ["--request-timeout", "15", "--phases", "examples,coverage,fuzzing"]
-            # A body of the right form may be refused for what it says: no trajectory, no image, no payload of a body, no board's number.
+            # A well-formed body may be refused for its contents: no trajectory, no image, no payload of a body, no board with this
+            # number.
             command += ["--exclude-checks", "positive_data_acceptance"]
             if lease:
-                # Whoever has the lease gets further; it cannot be tried without its key then.
+                # The lease holder reaches more code. The lease's own requests are excluded then, because their key is not known to
+                # Schemathesis.
                 grant = Requests(agent.url, token).json("POST", "/api/lease", {"name": "everything", "lasts_s": 60.0})
                 command += ["-H", f"Lease-Key: {grant['key']}", "--exclude-path", "/api/lease"]
             done = subprocess.run(command, capture_output=True, text=True, cwd=directory)
@@ -239,7 +244,8 @@ def requests_of_all_kinds(description, examples, serve, directory):
 
 
 def sway(amplitude, seconds):
-    """A trajectory's text: all joints there and back, at rest at both ends, every 10 ms; made with nothing of ours."""
+    """Returns the text of a trajectory: all joints there and back, at rest at both ends, every 10 ms; written without code of the
+    project."""
     lines = ["t," + ",".join(f"q{j}" for j in range(1, 7))]
     steps = round(100 * seconds)
     for n in range(steps + 1):

@@ -1,12 +1,12 @@
-"""Drives arms of other people's robot descriptions from the URDF to the motion, on a controller that knows another arm.
+"""Drives arms from other projects' robot descriptions, from the URDF to the motion, on a controller with another built-in arm.
 
     python check_driving.py JTC [--board EMULATOR ELF] [--only NAME]
 
-JTC is the command (`cargo build --release -p jtc-cli`). Each description of the package example-robot-data is imported, checked,
-pushed and stored; the controller is switched off and on; its defaults have to be that arm now, to the hash. Then a motion about the
-pose where it stands has to end where it began, with the largest error named, and a joint is jogged. The controller is `jtc sim`,
-whose arm is the imported one and whose controller has the built-in one in it at first; with --board it is the board's own program in
-the emulator, which keeps its flash in a file while it is off. An arm file that differs in one component of gravity is refused by name.
+JTC is the command (`cargo build --release -p jtc-cli`). Each description of the package example-robot-data is imported, checked, pushed
+and stored. Then the controller is switched off and on; its defaults must now be that arm, to the hash. A motion around the present pose
+must end where it began, with the largest error reported, and a joint is jogged. The controller is `jtc sim`, whose arm is the imported
+one and whose controller begins with the built-in arm. With --board the controller is the board's own program in the emulator, which
+stores its flash in a file while it is off. An arm file that differs in one component of gravity is refused, and the error names it.
 """
 
 import argparse
@@ -22,20 +22,20 @@ import tomllib
 
 import descriptions
 
-# Name, file, what to name at the import.
+# Name, file, options of the import.
 ARMS = [
     ("ur5", "ur_description/urdf/ur5_robot.urdf", ["--tip", "ee_link"]),
     ("kinova", "kinova_description/robots/kinova.urdf", []),
     ("z1", "z1_description/urdf/z1.urdf", ["--joints", "joint1,joint2,joint3,joint4,joint5,joint6"]),
 ]
-# rad: a gear without play, an encoder of 16 bits and the proposed gains leave far less; a wrong model leaves more.
+# rad. A gear without play, an encoder of 16 bits and the proposed gains give a far smaller error; a wrong model gives a larger one.
 ERROR_MAX = 0.02
 AMPLITUDE = 0.15
 PATIENCE_S = 60
 
 
 class Controller:
-    """A program behind a pseudo-terminal that is a controller until it is switched off."""
+    """A program at a pseudo-terminal that acts as a controller until it is switched off."""
 
     def __init__(self, program, port):
         self.program = subprocess.Popen([str(word) for word in program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -55,12 +55,12 @@ class Controller:
             self.program.kill()
             raise
         assert self.program.returncode == 0, printed
-        # The emulator reports resets and faults there.
+        # The emulator reports resets and faults in this output.
         assert "reset" not in printed and "fault" not in printed.lower(), printed
 
 
 class Desk:
-    """The command, with one port."""
+    """Runs the command, always with the same port."""
 
     def __init__(self, jtc, port):
         self.jtc, self.port = jtc, port
@@ -76,7 +76,7 @@ class Desk:
 
 
 def motion(path, begin):
-    """Each joint away from where it is and back, at rest at both ends: 4 s, a point each 20 ms."""
+    """Writes a motion of each joint away from its present position and back, at rest at both ends: 4 s, one point every 20 ms."""
     lines = ["t,q1,q2,q3,q4,q5,q6"]
     for n in range(201):
         s = AMPLITUDE * math.sin(math.pi * n / 200) ** 4
@@ -85,7 +85,7 @@ def motion(path, begin):
 
 
 def otherwise(arm, path):
-    """The same arm file with another number in one component of gravity."""
+    """Writes the same arm file with another value in one component of gravity."""
     text = arm.read_text()
     gravity = next(line for line in text.splitlines() if line.strip().startswith("gravity"))
     values = tomllib.loads(gravity.split("#")[0])[gravity.split("=")[0].strip()]
@@ -94,7 +94,7 @@ def otherwise(arm, path):
 
 
 def drive(desk, switch_on, arm, folder):
-    """One arm's whole way; returns the largest error of the motion, rad."""
+    """Takes one arm through all steps; returns the largest error of the motion, rad."""
     with switch_on():
         pushed = desk("arm", "push", arm, "--store")
     with switch_on():
@@ -114,17 +114,17 @@ def drive(desk, switch_on, arm, folder):
         assert error < ERROR_MAX, f"{error} rad"
         jogged = desk("jog", 6, 0.1, "--duration", 1)
         moved = [b - a for a, b in zip(jogged["from_rad"], jogged["to_rad"])]
-        # Its time is the host's, which may be slower than that of the controller.
+        # The duration is measured by the host, whose clock may be slower than the controller's.
         assert moved[5] > 0.05 and all(abs(way) < 0.01 for way in moved[:5]), jogged
         assert pushed["hash"] == desk("info")["hash"], "the stored arm is the one that was pushed"
     return error
 
 
 def largest_error(record):
-    """Of a recorded motion: where the arm was commanded to be less where it was, the most of all joints and times, rad."""
+    """Returns the largest difference between commanded and measured position in a recorded motion, of all joints and times, rad."""
     with record.open() as file:
         rows = csv.DictReader(line for line in file if not line.startswith("#"))
-        # Before the first point nothing is commanded.
+        # The columns are empty before the first point.
         rows = [row for row in rows if row["q1_set_position_rad"]]
     assert len(rows) > 50, f"{len(rows)} statuses of a motion of 4 s"
     return max(abs(float(row[f"q{j}_set_position_rad"]) - float(row[f"q{j}_position_rad"])) for row in rows for j in range(1, 7))

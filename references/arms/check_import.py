@@ -1,11 +1,12 @@
-"""Compares arms that `jtc arm import` makes of other people's robot descriptions with Pinocchio's reading of the same files.
+"""Compares arms that `jtc arm import` makes of other projects' robot descriptions with Pinocchio's reading of the same files.
 
     python check_import.py JTC [--states 40] [--seed N]
 
-JTC is the command (`cargo build --release -p jtc-cli`). The descriptions are those of the package example-robot-data: axes that are
-not z, fixed joints in between, joints without end, grippers that are left out. Pinocchio reads the original file, with all joints but
-the six held at 0; `jtc dynamics` reads the arm file. Gravity, inverse dynamics, mass matrix and forward dynamics have to agree to 1e-9
-of the largest entry (and what right angles that the controller makes exact change), the torques that `jtc arm check` names for its worst poses to 1 mN·m, and it has to take the file. Exit code 1 and the worst case on failure.
+JTC is the command (`cargo build --release -p jtc-cli`). The descriptions are those of the package example-robot-data: axes other than z,
+fixed joints in between, joints without end, grippers that are left out. Pinocchio reads the original file, with all joints but the six
+held at 0; `jtc dynamics` reads the arm file. Gravity, inverse dynamics, mass matrix and forward dynamics must agree to 1e-9 of the
+largest entry, plus the effect of right angles that the controller makes exact. The torques that `jtc arm check` reports for its worst
+poses must agree to 1 mN·m, and the command must accept the file. Exit code 1 and the worst case on failure.
 """
 
 import argparse
@@ -21,12 +22,12 @@ import pinocchio as pin
 import descriptions
 
 LIMIT = 1e-9
-# Relative change of a torque or an acceleration for one of an angle, at most.
+# Largest relative change of a torque or an acceleration for a change of an angle.
 SENSITIVITY = 100.0
-# N·m; positions that hardly matter are put to 0 in the poses that `arm check` names.
+# N·m. In the poses that `arm check` reports, positions with little effect are set to 0.
 HOLDING = 1e-3
 
-# File, joints to name (none: the file holds no others), tip to name.
+# File, joints to name (none: the file holds no other joints), tip to name.
 ARMS = [
     ("ur_description/urdf/ur3_robot.urdf", None, None),
     ("ur_description/urdf/ur5_robot.urdf", None, "ee_link"),
@@ -51,7 +52,8 @@ def run(command, lines=None):
 
 
 def reference(path, joints, gravity, base):
-    """Pinocchio's model of the original with all joints but the six held at 0, its joints in our order, gravity as in the arm file."""
+    """Returns Pinocchio's model of the original, with all joints but the six held at 0, our order of joints, and the arm file's
+    gravity."""
     whole = pin.buildModelFromUrdf(str(path))
     held = [k for k, name in enumerate(whole.names) if k > 0 and name not in joints]
     model = pin.buildReducedModel(whole, held, pin.neutral(whole)) if held else whole
@@ -65,7 +67,7 @@ def reference(path, joints, gravity, base):
 
 
 def configuration(model, joints, q):
-    """Joints without end are a cosine and a sine in Pinocchio."""
+    """Converts joint positions. Pinocchio represents joints without end by a cosine and a sine."""
     full = pin.neutral(model)
     for name, angle in zip(joints, q):
         joint = model.joints[model.getJointId(name)]
@@ -118,7 +120,7 @@ def compare(jtc, folder, rng, states, row):
 
 
 def snapped(angles):
-    """By how much the angles within 2 µrad of a right angle, which count as one (J-40), are off it altogether, rad."""
+    """Returns the sum of the deviations of angles within 2 µrad of a right angle, which count as right angles (J-40), rad."""
     off = np.abs(np.array(angles) - np.round(np.array(angles) / (np.pi / 2)) * (np.pi / 2))
     return off[off < 2e-6].sum()
 
@@ -128,7 +130,7 @@ def symmetric(upper):
 
 
 def worst_holding(model, data, names, holding):
-    """How far the torques that `arm check` gives for its worst poses are from Pinocchio's there, N·m."""
+    """Returns the largest difference between the torques that `arm check` gives for its worst poses and Pinocchio's, N·m."""
     errors = []
     for h in holding:
         torque = pin.computeGeneralizedGravity(model, data, configuration(model, names, h["pose_rad"]))

@@ -1,6 +1,6 @@
-"""Robot descriptions of other people: the URDF files of the package example-robot-data, without its 400 MB of meshes.
+"""Robot descriptions of other projects: the URDF files of the package example-robot-data, without its 400 MB of meshes.
 
-They are downloaded once and kept in the folder that OPENJTC_ROBOTS names, else beside the packages of the virtual environment.
+The files are downloaded once and stored in the folder that OPENJTC_ROBOTS names, or else next to the packages of the virtual environment.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ LIST = pathlib.Path(__file__).resolve().parent.parent / "requirements-robots.txt
 
 
 def folder():
-    """The folder with the descriptions, one folder a robot; made when it is not there yet."""
+    """Returns the folder with the descriptions, one folder per robot; creates it if it is missing."""
     parent = pathlib.Path(os.environ.get("OPENJTC_ROBOTS") or sys.prefix)
     kept = parent / f"robots-{hashlib.sha256(LIST.read_bytes()).hexdigest()[:16]}"
     stamp = kept / "complete"
@@ -32,7 +32,7 @@ def folder():
 
 
 def unpack(files, kept):
-    """The descriptions, and the licences that they come with."""
+    """Unpacks the descriptions and their licences."""
     for name in files.namelist():
         robot = name.partition("/robots/")[2]
         if robot and ".." not in robot and (robot.endswith(".urdf") or robot.endswith("LICENSE")):

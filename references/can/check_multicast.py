@@ -1,4 +1,4 @@
-"""python-can's udp_multicast interface against can-link's: every frame is echoed as it was sent.
+"""Compares python-can's udp_multicast interface with can-link's: every frame is echoed as it was sent.
 
 Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, else built with cargo. Frames
 stay on this host (hop limit 0). Exit code 0: all agreed.
@@ -20,7 +20,7 @@ TIMEOUT_S = 10.0
 
 
 def echoed(bus: can.BusABC) -> can.Message:
-    """The next message that is not our own (python-can receives what it sends)."""
+    """Returns the next message that is not our own (python-can receives what it sends)."""
     end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         try:
@@ -64,7 +64,7 @@ def check(group: str, port: int, seed: int) -> None:
                 wrong = differences(message, echoed(bus))
                 assert not wrong, f"{message}: {wrong}"
                 count += 1
-            # Noise is passed over: what follows is echoed.
+            # Noise is skipped, and the frames after it are echoed.
             send_noise(group, port)
             # A burst stays in order and complete as long as it fits into the receive buffers.
             burst = [can.Message(arbitration_id=0x100, is_extended_id=False, is_fd=True, bitrate_switch=True,

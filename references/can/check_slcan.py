@@ -1,4 +1,4 @@
-"""python-can's slcan interface against can-link's side of an adapter, at a pseudo-terminal.
+"""Compares python-can's slcan interface with can-link's adapter side, at a pseudo-terminal.
 
 Needs python-can and pyserial. The example `slcan_adapter` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all
 agreed.
@@ -36,7 +36,7 @@ def check(path: str, seed: int) -> None:
         assert bus.get_version(TIMEOUT_S) == (10, 13)
         for number in range(BURST):
             bus.send(can.Message(arbitration_id=0x100, is_extended_id=False, data=number.to_bytes(2, "big")))
-            # The line between the two is short: half-way through a burst its answers are taken.
+            # The line between the two has a small buffer, so answers are read half-way through a burst.
             if number % 100 == 99:
                 for before in range(number - 99, number + 1):
                     message = received(bus, TIMEOUT_S)

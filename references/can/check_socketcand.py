@@ -1,4 +1,4 @@
-"""python-can's socketcand interface against can-link's server.
+"""Compares python-can's socketcand interface with can-link's server.
 
 Needs python-can. The example `socketcand_server` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all agreed.
 """
@@ -29,7 +29,7 @@ def same(sent: can.Message, got: can.Message, step: int = 0) -> None:
 
 
 def check_kinds(port: int, rng: random.Random) -> None:
-    """Both directions, every length, both widths of identifiers; bytes from 0 to 255."""
+    """Checks both directions, every length, both widths of identifiers, and bytes from 0 to 255."""
     count = 0
     with connect(port, "can0") as bus:
         for extended, top in ((False, 0x7FF), (True, 0x1FFFFFFF)):
@@ -44,7 +44,7 @@ def check_kinds(port: int, rng: random.Random) -> None:
 
 
 def check_two(port: int) -> None:
-    """Two clients: each receives the other once and itself never, in order, a burst without gaps."""
+    """Checks two clients: each receives the other's frames once and its own never, in order, and a burst without gaps."""
     with connect(port, "can1") as one, connect(port, "can1") as two:
         def send() -> None:
             for number in range(BURST):
@@ -56,7 +56,7 @@ def check_two(port: int) -> None:
             message = received(two, TIMEOUT_S)
             assert message.arbitration_id == 0x100 and bytes(message.data) == number.to_bytes(2, "big"), message
         sender.join()
-        # A frame back: what `one` receives first is this, so none of its own came back.
+        # If this is the first frame that `one` receives, none of its own frames came back.
         two.send(can.Message(arbitration_id=0x200, is_extended_id=False))
         message = received(one, TIMEOUT_S)
         assert message.arbitration_id == 0x200 and message.dlc == 0, message
@@ -64,10 +64,10 @@ def check_two(port: int) -> None:
 
 
 def check_busy(port: int) -> None:
-    """A bus that is never quiet: connecting works and the frames come without gaps.
+    """Checks a bus that is never quiet: connecting works, and the frames come without gaps.
 
-    Between two reads of python-can's constructor a computer that is busy may pause longer than frames are held back; then the
-    client itself refuses. That is tried again.
+    Between two reads of python-can's constructor, a busy computer may pause longer than frames are held back. The client itself then
+    refuses, and the check tries again.
     """
     attempts, connected = 60, 0
     for _ in range(attempts):
@@ -98,7 +98,7 @@ def check_unknown_bus(port: int) -> None:
 
 
 def main() -> int:
-    # A line that is cut between two reads is no news.
+    # python-can's messages about a line that is cut between two reads are of no interest here.
     logging.getLogger("can").setLevel(logging.CRITICAL)
     seed = int(os.environ.get("SEED", random.randrange(2**32)))
     print(f"seed {seed}")

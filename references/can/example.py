@@ -1,4 +1,4 @@
-"""The examples of can-link that the checks talk to."""
+"""The examples of can-link for the checks."""
 
 import os
 import pathlib
@@ -10,7 +10,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def program(name: str) -> list[str]:
-    """The command of an example: taken from $JTC_EXAMPLES, else built with cargo."""
+    """Returns the command of an example, taken from $JTC_EXAMPLES or built with cargo."""
     built = os.environ.get("JTC_EXAMPLES")
     if built and (pathlib.Path(built) / name).exists():
         return [str(pathlib.Path(built) / name)]
@@ -19,7 +19,7 @@ def program(name: str) -> list[str]:
 
 
 def received(bus: can.BusABC, timeout_s: float) -> can.Message:
-    """The next message; python-can returns without one when only a confirmation or a part of a line has come."""
+    """Returns the next message. python-can returns none when only a confirmation or a part of a line has come."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
         message = bus.recv(1.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def read(path):
-    """Joint origins (7×6), links (7×13) and gravity (3) of an arm file."""
+    """Returns joint origins (7×6), links (7×13) and gravity (3) of an arm file."""
     with open(path, "rb") as file:
         arm = tomllib.load(file)
     joints = np.array([j["origin_xyz_m"] + j["origin_rpy_rad"] for j in arm["joint"]], dtype=float)
@@ -18,24 +18,24 @@ def read(path):
 
 
 def right_angles(rpy):
-    """Angles of joint origins; those within 2e-6 rad of a multiple of a right angle are that multiple."""
+    """Returns angles of joint origins; those within 2e-6 rad of a multiple of a right angle become that multiple."""
     quarters = np.round(np.asarray(rpy) / (np.pi / 2)) * (np.pi / 2)
     return np.where(np.abs(rpy - quarters) <= 2e-6, quarters, rpy)
 
 
 def line(kind, *parts):
-    """One line of text; 17 digits, so nothing is lost."""
+    """Returns a line of text, with 17 digits per number so that nothing is lost."""
     return kind + " " + " ".join(repr(float(v)) for p in parts for v in np.ravel(p))
 
 
 def states(rng, count):
-    """Rows of q, qd, qdd, torque, rotor inertia."""
+    """Returns rows of q, qd, qdd, torque, rotor inertia."""
     scale = np.repeat([np.pi, 2.0, 10.0, 50.0], 6)
     return np.hstack([rng.uniform(-1, 1, (count, 24)) * scale, np.full((count, 6), 0.7)])
 
 
 def rpy_matrix(rpy):
-    """Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Returns Rz(yaw) Ry(pitch) Rx(roll)."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(rpy), np.cos(rpy)
     rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
     ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
@@ -44,14 +44,14 @@ def rpy_matrix(rpy):
 
 
 def full_inertia(link):
-    """Inertia about the centre of mass, in the axes of the link frame."""
+    """Returns the inertia about the centre of mass, in the axes of the link frame."""
     xx, xy, xz, yy, yz, zz = link[6:12]
     turn = rpy_matrix(link[3:6])
     return turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
 
 
 def mjcf(joints, links, gravity, armature=None, timestep=0.001, integrator="RK4"):
-    """The arm for MuJoCo: no contacts, no limits, no damping."""
+    """Returns the arm for MuJoCo: no contacts, no limits, no damping."""
 
     def text(values):
         return " ".join(repr(float(v)) for v in values)

@@ -1,11 +1,11 @@
-"""Looks at the machine code of jtc-dynamics for the board: no panic, no branch, how many instructions.
+"""Checks the machine code of jtc-dynamics for the board: no panic, no branch, number of instructions.
 
     python check_codegen.py
 
-Builds the crate for thumbv7em-none-eabihf with target-cpu=cortex-m7 (with it f64 is done in hardware) and reads the
-assembly: the crate may not mention `panicking` anywhere, and the per-tick functions may not contain a call, a fused
-multiply-add or a conditional branch, but for one that closes a loop over the six joints. So every call executes the
-same instructions: constant by construction, and the count printed is exact. Exit code 1 on a finding.
+Builds the crate for thumbv7em-none-eabihf with target-cpu=cortex-m7 (which computes f64 in hardware) and reads the assembly. The crate
+may not mention `panicking` anywhere. The per-tick functions may not contain a call, a fused multiply-add or a conditional branch, except
+one that closes a loop over the six joints. Every call therefore executes the same instructions, and the printed count is exact. Exit code
+1 on a finding.
 """
 
 import glob
@@ -17,7 +17,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TARGET = "thumbv7em-none-eabihf"
-# `inverse` only chooses by the arm's shape, which no tick changes, among the instances of `inverse_of`.
+# `inverse` only selects an instance of `inverse_of` by the arm's shape, which no tick changes.
 STRAIGHT = {"inverse_of": 3, "gravity_torque": 1, "mass_matrix": 1, "forward": 1}
 JOINTS = 6
 
@@ -33,7 +33,7 @@ def assembly():
 
 
 def functions(text):
-    """Instructions and labels of each function `Dynamics::name` and `inverse::name`."""
+    """Yields instructions and labels of each function `Dynamics::name` and `inverse::name`."""
     for match in re.finditer(r"^(_ZN12jtc_dynamics(?:8Dynamics|7inverse)\d+(\w+?)17h\w+):\n(.*?)^\.Lfunc_end", text, re.M | re.S):
         lines = (line.strip() for line in match[3].splitlines())
         yield match[2], [line for line in lines if line and (line[0] not in ".@" or re.match(r"\.LBB\w+:", line))]
@@ -44,7 +44,7 @@ def is_instruction(line):
 
 
 def inspect(body):
-    """Instructions that a call executes (without the clearing of a matrix by `__aeabi_memclr8`), and what is wrong."""
+    """Returns the instructions that a call executes (without the clearing of a matrix by `__aeabi_memclr8`), and the findings."""
     count, findings, loops = sum(map(is_instruction, body)), [], 0
     for place, line in enumerate(body):
         word, *operands = line.split()

@@ -2,11 +2,11 @@
 
     python check_pinocchio.py PROGRAM [--models 100] [--states 20] [--seed N]
 
-PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example
-reference`). Every model has random joint origins, masses, inertias and gravity; a share of them has parallel, nearly
-parallel, antiparallel or crossing axes, and every other one carries a payload at its flange (J-60); angles next to a right
-angle are taken as J-40 takes them. Each result has to
-agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on failure.
+PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example reference`). Every model
+has random joint origins, masses, inertias and gravity. A share of the models has parallel, nearly parallel, antiparallel or crossing
+axes, and every second model carries a payload at its flange (J-60). Angles close to a right angle are taken as J-40 takes them. Each
+result must agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on
+failure.
 """
 
 import argparse
@@ -22,7 +22,7 @@ SHAPES = [("inverse", 6), ("gravity", 6), ("mass matrix", 36), ("forward, rotors
 
 
 def random_inertia(rng):
-    """Six numbers of an inertia that a body can have: that of some random points."""
+    """Returns six numbers of a possible inertia of a body: that of some random points."""
     points = rng.normal(size=(8, 3)) * rng.uniform(0.02, 0.3)
     cov = points.T @ points / 8 * rng.uniform(0.2, 8.0)
     j = np.trace(cov) * np.eye(3) - cov
@@ -46,7 +46,7 @@ def random_model(rng):
 
 
 def random_payload(rng):
-    """Mass, centre of mass and inertia about it, in the flange frame."""
+    """Returns mass, centre of mass and the inertia about it, in the flange frame."""
     return np.r_[rng.uniform(0.1, 8), rng.uniform(-0.3, 0.3, 3), random_inertia(rng)]
 
 

@@ -1,9 +1,10 @@
-"""A host program of its own, with pyserial, against `jtc sim`: it shares no code with the project and knows the protocol page only.
+"""Checks `jtc sim` with a separate host program on pyserial, which shares no code with the project and is written from the protocol page
+only.
 
 usage: check_serial_host.py JTC
 
-JTC is the command `jtc`. The host behaves as the known ones do: it waits for the one-shot record of each frame, sends segments of
-500 points, polls the trajectory state, and takes a status apart by its offsets. Needs pyserial.
+JTC is the command `jtc`. The host behaves as the known hosts do: it waits for the one-shot record of each frame, sends segments of 500
+points, polls the trajectory state, and reads a status by its offsets. Needs pyserial.
 """
 
 import math
@@ -55,7 +56,7 @@ class Host:
         self.statuses = 0
 
     def status(self):
-        """The next status; whatever is no status is a failure."""
+        """Returns the next status; any other data are a failure."""
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
             while len(self.held) >= 4:
@@ -74,7 +75,7 @@ class Host:
         raise AssertionError("the controller is silent")
 
     def ask(self, data, expect=(1, 1)):
-        """Sends a frame and waits for its record, which has to come exactly once."""
+        """Sends a frame and waits for its record, which must come exactly once."""
         self.port.write(data)
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
@@ -97,7 +98,7 @@ class Host:
 
 
 def motion():
-    """2 s of a smooth swing of all joints, a point each 2 ms: 1,001 points."""
+    """Returns 2 s of a smooth swing of all joints, one point every 2 ms: 1,001 points."""
     points = []
     for i in range(1001):
         t = i * 0.002
@@ -119,14 +120,14 @@ def session(host):
     for kind in (0x0F, 0x08, 0x0A):
         host.ask(frame(kind))
     host.until("HoldPos", lambda s: s.state == "HoldPos")
-    # Refusals: a wrong CRC, an unknown type, a trajectory that begins in its middle, execution of nothing.
+    # Refusals: a wrong CRC, an unknown type, a trajectory that begins in its middle, an Execute without a trajectory.
     broken = bytearray(frame(0x08))
     broken[-1] ^= 1
     host.ask(bytes(broken), expect=(4, 0))
     points = motion()
     head = lambda segment, segments: struct.pack(">4H", 3, segment, segments, 2)
     host.ask(frame(0x04, head(1, 3) + points[0]), expect=(1, 4))
-    # An existing host knows no data status above 6 (J-51): "not allowed" is 6 to it.
+    # An existing host knows no data status above 6 (J-51), so "not allowed" is 6 for it.
     host.ask(frame(0x0B, b"\x03"), expect=(1, 6))
     chunks = [b"".join(points[i : i + 500]) for i in range(0, len(points), 500)]
     for number, chunk in enumerate(chunks):

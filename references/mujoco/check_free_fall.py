@@ -1,10 +1,10 @@
-"""Free fall of random arms: the simulator's integration against MuJoCo's RK4, both in steps of 1 ms.
+"""Compares the free fall of random arms: the simulator's integration and MuJoCo's RK4, both in steps of 1 ms.
 
 Usage: python check_free_fall.py [PROGRAM] [--seed N] [--arms N]
 PROGRAM is the built example `free_fall` of jtc-sim; without it, cargo builds and runs it.
 
-Each arm (random kinematics, masses, inertias, rotor inertias, gravity and state) falls for a second without friction
-and without drives; joint positions must agree to 1e-9 rad. Exits with 1 when they do not.
+Each arm (random kinematics, masses, inertias, rotor inertias, gravity and state) falls for a second without friction and without drives.
+The joint positions must agree to 1e-9 rad, otherwise the exit code is 1.
 """
 import argparse
 import pathlib
@@ -20,7 +20,7 @@ TOLERANCE_RAD = 1e-9
 
 
 def rotation(rpy):
-    """Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Returns Rz(yaw) Ry(pitch) Rx(roll)."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     return np.array([
         [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -36,7 +36,7 @@ def quaternion(rpy):
 
 
 def random_arm(rng):
-    """Numbers of one arm, physical by construction."""
+    """Returns the numbers of one arm, physical by construction."""
     uniform = rng.uniform
     joints = [[uniform(-0.4, 0.4) for _ in range(3)] + [uniform(-3.1, 3.1) for _ in range(3)] for _ in range(7)]
     links = []
@@ -69,7 +69,7 @@ def words(numbers):
 
 
 def body(arm, i):
-    """Link i+1 and everything that it carries, as MJCF. The flange (joint 6) is fixed and carries nothing."""
+    """Returns link i+1 and everything that it carries, as MJCF. The flange (joint 6) is fixed and carries nothing."""
     joint, link = arm["joints"][i], arm["links"][i + 1]
     r = rotation(np.array(link[3:6]))
     ixx, ixy, ixz, iyy, iyz, izz = link[6:12]

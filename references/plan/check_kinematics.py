@@ -2,13 +2,13 @@
 
     python check_kinematics.py PROGRAM [--poses 40] [--seed N]
 
-PROGRAM is the example `poses` of the crate jtc-plan (`cargo build --release -p jtc-plan --example poses`). The arms are six axes of
-the robot descriptions of example-robot-data, as Pinocchio reads them, and random ones. Of each pose, which Pinocchio's forward
-kinematics makes of random joint positions, every solution has to bring Pinocchio's flange there, to 1e-9 m and 1e-9 rad, and away
-from singular poses the joint positions that it was made of have to be among them, and whatever Pinocchio's own iteration finds (closed
-forms: always; searches: in all but a few of a hundred). On lines the flange has to be on the straight line with an even turn, with
-velocity and acceleration that Pinocchio computes from the derivatives. For the UR5 the solutions have to be those of the formulas
-of R. S. Andersen (Kinematics of a UR5, 2018). Exit code 1 and the worst case on failure.
+PROGRAM is the example `poses` of the crate jtc-plan (`cargo build --release -p jtc-plan --example poses`). The arms are six axes of the
+robot descriptions of example-robot-data, as read by Pinocchio, and random arms. Pinocchio's forward kinematics makes a pose from random
+joint positions. Every solution for the pose must bring Pinocchio's flange there, to 1e-9 m and 1e-9 rad. Away from singular poses the
+original joint positions must be among the solutions, as well as those that Pinocchio's own iteration finds (closed forms: always;
+searches: except for at most one in a hundred). On lines the flange must be on the straight line with an even turn, with velocity and
+acceleration that Pinocchio computes from the derivatives. For the UR5 the solutions must be those of the formulas of R. S. Andersen
+(Kinematics of a UR5, 2018). Exit code 1 and the worst case on failure.
 """
 
 import argparse
@@ -23,13 +23,13 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "arms"))
 import descriptions  # noqa: E402
 
 LIMIT = 1e-9
-# Smallest singular value (m and rad as they are) from which on a pose is away from singular ones.
+# Smallest singular value (m and rad as they are) from which on a pose counts as away from singular poses.
 AWAY = 0.03
-# Share of what Pinocchio's iteration finds that a search of ours may miss.
+# Largest share of the results of Pinocchio's iteration that our search may miss.
 MISSED = 0.01
 SAMPLES = 20
 
-# File, joints, whether there is a closed form.
+# File, joints, and whether there is a closed form.
 UR = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 ARMS = [
     ("ur_description/urdf/ur3_robot.urdf", UR, True),
@@ -43,7 +43,7 @@ ARMS = [
 
 
 class Arm:
-    """Six axes, each the z axis of its frame, in Pinocchio and as our text."""
+    """Six axes, each the z axis of its frame, for Pinocchio and as text for our program."""
 
     def __init__(self, name, origins, closed):
         self.name, self.origins, self.closed = name, np.array(origins), closed
@@ -69,7 +69,7 @@ class Arm:
         return np.linalg.svd(self.jacobian(q), compute_uv=False)[-1]
 
     def iterate(self, target, q):
-        """Pinocchio's closed-loop inverse kinematics, damped; None where it leads to no solution."""
+        """Returns the result of Pinocchio's closed-loop inverse kinematics, damped; None if it finds no solution."""
         for _ in range(100):
             error = pin.log6(self.flange(q).actInv(target)).vector
             if np.linalg.norm(error) < 1e-12:
@@ -93,7 +93,7 @@ def origin(placed):
 
 
 def described(file, joints, closed):
-    """The arm of a description, with all other joints held at 0: its axes as z axes of frames on them."""
+    """Returns the arm of a description, with all other joints held at 0; its axes are the z axes of frames on them."""
     whole = pin.buildModelFromUrdf(str(descriptions.folder() / file))
     data = whole.createData()
     zero = pin.neutral(whole)
@@ -112,7 +112,7 @@ def described(file, joints, closed):
 
 
 def rounded(values):
-    """Without what rounding leaves of right angles, which the project makes exact."""
+    """Makes right angles exact, as the project does, by removing their rounding errors."""
     values = np.array(values)
     quarters = np.round(values[3:] / (np.pi / 2)) * (np.pi / 2)
     values[3:] = np.where(np.abs(values[3:] - quarters) <= 2e-6, quarters, values[3:])
@@ -152,7 +152,7 @@ def values(answer):
 
 
 def check_poses(program, arm, rng, count):
-    """The worst residual, and of what Pinocchio finds how much is missing."""
+    """Returns the worst residual, the number of known solutions, the number of those that are missing, and the failures."""
     made = rng.uniform(-np.pi, np.pi, (count, 6))
     near = rng.uniform(-np.pi, np.pi, (count, 6))
     poses = [arm.flange(q) for q in made]
@@ -188,7 +188,7 @@ def check_poses(program, arm, rng, count):
 
 
 def check_lines(program, arm, rng, count):
-    """The worst deviation from straight lines (m, rad), and of velocity and acceleration, relative."""
+    """Returns the number of paths, the worst deviation from straight lines (m, rad), and that of velocity and acceleration."""
     starts = rng.uniform(-np.pi, np.pi, (count, 6))
     starts = [q for q in starts if arm.smallest(q) > AWAY]
     begins = [arm.flange(q) for q in starts]
@@ -216,7 +216,7 @@ def check_lines(program, arm, rng, count):
 
 
 def ur5_solutions(target, d1, a2, a3, d4, d5, d6):
-    """All solutions for the UR5, by Andersen's formulas in modified Denavit-Hartenberg frames."""
+    """Returns all solutions for the UR5, by Andersen's formulas in modified Denavit-Hartenberg frames."""
 
     def frame(alpha, a, d, theta):
         return pin.SE3(pin.rpy.rpyToMatrix(alpha, 0, 0), np.array([a, 0, 0])) * pin.SE3(
@@ -251,7 +251,7 @@ def ur5_solutions(target, d1, a2, a3, d4, d5, d6):
 
 
 def check_ur5(program, rng, count):
-    """The published parameters; both sets of solutions have to be the same."""
+    """Uses the published parameters; both sets of solutions must be equal."""
     d1, a2, a3, d4, d5, d6 = 0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823
     half = np.pi / 2
     dh = [(d1, 0, half), (0, a2, 0), (0, a3, 0), (d4, 0, half), (d5, 0, -half), (d6, 0, 0)]

@@ -2,10 +2,10 @@
 
     python check_plan.py PROGRAM [--moves 300] [--paths 40] [--seed N]
 
-PROGRAM is the example `plans` of the crate jtc-plan (`cargo build --release -p jtc-plan --example plans`). Point to point under
-random limits of velocity, acceleration and jerk: durations within 1 % of Ruckig's. Along blended paths without a limit of jerk, with
-and without torque limits: within 2 % of toppra's, which gets the same path as places with two derivatives, and its torque from
-Pinocchio. Exit code 1 and the worst case on failure.
+PROGRAM is the example `plans` of the crate jtc-plan (`cargo build --release -p jtc-plan --example plans`). Point to point, with random
+limits of velocity, acceleration and jerk: durations within 1 % of Ruckig's. Along blended paths without a limit of jerk, with and without
+torque limits: within 2 % of toppra's. toppra gets the same path as positions with two derivatives, and its torque from Pinocchio. Exit
+code 1 and the worst case on failure.
 """
 
 import argparse
@@ -28,7 +28,7 @@ PLACES = 1500
 
 
 def limits(rng, joints):
-    """Random limits around those of the arm: velocity, acceleration, jerk, torque."""
+    """Returns random limits around those of the arm: velocity, acceleration, jerk, torque."""
     velocity = np.array([j["velocity_max_rad_s"] for j in joints[:6]]) * rng.uniform(0.3, 1.2, 6)
     acceleration = np.array([j["acceleration_max_rad_s2"] for j in joints[:6]]) * rng.uniform(0.2, 1.5, 6)
     torque = np.array([j["torque_max_nm"] for j in joints[:6]]) * rng.uniform(0.9, 1.2, 6)

@@ -1,4 +1,4 @@
-"""Plans of the example `plans` of jtc-plan, and the same by other people's planners."""
+"""Plans of the example `plans` of jtc-plan, and plans of other projects' planners for the same motions."""
 
 import subprocess
 import time
@@ -14,12 +14,12 @@ toppra.setup_logging("ERROR")
 
 
 def words(kind, *parts):
-    """One line of text; 17 digits, so nothing is lost."""
+    """Returns a line of text, with 17 digits per number so that nothing is lost."""
     return kind + " " + " ".join(repr(float(v)) for part in parts for v in np.ravel(part)) + "\n"
 
 
 def answers(program, lines):
-    """What the program answers to these lines."""
+    """Returns the program's answers to these lines."""
     run = subprocess.run([program], input="".join(lines), capture_output=True, text=True)
     if run.returncode != 0:
         raise SystemExit(f"{program} ended with {run.returncode}: {run.stderr.strip()}")
@@ -27,7 +27,7 @@ def answers(program, lines):
 
 
 def ruckig_duration(start, end, velocity, acceleration, jerk):
-    """Of a move from rest to rest. Without waypoints: Ruckig would send those to a server."""
+    """Returns Ruckig's duration of a move from rest to rest. Without waypoints, which Ruckig would send to a server."""
     given = ruckig.InputParameter(6)
     given.current_position, given.target_position = list(start), list(end)
     given.max_velocity, given.max_acceleration, given.max_jerk = list(velocity), list(acceleration), list(jerk)
@@ -39,7 +39,7 @@ def ruckig_duration(start, end, velocity, acceleration, jerk):
 
 
 class SampledPath(toppra.interpolator.AbstractGeometricPath):
-    """A path through places with the first and second derivatives that were given there."""
+    """A path through positions, with given first and second derivatives."""
 
     def __init__(self, rows):
         self.s = rows[:, 0]
@@ -64,7 +64,7 @@ class SampledPath(toppra.interpolator.AbstractGeometricPath):
 
 
 def toppra_duration(rows, velocity, acceleration, inverse=None, torque=None):
-    """Duration of the fastest motion along a path that is given by rows as the example prints them, and the time it took to find it, s."""
+    """Returns the duration of the fastest motion along a path in rows as the example prints them, and the time to find it, s."""
     scheme = toppra.constraint.DiscretizationType.Interpolation
     begin = time.perf_counter()
     path = SampledPath(rows)
@@ -77,7 +77,7 @@ def toppra_duration(rows, velocity, acceleration, inverse=None, torque=None):
         constraints.append(
             toppra.constraint.JointTorqueConstraint(inverse, both(torque), np.zeros(6), discretization_scheme=scheme)
         )
-    # A spline through the result, the default, would change its time.
+    # A spline through the result, which is the default, would change its duration.
     solver = toppra.algorithm.TOPPRA(constraints, path, gridpoints=path.s, parametrizer="ParametrizeConstAccel")
     trajectory = solver.compute_trajectory(0, 0)
     taken = time.perf_counter() - begin

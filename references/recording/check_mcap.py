@@ -1,4 +1,4 @@
-"""Reads a recording with the MCAP and ROS 2 libraries of others, as Foxglove does, and checks what it says.
+"""Reads a recording with the MCAP and ROS 2 libraries of other projects, as Foxglove does, and checks its contents.
 
 usage: check_mcap.py RECORDING.mcap [RECORDING.csv]
 
@@ -18,7 +18,7 @@ TOPICS = {
     "/jtc/control": "openjtc_msgs/msg/JointControl",
     "/jtc/state": "openjtc_msgs/msg/ControllerState",
 }
-# What check_standalone.py looks at.
+# Topics that check_standalone.py checks.
 OTHERS = {"/robot_description", "/tf"}
 
 
@@ -55,7 +55,7 @@ def main():
         messages["/joint_states"], messages["/joint_commands"], messages["/jtc/control"]
     ):
         for j in range(6):
-            # The error is that of the time of the measurement, some ticks before.
+            # The error belongs to the time of the measurement, some ticks before.
             way = 0.01 * (abs(commands.velocity[j]) + 0.1)
             assert not abs(control.position_error[j] - (commands.position[j] - states.position[j])) > way
             assert same(control.torque[j], states.effort[j])

@@ -1,9 +1,9 @@
-"""Reads what a recording holds of its arm with the libraries of others, and checks it with Pinocchio.
+"""Reads the arm in a recording with the libraries of other projects, and checks it with Pinocchio.
 
 usage: check_standalone.py RECORDING.mcap
 
-Needs `mcap`, `mcap-ros2-support` and `pin` from PyPI. The description on /robot_description is one that Pinocchio reads; its forward
-kinematics at the measured positions place each link where the transforms on /tf do; names and limits are those of the metadata.
+Needs `mcap`, `mcap-ros2-support` and `pin` from PyPI. Pinocchio reads the description on /robot_description. Its forward kinematics at
+the measured positions must give the link poses of the transforms on /tf. Names and limits must be those of the metadata.
 """
 
 import sys
@@ -70,7 +70,7 @@ def main():
         placed = {"link_0": pinocchio.SE3.Identity()}
         for t in message:
             assert t.header.stamp.sec * 1_000_000_000 + t.header.stamp.nanosec == time
-            # Behind a joint that does not answer nothing is known.
+            # The poses after a joint that does not answer are unknown.
             if t.header.frame_id in placed:
                 placed[t.child_frame_id] = placed[t.header.frame_id] * placement(t.transform)
         known = next((i for i, position in enumerate(q) if np.isnan(position)), len(frames))

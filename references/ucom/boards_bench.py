@@ -1,4 +1,4 @@
-"""What rows with simulated boards begin with."""
+"""First steps of rows with simulated boards."""
 
 import tempfile
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ FLASH = "0x21,0x42,0x63,0x04,0x7F"
 
 
 def status(peer: Peer, board: int) -> str:
-    """Status byte of PC_INFO; a running board's process data come in between."""
+    """Returns the status byte of PC_INFO, although a running board's process data come in between."""
     return peer.answer(wire.frame(8, board), f"{0x140 + board:03X}#")[10:12]
 
 
 def give_numbers(bench: Bench, peer: Peer, boards: int) -> None:
-    """Resets all and numbers the first ones."""
+    """Resets all boards and numbers the first ones."""
     peer.ask("000#", 0.6)
     for board in range(1, boards + 1):
         number = f"{board:02X}"
@@ -26,7 +26,7 @@ def give_numbers(bench: Bench, peer: Peer, boards: int) -> None:
 
 
 def start(bench: Bench, peer: Peer) -> None:
-    """Board 1 with its application up."""
+    """Starts the application of board 1."""
     give_numbers(bench, peer, 1)
     bench.same("D-T9", "MCA_DSP_READY", peer.answer("301#", "501#"), "501#")
     peer.all(0.1)
@@ -38,7 +38,7 @@ def five(bench: Bench) -> Chain:
 
 @contextmanager
 def chain_of(bench: Bench, boards: str) -> Iterator[Chain]:
-    """A chain from the text of a file."""
+    """Starts a chain from the text of a file."""
     with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
         file.write(boards)
         file.flush()

@@ -1,4 +1,4 @@
-"""Rows of `check_boards.py`: simulated boards that are updated by a raw-frame peer."""
+"""Rows of `check_boards.py`: a raw-frame peer updates simulated boards."""
 
 import time
 
@@ -18,7 +18,7 @@ def give(peer: Peer, board: int, data: bytes) -> None:
 
 
 def block(peer: Peer, board: int, data: bytes) -> str:
-    """Eight frames; what comes of them."""
+    """Sends eight frames; returns the answer."""
     give(peer, board, data)
     answer = peer.wait(*VERDICTS)
     assert answer, "nothing came after a block"
@@ -26,7 +26,7 @@ def block(peer: Peer, board: int, data: bytes) -> str:
 
 
 def identity(bench: Bench, program: int, date: int) -> str:
-    """Program ID and date as DSP_INFO has them."""
+    """Returns Program ID and date as DSP_INFO has them."""
     return (wire.word(bench.order, program) + wire.word(bench.order, date)).hex().upper()
 
 
@@ -50,7 +50,7 @@ def update(bench: Bench) -> None:
         bench.ok("D-T17")
 
 
-# What a peer does wrong, the error that it gets, and whether something was erased by then.
+# Mistakes of a peer, the error for each, and whether something was erased by then.
 MISTAKES = {
     "bad sum": (5, False), "wrong target": (2, False), "DLC 7": (7, False), "a pause in a block": (10, False),
     "cycle 2 first": (10, False), "address range": (2, False), "length range": (2, False),
@@ -60,7 +60,7 @@ MISTAKES = {
 
 
 def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
-    """Does it, so that the error is the next frame to come; false: the peer was too slow for it."""
+    """Makes the mistake, so that the error is the next frame; returns False if the peer was too slow for it."""
     order = bench.order
     first = bytearray(wire.header(order, 1, image, DATE))
 
@@ -110,7 +110,7 @@ def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
                 give(peer, 1, bytes(first))
             give(peer, 1, b"\0" * 8)
             answer = peer.wait(*VERDICTS)
-            # The board was done with the block before this peer's ninth frame came: nothing was wrong.
+            # The board had processed the block before this peer's ninth frame came, so the mistake did not occur.
             if answer == "181#":
                 return False
             bench.same("D-T18", f"{name}:", answer, "081#04")
@@ -120,7 +120,7 @@ def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
 
 
 def mistakes(bench: Bench, part: int) -> None:
-    """A third of them."""
+    """Checks a third of the mistakes."""
     some = list(MISTAKES.items())[part::3]
     for name, (_, erased) in some:
         for tries in range(5):
@@ -180,7 +180,7 @@ def group(bench: Bench) -> None:
 
 
 def not_asked_for(bench: Bench) -> None:
-    """Error 2 for program data with PROG = 0, and while the application runs."""
+    """Checks error 2 for program data with PROG = 0, and while the application runs."""
     with five(bench) as chain, chain.peer() as peer:
         give_numbers(bench, peer, 1)
         bench.same("PC_PROG", "with PROG = 0:", peer.ask("2C1#0000000000000000", 0.2), ["081#02"])

@@ -1,4 +1,4 @@
-"""Frames, strings and buffers: what `ucom` reads and writes, against this script's own tables, over python-can.
+"""Checks frames, strings and buffers that `ucom` reads and writes against this script's own tables, over python-can.
 
 Argument: the `ucom` program. Exit code 0: all agreed.
 """
@@ -15,7 +15,7 @@ from boards_bench import five, give_numbers, start
 from pc_play import PATIENT, boards, told
 from rows import Bench
 
-# In the order of their numbers.
+# Function names in the order of their numbers.
 NAMES = """
 PC_RESET PC_XRESET DSP_ERROR DSP_INITACK DSP_PROGFINISHED DSP_INFO DSP_READY PC_SETSTATUS PC_INFO PC_REPORT
 PC_INIT PC_PROG PC_START MCA_PC_CI MCA_DSP_SO MCA_PC_PAR DSP_REPORT0 DSP_REPORT1 DSP_REPORT2 DSP_REPORT3
@@ -36,7 +36,7 @@ def identifiers(bench: Bench) -> None:
 
 
 def foreign(bench: Bench) -> None:
-    """C-2: counted, shown, never acted on."""
+    """C-2: foreign frames are counted and shown, and have no effect."""
     messages = [can.Message(arbitration_id=i, is_extended_id=True) for i in (0, 0x201, 0x1FFFFFFF)]
     messages += [can.Message(arbitration_id=0x201 | 0x20, is_extended_id=False)]
     messages += [can.Message(arbitration_id=f << 6 | 1, is_extended_id=False) for f in range(28, 32)]
@@ -57,7 +57,7 @@ def foreign(bench: Bench) -> None:
 
 
 def recorded(bench: Bench) -> None:
-    """C-3 and C-7: what was recorded is what was sent, and is sent again; `000#` is a frame like any other."""
+    """C-3 and C-7: a recording has the frames that were sent, and a replay sends them again; `000#` is a frame like any other."""
     for ending in ("log", "fzi"):
         sent = ["000#"] + [
             wire.frame(bench.random.randrange(28), bench.random.randrange(32), bench.random.randbytes(length))

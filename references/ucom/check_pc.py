@@ -1,7 +1,7 @@
-"""`ucom scan`, `init` and `dbc` against boards that this script plays on python-can's socketcand interface.
+"""Checks `ucom scan`, `init` and `dbc` with boards that this script plays on python-can's socketcand interface.
 
-Argument: the `ucom` program. Exit code 0: all agreed. The boards have nothing of the project's code; a bus without
-boards (`ucom sim --boards 0`) connects the two. Updates, running boards and probes are in scripts of their own.
+Argument: the `ucom` program. Exit code 0: all agreed. The boards use no code of the project. A bus without boards (`ucom sim --boards 0`)
+connects the two. Updates, running boards and probes are in separate scripts.
 """
 
 import json
@@ -76,14 +76,14 @@ def acknowledgements(bench: Bench) -> None:
 
 
 def repair(bench: Bench) -> None:
-    """5.4: the pin of board 2 goes down three times before PC_INIT(2); another board's number is never given."""
+    """5.4: the pin of board 2 goes down three times before PC_INIT(2), and the number of another board is never given."""
     flash = bench.flash_ids(3)
     for deaf_master in (False, True):
         with bench.bus() as chain, boards(bench, chain, flash) as played:
             told(bench, "repair", chain.start("init", "--renew"), 0)
             del played.heard[:]
             played.later(0.0, played.crash, played.boards[2 if deaf_master else 1])
-            # Board 2 is alive, but nobody hears it, and board 3 has lost its number: it must not become number 2.
+            # Board 2 works, but its frames are lost, and board 3 has lost its number: board 3 must not become number 2.
             played.boards[1].mute = deaf_master
             time.sleep(0.3)
             said = told(bench, "repair", chain.start("repair", "2"), (1, 3, 4, 5) if deaf_master else 0)
@@ -98,7 +98,7 @@ def repair(bench: Bench) -> None:
 
 
 def dbc(bench: Bench) -> None:
-    """P-21: cantools reads the exported file, and recorded frames, as the tool does."""
+    """P-21: cantools reads the exported file, and decodes recorded frames as the tool does."""
     with bench.chain("--boards", "1") as chain, chain.peer() as peer:
         for words in (("init", "--renew"), ("start", "1"), ("dbc", "1", "--out", chain.path("chain.dbc"))):
             told(bench, "P-21", chain.start(*words), 0)

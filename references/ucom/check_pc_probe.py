@@ -1,4 +1,4 @@
-"""`ucom probe` against boards that read the protocol otherwise, played on python-can's socketcand interface.
+"""Checks `ucom probe` with boards that read the protocol differently, played on python-can's socketcand interface.
 
 Argument: the `ucom` program. Exit code 0: all agreed.
 """
@@ -17,7 +17,7 @@ KEYS = ("inclusive", "all4", "auto_pin", "strict")
 
 
 def flat(table: dict, before: str = "") -> dict:
-    """Keys of a profile, `a.b` for one in a table."""
+    """Returns the keys of a profile, `a.b` for a key in a table."""
     out = {}
     for key, value in table.items():
         out |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
@@ -25,7 +25,7 @@ def flat(table: dict, before: str = "") -> dict:
 
 
 def expected(order: str, quirks: dict) -> dict:
-    """What the profile must say of such boards."""
+    """Returns the values that the profile must have for such boards."""
     yes = {True: ("yes", True), False: ("no", False)}
     return {
         "endian": (order,),
@@ -46,14 +46,14 @@ def agrees(bench: Bench, path: str, quirks: dict, without: tuple[str, ...] = ())
 
 
 def numbering(bench: Bench, several: list[dict]) -> None:
-    """With `--init`, beginning with the profile's defaults whatever the boards are like."""
+    """Checks `--init`, beginning with the profile's defaults for boards of any kind."""
     for quirks in several:
         with bench.bus() as chain, boards(bench, chain, bench.flash_ids(3), **quirks) as played:
             out = chain.path("found.toml")
             none = chain.write("none.toml", "")
             told(bench, "P-20", chain.start("probe", "--init", "--out", out, profile=none), 0)
             agrees(bench, out, quirks)
-            # The profile that was found works.
+            # The measured profile works.
             said = told(bench, "P-20", chain.start("init", "--renew", profile=out), 0)
             seen = [(b["flash_number"], b["description"]) for b in said["boards"]]
             there = [(board.flash, board.names()[0]) for board in played.boards]
@@ -91,7 +91,7 @@ def some_by_chance(bench: Bench) -> None:
 
 
 def harmless(bench: Bench) -> None:
-    """Without `--init` nothing is done to numbered or started boards, and what can be asked is found."""
+    """Checks that without `--init` numbered or started boards stay unchanged, and that questions alone find all they can."""
     for started in (False, True):
         quirks = {"inclusive": True, "all4": True}
         how = {"numbered": True, "shape": (7, 4, 2), "running": 3 if started else 0}

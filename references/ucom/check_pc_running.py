@@ -1,4 +1,4 @@
-"""Boards that are described, run and supervised by `ucom`; this script plays them on python-can's socketcand interface.
+"""Checks boards that `ucom` describes, runs and supervises; this script plays them on python-can's socketcand interface.
 
 Argument: the `ucom` program. Exit code 0: all agreed.
 """
@@ -21,7 +21,7 @@ SAFE = "600#00000000"
 
 
 class Traffic(threading.Thread):
-    """Outputs of ten boards at full rate, two packages of each every 10 ms."""
+    """Sends outputs of ten boards at full rate, two packages of each every 10 ms."""
 
     def __init__(self, peer: Peer, order: str, numbers: range):
         super().__init__(daemon=True)
@@ -83,7 +83,7 @@ def interleaved(bench: Bench) -> None:
 
 
 def dump_and_life_signs(bench: Bench) -> None:
-    """P-14 while a dump goes on for some seconds."""
+    """P-14: heartbeats continue during a dump of some seconds."""
     how = {"numbered": True, "dump_gap": 0.07, "shape": (4, 6, 5)}
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(1), **how) as played:
         command = chain.start("run", "1", "--for", "0.5")
@@ -124,7 +124,7 @@ def lost_and_back(bench: Bench) -> None:
 
 
 def rebooted(bench: Bench) -> None:
-    """P-16: a report that nobody asked for."""
+    """P-16: an unrequested report."""
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(2), numbered=True) as played:
         command = chain.start("run", "1,2", "--for", "4")
         bench.expect(command.wait_out("running") is not None, "P-16", "both boards run", command.notes)
@@ -138,7 +138,7 @@ def rebooted(bench: Bench) -> None:
 
 
 def second_master(bench: Bench) -> None:
-    """P-17: whatever only a PC sends, every 100 ms."""
+    """P-17: frames that only a PC sends, every 100 ms."""
     image = bench.image()
     zeros = "0" * 16
     frames = ["680#", "205#", "240#", "585#", "600#00000000", f"345#{zeros}", f"2C5#{zeros}"]
@@ -148,7 +148,7 @@ def second_master(bench: Bench) -> None:
         path = chain.write("image.bin", image)
         commands = [("start", "1"), ("update", "1", path), ("init", "--renew"), ("run", "1", "--for", "1")]
         for words, frame in zip(commands, foreign):
-            # The other PC's last frame for the command before may still be on its way.
+            # The other PC's last frame for the previous command may still be in transmission.
             time.sleep(0.2)
             del played.heard[:]
             command = chain.start(*words)
@@ -156,10 +156,10 @@ def second_master(bench: Bench) -> None:
                 other.send(frame)
                 time.sleep(0.1)
             told(bench, "P-17", command, 4)
-            # What the other one says is heard here, too.
+            # The frames of the other PC are received here as well.
             odd = [f for f in intrusive(played.frames()) if f != frame]
             bench.same("P-17", f"{words[0]}: frames that do something", odd, [])
-        # A running board's own heartbeats and flags are none.
+        # A running board's own heartbeats and flags do not count as those of a PC.
         command = chain.start("start", "1")
         while command.process.poll() is None:
             other.send("682#")
@@ -177,7 +177,7 @@ def load(bench: Bench) -> None:
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(16), **how) as played:
         command = chain.start("run", "1-16", "--for", "1")
         said = told(bench, "P-19", command, 4)
-        # So many boards as are too many; whole packages of 135 bits, outputs every 10 ms, inputs every 20 ms.
+        # The first number of boards that is too large: whole packages of 135 bits, outputs every 10 ms, inputs every 20 ms.
         forecast, count = map(int, re.search(r"(\d+) %.* (\d+) boards", said["error"]["message"]).groups())
         percent = count * (4 * 100 + 1 * 50) * 135 / 1e6 * 100
         bench.expect(count <= 16 and 70 < forecast, "P-19", "a forecast of more than 70 %", said)
@@ -190,7 +190,7 @@ def load(bench: Bench) -> None:
 
 
 def wait_for_stop(bench: Bench) -> None:
-    """What `ucom run` leaves behind: outputs off, control off, applications stopped, in reverse order."""
+    """Checks the state after `ucom run`: outputs off, control off, applications stopped, in reverse order."""
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(2), numbered=True) as played:
         told(bench, "stop", chain.start("run", "1,2", "--for", "0.5", "--active"), 0)
         left = [board.status for board in played.boards]

@@ -1,4 +1,4 @@
-"""`ucom update` against boards that this script plays on python-can's socketcand interface.
+"""Checks `ucom update` with boards that this script plays on python-can's socketcand interface.
 
 Argument: the `ucom` program. Exit code 0: all agreed.
 """
@@ -21,7 +21,7 @@ DATE = 0x3AC1
 
 @contextmanager
 def alone(bench: Bench, profile: str = "", **quirks) -> Iterator[tuple[Chain, Boards]]:
-    """A bus with one numbered board; keywords are those of `Quirks`."""
+    """Runs a bus with one numbered board; keywords are those of `Quirks`."""
     with bench.bus(PATIENT + profile) as chain, boards(bench, chain, [0x21], numbered=True, **quirks) as played:
         yield chain, played
 
@@ -31,12 +31,12 @@ def begin(chain: Chain, image: bytes, *words: str) -> Command:
 
 
 def blocks(image: bytes) -> int:
-    """Blocks of a cycle, the header's too."""
+    """Returns the number of blocks of a cycle, including the header's."""
     return 1 + len(wire.padded(image))
 
 
 def verified(bench: Bench, rule: str, played: Boards, command: Command, image: bytes, attempts: int = 1) -> None:
-    """The update is done as it should be."""
+    """Checks that the update is done as required."""
     said = told(bench, rule, command, 0)
     bench.same(rule, "outcome", said["outcome"], "verified")
     bench.same(rule, "attempts told", said["boards"][0]["attempts"], attempts)
@@ -60,7 +60,7 @@ def golden(bench: Bench) -> None:
                 header = "4355010001000000 00000000F4010000 3F4BC13AFFFFFFFF".split() + ["F" * 16] * 4
                 named = [f"2C1#{part}" for part in (*header, "FFFFFFFFFFFFDC22", "0B30557A9FC4E90E")]
                 bench.same("13.4", "first frames", frames[:9], named)
-            # D-62: no inventory names what was written to this board, so its Program ID and date prove nothing.
+            # D-62: no inventory has a record of this board, so its Program ID and date prove nothing.
             said = told(bench, "U-3", begin(chain, image), 4)
             bench.same("U-3", "outcome of the same image again", (said["outcome"], played.attempts), ("program-up-to-date", 1))
             said = told(bench, "U-3", begin(chain, image, "--unverified"), 0)
@@ -78,7 +78,7 @@ def other_board(bench: Bench) -> None:
 
 
 def one_by_one(bench: Bench) -> None:
-    """P-7: DSP_READY comes whenever it likes; nothing of the next block comes before."""
+    """P-7: DSP_READY comes after any delay, and no frame of the next block comes before it."""
     image = bench.image()
     with alone(bench, late_by=lambda: bench.random.uniform(0, 0.06)) as (chain, played):
         verified(bench, "P-7", played, begin(chain, image), image)
@@ -87,7 +87,7 @@ def one_by_one(bench: Bench) -> None:
 
 
 def late_ready(bench: Bench) -> None:
-    """P-8: 0.9 s for a block, 8 s for erasing and for the end."""
+    """P-8: 0.9 s for a block, 8 s for the erase and for the end."""
     image = bench.image(200, 400)
     middle = bench.random.randint(1, blocks(image) - 2)
     late = {(1, 0): 0.9, (1, middle): 0.9, (2, 0): 8.0, (2, middle): 0.9, (2, blocks(image) - 1): 8.0}
@@ -138,7 +138,7 @@ def errors(bench: Bench) -> None:
 
 
 def until(played: Boards, frames: int) -> int:
-    """Waits until so many frames of program data were heard; how many there are."""
+    """Waits until at least `frames` frames of program data were received; returns their number."""
     end = time.monotonic() + 30
     while (heard := len(played.frames("2C1"))) < frames:
         assert time.monotonic() < end, f"{heard} of {frames} frames"
@@ -149,7 +149,7 @@ def until(played: Boards, frames: int) -> int:
 def cancelled(bench: Bench) -> None:
     image = bench.image()
     for cycle in (1, 2):
-        # Slow enough that the signal meets a block under way.
+        # Slow enough that the signal comes during a block.
         with alone(bench, profile="prog.frame_gap_us = 20000\n") as (chain, played):
             command = begin(chain, image)
             until(played, 8 * ((cycle - 1) * blocks(image) + 2) + bench.random.randint(1, 6))
@@ -184,7 +184,7 @@ def killed(bench: Bench) -> None:
 
 
 def group(bench: Bench) -> None:
-    """Boards 1 and 3 at once by broadcast, DSP_READY whenever each likes; board 2 hears it all and is silent."""
+    """Checks a broadcast to boards 1 and 3, with DSP_READY after any delay of each. Board 2 receives all frames and is silent."""
     image = bench.image()
     plans = {"": {}, "board 3 complains once": {(1, bench.random.randint(1, blocks(image) - 1)): 1}}
     for name, once in plans.items():
@@ -210,7 +210,7 @@ def group(bench: Bench) -> None:
 
 
 def life_signs(bench: Bench) -> None:
-    """P-14: every 500 ms, while an update goes on for some seconds."""
+    """P-14: a heartbeat every 500 ms during an update of some seconds."""
     image = bench.image(1000, 1200)
     with alone(bench, late_by=lambda: 0.12) as (chain, played):
         verified(bench, "P-14", played, begin(chain, image), image)
@@ -219,7 +219,8 @@ def life_signs(bench: Bench) -> None:
 
 
 def punctual(bench: Bench, what: str, signs: list[float], first: float, last: float) -> None:
-    """Heartbeats of a PC between two times are 500 ms apart, to 50 ms in the mean and to the bench's fifth each."""
+    """Checks that a PC's heartbeats between two times are 500 ms apart: within 50 ms on average, and each within the bench's
+    tolerance."""
     gaps = [after - before for before, after in zip(signs, signs[1:])]
     bench.expect(len(gaps) >= 4 and signs[0] <= first + 0.6, "P-14", f"heartbeats all the time of the {what}", signs)
     late = bench.jitter.worst(signs[0], last)

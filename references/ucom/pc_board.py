@@ -1,4 +1,4 @@
-"""State of a board that a script plays, and what boards may do otherwise."""
+"""State of a board that a script plays, and its possible deviations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -9,24 +9,24 @@ NONE = (0xFFFF, 0xFFFF)
 
 @dataclass
 class Quirks:
-    """What these boards do otherwise, or wrong."""
+    """Deviations and faults of these boards."""
 
     order: str = "little"
     inclusive: bool = False  # the count of a string counts its header
-    all4: bool = False  # four reports of each board
+    all4: bool = False  # each board sends four reports
     auto_pin: bool = False  # the pin goes up with the acknowledgement
     strict: bool = False  # surplus bytes are refused
     lost_acks: int = 0
     wrong_ack: bool = False
-    lost_pins: int = 0  # so many PC_SETSTATUS for the pin are not heard
-    other_number: bool = False  # DSP_INFO has another number inside
+    lost_pins: int = 0  # number of PC_SETSTATUS for the pin that are lost
+    other_number: bool = False  # DSP_INFO contains another number
     keeps_old: bool = False
     lost_finished: bool = False
-    errors: dict[tuple[int, int], int] = field(default_factory=dict)  # after a block of a cycle, from 0, this error
-    late: dict[tuple[int, int], float] = field(default_factory=dict)  # DSP_READY after a block comes so late, s
-    late_by: Callable[[], float] = lambda: 0.0  # for all other blocks
-    dump_gap: float = 0.0  # between frames of an IO description, s
-    between: Callable[[], list[str]] = list  # what else comes between them
+    errors: dict[tuple[int, int], int] = field(default_factory=dict)  # error after a block of a cycle, from 0
+    late: dict[tuple[int, int], float] = field(default_factory=dict)  # delay of DSP_READY after a block, s
+    late_by: Callable[[], float] = lambda: 0.0  # delay for all other blocks
+    dump_gap: float = 0.0  # pause between frames of an IO description, s
+    between: Callable[[], list[str]] = list  # other frames between them
 
 
 class Board:
@@ -38,8 +38,8 @@ class Board:
         self.status = EXLRUN
         self.program = (0x1234, 0x386E)
         self.silent = False
-        self.mute = False  # it hears, and nobody hears it
-        self.once: dict[tuple[int, int], int] = {}  # as `Quirks.errors`, each one time
+        self.mute = False  # the board receives frames, but its own are lost
+        self.once: dict[tuple[int, int], int] = {}  # as `Quirks.errors`, each entry once
         self.dropping, self.busy = False, False
         self.block, self.blocks = b"", []
         self.serial = 0
@@ -47,7 +47,7 @@ class Board:
         self.text = f"python {flash:x}"
 
     def names(self) -> list[str]:
-        """Its description, then the names of inputs, outputs and parameters."""
+        """Returns its description, then the names of inputs, outputs and parameters."""
         kinds = zip(("ci", "so", "par"), self.shape)
         return [self.text] + [f"{kind}{i} of {self.flash:x}" for kind, n in kinds for i in range(n)]
 

@@ -1,4 +1,4 @@
-"""A chain of boards that a script plays, written from the protocol's tables alone."""
+"""A chain of boards that a script plays, written only from the protocol's tables."""
 
 import heapq
 import itertools
@@ -14,7 +14,7 @@ from peer import Peer
 
 
 class Boards(threading.Thread, Programming):
-    """A chain on a bus, and all that it heard and said, with times."""
+    """A chain on a bus, with all received and sent frames and their times."""
 
     def __init__(self, peer: Peer, flash: list[int], quirks: Quirks, shape=(2, 4, 3), numbered=False, running=0):
         super().__init__(daemon=True)
@@ -24,7 +24,7 @@ class Boards(threading.Thread, Programming):
             board.number, board.status = board.place + 1, EXLRUN | INIT | OPINIT
         self.heard: list[tuple[float, str]] = []
         self.said: list[tuple[float, str]] = []
-        self.early: list[str] = []  # program data before the answer to the block before
+        self.early: list[str] = []  # program data before the answer to the previous block
         self.complaints: list[str] = []
         self.attempts = 0
         self.waits: list[tuple[float, int, Callable]] = []
@@ -51,7 +51,7 @@ class Boards(threading.Thread, Programming):
             self.broken = e
 
     def turn(self) -> None:
-        """What is due, and a frame if one comes."""
+        """Performs due actions, and handles a frame if one comes."""
         while (act := self.due()) is not None:
             act()
         with self.lock:
@@ -68,7 +68,7 @@ class Boards(threading.Thread, Programming):
         return None
 
     def end(self) -> list[str]:
-        """No more; the frames that were heard."""
+        """Ends the boards; returns the received frames."""
         self.ending.set()
         self.join()
         if self.broken is not None:
@@ -79,11 +79,11 @@ class Boards(threading.Thread, Programming):
         return [frame for _, frame in list(self.heard) if frame.startswith(starts or ("",))]
 
     def times(self, start: str) -> list[float]:
-        """When frames that begin so were heard."""
+        """Returns the times at which frames that begin with `start` were received."""
         return [at for at, frame in list(self.heard) if frame.startswith(start)]
 
     def later(self, seconds: float, act: Callable, *arguments) -> None:
-        """Has the boards do something, from any thread."""
+        """Schedules an action of the boards, from any thread."""
         with self.lock:
             heapq.heappush(self.waits, (time.monotonic() + seconds, next(self.count), lambda: act(*arguments)))
 
@@ -112,7 +112,7 @@ class Boards(threading.Thread, Programming):
                 self.numbered(board, function, to, data)
 
     def crash(self, board: Board) -> None:
-        """It boots by itself."""
+        """Lets the board reboot by itself."""
         self.forget(board)
         self.report(board)
 
@@ -194,7 +194,7 @@ class Boards(threading.Thread, Programming):
         self.say(20, board.number)
 
     def alive(self, board: Board) -> None:
-        """A heartbeat, and so on every second while the application is up."""
+        """Sends a heartbeat, and again every second while the application is up."""
         if board.status & MSTART and board.number is not None:
             if not board.silent:
                 self.say(26, board.number)
@@ -205,7 +205,7 @@ class Boards(threading.Thread, Programming):
             self.later(0.01, self.outputs, board, 0)
         board.status = board.status | MCARUN if on else board.status & ~MCARUN
         board.flags = bytes([on, on and board.flags[1], *board.flags[2:]])
-        # Both sides have one identifier for it: not at once.
+        # Not at once, because both sides use the same identifier.
         self.later(0.003, self.say, 24, board.number, board.flags)
 
     def outputs(self, board: Board, turn: int) -> None:

@@ -1,4 +1,4 @@
-"""A `ucom` command against boards that a script plays."""
+"""Runs a `ucom` command with boards that a script plays."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,22 +8,22 @@ from pc_boards import Boards
 from peer import Chain, Command
 from rows import Bench
 
-# Waits of a tool whose row is not about them: this script's boards answer when the machine lets them.
+# Longer timeouts for rows that do not test them: this script's boards answer as soon as the machine lets them.
 PATIENT = "string.gap = 400\ninfo.timeout = 400\nadmin.timeout = 400\n"
-# Functions that only ask; everything else of a PC does something to boards.
+# Functions that only ask; all other functions of a PC change boards.
 HARMLESS = (8, 9, 22, 23)
 
 
 @contextmanager
 def boards(bench: Bench, chain: Chain, flash: list[int], **how) -> Iterator[Boards]:
-    """Boards on a bus; keywords are those of `Quirks`, and shape, numbered, running of `Boards`."""
+    """Runs boards on a bus; keywords are those of `Quirks`, and shape, numbered, running of `Boards`."""
     fixed = {key: how.pop(key) for key in ("shape", "numbered", "running") if key in how}
     with chain.peer() as peer, Boards(peer, flash, Quirks(bench.order, **how), **fixed) as played:
         yield played
 
 
 def told(bench: Bench, rule: str, command: Command, code: int | tuple[int, ...], seconds: float = 120.0) -> dict:
-    """Waits for the command's end with one of these exit codes; what it said."""
+    """Waits for the command's end with one of these exit codes; returns its output."""
     codes = (code,) if isinstance(code, int) else code
     came = command.end(seconds)
     notes = [line for _, line in command.notes]
@@ -32,5 +32,5 @@ def told(bench: Bench, rule: str, command: Command, code: int | tuple[int, ...],
 
 
 def intrusive(frames: list[str]) -> list[str]:
-    """What of the frames of a PC does something to boards."""
+    """Returns the frames of a PC that change boards."""
     return [frame for frame in frames if int(frame[:3], 16) >> 6 not in HARMLESS]

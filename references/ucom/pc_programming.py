@@ -1,4 +1,4 @@
-"""How boards that a script plays take program data: blocks, cycles, checks."""
+"""Handling of program data by boards that a script plays: blocks, cycles, checks."""
 
 import wire
 from pc_board import NONE, PROG, Board
@@ -8,7 +8,7 @@ class Programming:
     """Part of `pc_boards.Boards`."""
 
     def transfer(self, board: Board) -> None:
-        """Begins with cycle 1."""
+        """Begins a transfer with cycle 1."""
         board.dropping, board.busy, board.block, board.blocks = False, False, b"", []
         board.serial += 1
 

@@ -1,4 +1,4 @@
-"""A simulated chain, `ucom` commands on its bus, and a peer of it that knows nothing but frames."""
+"""A simulated chain, `ucom` commands on its bus, and a peer that only sends and receives frames."""
 
 import json
 import logging
@@ -12,14 +12,14 @@ import time
 
 import can
 
-# python-can warns whenever a frame comes in two pieces.
+# python-can logs a warning whenever a frame comes in two pieces.
 logging.getLogger("can").setLevel(logging.ERROR)
 
 PROFILE = {"little": "", "big": 'endian = "big"\nprog.endian = "big"\n'}
 
 
 class Chain:
-    """`ucom sim` on a free port, and `ucom` commands on its bus. Both read words in this byte order."""
+    """`ucom sim` on a free port, and `ucom` commands on its bus. Both read words in the same byte order."""
 
     def __init__(self, program: str, *options: str, order: str = "little", profile: str = ""):
         self.program = program
@@ -47,7 +47,7 @@ class Chain:
         return str(pathlib.Path(self.directory.name) / name)
 
     def write(self, name: str, content: str | bytes) -> str:
-        """A file of this chain's directory; its path."""
+        """Writes a file to this chain's directory; returns its path."""
         content = content.encode() if isinstance(content, str) else content
         pathlib.Path(self.path(name)).write_bytes(content)
         return self.path(name)
@@ -55,7 +55,7 @@ class Chain:
     def fault(self, line: str) -> None:
         self.process.stdin.write(line + "\n")
         self.process.stdin.flush()
-        time.sleep(0.15)  # it looks at its stdin every 50 ms
+        time.sleep(0.15)  # the simulator polls its stdin every 50 ms
 
     def start(self, *words: str, profile: str | None = None) -> "Command":
         return Command([self.program, "--json", "--bus", self.url, "--profile", profile or self.profile, *words], self)
@@ -65,7 +65,7 @@ class Chain:
 
 
 class Command:
-    """A running `ucom` command; every line it says is kept with its time."""
+    """A running `ucom` command; every line of its output is stored with its time."""
 
     def __init__(self, words: list[str], chain: Chain):
         environment = os.environ | {"UCOM_INVENTORY": chain.path("inventory.toml"), "UCOM_CACHE": chain.path("cache")}
@@ -86,7 +86,7 @@ class Command:
             lines.append((time.time(), line.rstrip("\n")))
 
     def end(self, seconds: float = 120.0) -> int:
-        """Waits for the end; the exit code, -9 for a process that was killed."""
+        """Waits for the end; returns the exit code, -9 for a killed process."""
         try:
             code = self.process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -98,11 +98,11 @@ class Command:
         return code
 
     def said(self) -> dict:
-        """The last JSON object of its output."""
+        """Returns the last JSON object of its output."""
         return json.loads(self.out[-1][1]) if self.out else {}
 
     def note(self, text: str) -> float | None:
-        """When it first said so on stderr."""
+        """Returns the time of the first line on stderr with this text."""
         return next((at for at, line in list(self.notes) if text in line), None)
 
     def wait_note(self, text: str, seconds: float) -> float | None:
@@ -112,7 +112,7 @@ class Command:
         return self.note(text)
 
     def wait_out(self, text: str, seconds: float = 30.0) -> float | None:
-        """When it first printed a line with this text."""
+        """Waits for a line with this text on stdout, and returns its time."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             found = next((at for at, line in list(self.out) if text in line), None)
@@ -123,7 +123,7 @@ class Command:
 
 
 class Peer:
-    """Frames written as candump does: `1C1#0202`, and the bus's time of those that came."""
+    """Sends and receives frames written as candump does, `1C1#0202`, with the bus's times of received frames."""
 
     def __init__(self, port: int):
         self.bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
@@ -136,14 +136,14 @@ class Peer:
         self.bus.shutdown()
 
     def send(self, text: str) -> float:
-        """Sends, and tells when."""
+        """Sends a frame; returns the time."""
         number, data = text.split("#")
         now = time.time()
         self.bus.send(can.Message(arbitration_id=int(number, 16), is_extended_id=False, data=bytes.fromhex(data)))
         return now
 
     def next(self, seconds: float) -> str | None:
-        """The next frame within a time; `stamp` is when it was on the bus."""
+        """Returns the next frame within a time; `stamp` is the time at which it was on the bus."""
         end = time.monotonic() + seconds
         while True:
             message = self.bus.recv(max(0.0, end - time.monotonic()))
@@ -154,7 +154,7 @@ class Peer:
                 return None
 
     def all(self, seconds: float) -> list[str]:
-        """Everything within a time."""
+        """Returns all frames within a time."""
         end, frames = time.monotonic() + seconds, []
         while (left := end - time.monotonic()) > 0:
             frame = self.next(left)
@@ -163,12 +163,12 @@ class Peer:
         return frames
 
     def ask(self, text: str, seconds: float = 0.3) -> list[str]:
-        """Everything within a time after a frame."""
+        """Returns all frames within a time after a frame."""
         self.send(text)
         return self.all(seconds)
 
     def wait(self, *starts: str, seconds: float = 15.0) -> str:
-        """The next frame that begins so; others are passed over. Empty when none came."""
+        """Returns the next frame that begins with one of `starts`, and skips others; empty if none came."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             frame = self.next(left)
@@ -177,6 +177,6 @@ class Peer:
         return ""
 
     def answer(self, text: str, *starts: str, seconds: float = 5.0) -> str:
-        """The first frame that begins so after a request: a busy machine may take its time."""
+        """Sends a request and returns the first answer that begins with one of `starts`; the timeout allows for a busy machine."""
         self.send(text)
         return self.wait(*starts, seconds=seconds)

@@ -1,9 +1,9 @@
-"""Rows of the protocol's tests, run beside each other: each in a process of its own, on a bus of its own.
+"""Runs the rows of the protocol's tests in parallel, each in its own process and on its own bus.
 
-A row that fails beside others is run once more alone, and what it says then counts: both are printed.
+A row that fails while others run is repeated once alone, and the second result counts: both are printed.
 
-A row is a function of a `Bench`; it is run once for each byte order of words. Whatever is drawn by chance comes from a
-seed that is printed; `--seed N` draws the same again. `--only TEXT` runs the rows whose function's name has that text.
+A row is a function of a `Bench`; it runs once for each byte order of words. Random values depend on a seed that is printed; `--seed N`
+gives the same values again. `--only TEXT` runs the rows whose function name contains that text.
 """
 
 import argparse
@@ -16,19 +16,19 @@ import traceback
 
 from peer import Chain
 
-# Times of the protocol are held to within a fifth.
+# Times of the protocol have a tolerance of a fifth.
 BENCH = 1.2
-# A machine that wakes its programs so late, s, tells nothing about answers within 100 ms.
+# A machine that wakes its programs this late, s, cannot judge answers within 100 ms.
 TOO_LATE = 0.05
 TRIES = 3
 
 
 class Disagreement(Exception):
-    """What was expected did not come."""
+    """The result differs from the expected one."""
 
 
 class Jitter(threading.Thread):
-    """How late this machine wakes those who sleep 5 ms: no one here can be more punctual than that."""
+    """Measures how late this machine wakes threads that sleep 5 ms: no program here can be more punctual."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -44,12 +44,12 @@ class Jitter(threading.Thread):
                 self.late.append((time.time(), late))
 
     def worst(self, since: float, until: float) -> float:
-        """Longest delay that ended between two times, s."""
+        """Returns the longest delay that ended between two times, s."""
         return max((late for at, late in list(self.late) if since <= at <= until + late), default=0.0)
 
 
 class Bench:
-    """What a row works with."""
+    """Environment of a row."""
 
     def __init__(self, program: str, order: str, seed: int, name: str):
         self.program, self.order = program, order
@@ -63,11 +63,11 @@ class Bench:
         return Chain(self.program, "--seed", str(self.seed), *options, order=self.order, profile=profile)
 
     def bus(self, profile: str = "") -> Chain:
-        """A bus without boards."""
+        """Starts a bus without boards."""
         return self.chain("--boards", "0", profile=profile)
 
     def ok(self, rule: str, note: str = "") -> None:
-        """This rule holds."""
+        """Records that this rule holds."""
         self.lines.append(f"{rule} {self.order}-endian ok{': ' if note else ''}{note}")
 
     def expect(self, holds: bool, rule: str, expected: str, came) -> None:
@@ -78,23 +78,23 @@ class Bench:
         self.expect(came == expected, rule, f"{what} {expected}", came)
 
     def within(self, rule: str, what: str, seconds: float, low: float, high: float) -> None:
-        """A time between two others, s."""
+        """Checks that a time is between two others, s."""
         self.expect(low <= seconds <= high, rule, f"{what} after {low:.3f} to {high:.3f} s", f"{seconds:.3f} s")
 
     def image(self, least: int = 200, most: int = 1200) -> bytes:
-        """An image of whole words."""
+        """Returns an image of whole words."""
         return self.random.randbytes(2 * self.random.randint(least // 2, most // 2))
 
     def flash_ids(self, count: int) -> list[int]:
-        """Flash numbers that differ in their low seven bits."""
+        """Returns flash numbers that differ in their low seven bits."""
         return [self.random.randrange(256) << 8 | low for low in self.random.sample(range(1, 128), count)]
 
 
 def run_row(program: str, order: str, seed: int, function) -> tuple[bool, list[str], float]:
-    """One row; whether it held, and what is to be said.
+    """Runs one row; returns whether it held, and the lines to print.
 
-    Answers within 100 ms need a machine that lets its programs run within 100 ms: a row that failed while it did not is
-    run again, three times in all.
+    Answers within 100 ms need a machine that lets its programs run within 100 ms. A row that failed while the machine was too slow is run
+    again, three times in all.
     """
     start, lines = time.monotonic(), []
     for tries in range(TRIES):
@@ -117,7 +117,7 @@ def run_row(program: str, order: str, seed: int, function) -> tuple[bool, list[s
 
 
 def main(rows: list, workers: int = 12) -> None:
-    """Runs the rows of a script: its arguments are the `ucom` program and the options above. Exit code 0: all hold."""
+    """Runs the rows of a script. The arguments are the `ucom` program and the options above. Exit code 0: all hold."""
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("--seed", type=int, default=1)
@@ -143,7 +143,7 @@ def main(rows: list, workers: int = 12) -> None:
 
 
 def told(row, order: str, came: tuple[bool, list[str], float]) -> bool:
-    """Prints what came of a row; whether it held."""
+    """Prints the result of a row; returns whether it held."""
     good, lines, seconds = came
     for line in lines:
         print(line, flush=True)

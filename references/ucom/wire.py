@@ -1,13 +1,13 @@
-"""Bytes of the protocol, packed from its tables alone. `order` is "little" or "big", as `int.to_bytes` takes it."""
+"""Bytes of the protocol, packed only from its tables. `order` is "little" or "big", as for `int.to_bytes`."""
 
 
 def frame(function: int, sequence: int, data: bytes = b"") -> str:
-    """A frame as candump writes it: function in bits 10..6 of the identifier, sequence number in bits 4..0."""
+    """Returns a frame as candump writes it: function in bits 10..6 of the identifier, sequence number in bits 4..0."""
     return f"{function << 6 | sequence:03X}#{data.hex().upper()}"
 
 
 def parts(text: str) -> tuple[int, int, bytes]:
-    """Function, sequence number and data of a frame."""
+    """Returns function, sequence number and data of a frame."""
     number, data = text.split("#")
     return int(number, 16) >> 6, int(number, 16) & 0x1F, bytes.fromhex(data)
 
@@ -21,19 +21,19 @@ def number(order: str, data: bytes) -> int:
 
 
 def report(flash: int) -> str:
-    """DSP_REPORTk: bits 6..5 of the flash number choose the function, bits 4..0 are the sequence field."""
+    """Returns DSP_REPORTk: bits 6..5 of the flash number select the function, bits 4..0 are the sequence field."""
     return frame(16 + (flash >> 5 & 3), flash & 0x1F, bytes([flash & 0xFF]))
 
 
 def string(order: str, text: str, inclusive: bool = False) -> list[bytes]:
-    """A string's packages: how many follow (or how many there are), then eight characters each."""
+    """Returns a string's packages: the number of packages that follow (or of all packages), then eight characters each."""
     data = text.encode("latin-1")
     packages = [data[i:i + 8] for i in range(0, len(data), 8)]
     return [word(order, len(packages) + inclusive), *packages]
 
 
 def texts(order: str, payloads: list[bytes]) -> list[str]:
-    """Texts of string packages."""
+    """Returns the texts of string packages."""
     out, rest = [], list(payloads)
     while rest:
         count = number(order, rest.pop(0))
@@ -43,18 +43,18 @@ def texts(order: str, payloads: list[bytes]) -> list[str]:
 
 
 def package(order: str, offset: int, *words: int) -> bytes:
-    """A buffer package: index of the first word, three words, what is missing is 0."""
+    """Returns a buffer package: index of the first word, then three words; missing words are 0."""
     words = (*words, 0, 0, 0)[:3]
     return word(order, offset) + b"".join(word(order, w) for w in words)
 
 
 def packages(order: str, buffer: list[int]) -> list[bytes]:
-    """A whole buffer."""
+    """Returns the packages of a whole buffer."""
     return [package(order, i, *buffer[i:i + 3]) for i in range(0, len(buffer), 3)]
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/CCITT-FALSE, bit by bit."""
+    """Returns CRC-16/CCITT-FALSE, computed bit by bit."""
     crc = 0xFFFF
     for byte in data:
         crc ^= byte << 8
@@ -65,7 +65,7 @@ def crc16(data: bytes) -> int:
 
 def header(order: str, cycle: int, image: bytes, date: int, target: int = 0xFFFF, address: int = 0,
            length: int | None = None) -> bytes:
-    """The header block of a cycle; its words add up to 0."""
+    """Returns the header block of a cycle; its words add up to 0."""
     length = len(image) // 2 if length is None else length
     words = [0x5543, 1, cycle, 0, address & 0xFFFF, address >> 16, length & 0xFFFF, length >> 16]
     words += [crc16(image), date, target] + [0xFFFF] * 20
@@ -74,6 +74,6 @@ def header(order: str, cycle: int, image: bytes, date: int, target: int = 0xFFFF
 
 
 def padded(image: bytes) -> list[bytes]:
-    """Data blocks of an image."""
+    """Returns the data blocks of an image."""
     image += b"\xff" * (-len(image) % 64)
     return [image[i:i + 64] for i in range(0, len(image), 64)]

@@ -1,4 +1,4 @@
-//! The body of the fuzz target over the inputs that are kept, and over some at random.
+//! Body of the fuzz target, run with the kept inputs and with random ones.
 use jtc_agent::modbus::fuzzing::modbus_stream;
 use proptest::prelude::*;
 
@@ -13,7 +13,7 @@ fn request(pdu: Vec<u8>) -> Vec<u8> {
     [&[0xAB, 0xCD, 0, 0][..], &len.to_be_bytes(), &[7], &pdu].concat()
 }
 
-/// Mostly of the device's own addresses, and mostly as long as they should be.
+/// Random requests, mostly with addresses of the device and a correct length.
 fn requests() -> impl Strategy<Value = Vec<u8>> {
     let any_request = prop::collection::vec(any::<u8>(), 1..20);
     let write =

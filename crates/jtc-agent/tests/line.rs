@@ -1,4 +1,4 @@
-//! Many clients on one line: whose records are whose, who may command, and how soon a Stop is on the line.
+//! Many clients on one line: which client receives a record, which client may command, and how soon a Stop is on the line.
 use crate::board;
 
 use std::time::Duration;
@@ -16,7 +16,7 @@ const PAUSE: [u8; 7] = fixed::exec(ExecCommand::Pause);
 const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 const EXECUTE: [u8; 7] = fixed::exec(ExecCommand::Execute);
 
-/// A segment of so many points.
+/// Returns a segment of `points` points.
 fn segment(points: usize) -> Vec<u8> {
     let points = vec![RawPoint::default(); points];
     let mut bytes = vec![0; 60_000];
@@ -53,7 +53,7 @@ proptest! {
         board.run_ms(100);
         let at = board.frames.iter().find(|(_, t, _)| *t == Some(FrameType::TrajSetExecStatus)).expect("it came").0;
         prop_assert!(at - asked <= Duration::from_millis(40), "{:?}", at - asked);
-        // Nothing of the upload comes any more, and whoever sends it knows why.
+        // No further frame of the upload arrives, and its sender is told the reason.
         board.run_ms(6_000);
         let behind = board.frames.iter().filter(|(t, kind, _)| *t > at && kind.is_some()).count();
         prop_assert_eq!(behind, 0);
@@ -63,12 +63,13 @@ proptest! {
         let refused = records.iter().filter(|r| r.data == DataStatus::NotAllowed).count();
         prop_assert_eq!(refused, 4 - after);
         prop_assert!(denied.len() == refused && denied.iter().all(|why| why.contains("bob has stopped")));
-        // The one who stopped has the record of it.
+        // The client that stopped the arm receives the record of its Stop.
         let (records, _) = board.take(other);
         prop_assert!(records.len() == 1 && records[0].accepted());
     }
 
-    /// However long the system takes to take bytes: no more than 256 wait, and the silence ahead of a Stop is long enough for it to be one.
+    /// The operating system may accept bytes late. At most 256 bytes are queued there, and the silence before a Stop is long enough to
+    /// separate it from the abandoned frame.
     #[test]
     fn j04_j05_a_stop_in_an_upload_on_a_busy_computer_is_a_frame_of_its_own(
         after_us in 0u64..400_000, points in 20usize..1666, held_up_us in prop::collection::vec(0u64..15_000, 0..20),
@@ -81,7 +82,8 @@ proptest! {
         board.run_ms(after_us / 1000);
         board.send(bob, &STOP);
         board.run_ms(100);
-        // A frame that a system has torn leaves more than one bad record, and a Stop that may be meant by one is sent again: each comes whole.
+        // A frame that a delay of the system has interrupted leaves more than one bad record. A Stop that may belong to such a record is
+        // sent again. Each Stop arrives as a complete frame.
         let stops = board.written.iter().filter(|(_, bytes)| bytes.ends_with(&STOP)).count();
         prop_assert!(stops >= 1);
         prop_assert_eq!(board.arrived(FrameType::TrajSetExecStatus), stops);
@@ -97,7 +99,7 @@ proptest! {
         let asks = [FrameType::GetInfo, FrameType::TrajSetExecStatus];
         let mut sent = [Vec::new(), Vec::new(), Vec::new()];
         for (client, kind) in frames {
-            // The first one commands; all of them ask and pause.
+            // The first client commands; all clients send requests, but only the first one sends commands.
             let frame: Vec<u8> = match (client, kind) {
                 (_, 0) => fixed::GET_INFO.to_vec(),
                 (_, 1) => fixed::get_arm(256).to_vec(),
@@ -110,7 +112,7 @@ proptest! {
             board.send(clients[client], &frame);
             board.run_ms(seed_ms);
         }
-        // A request that returns something waits for what the last one returned, which this board never sends.
+        // A request that returns a frame waits for the frame of the last request, which this board never sends.
         board.run_ms(60 * 520 + 2000);
         for (client, sent) in clients.iter().zip(&sent) {
             let (records, denied) = board.take(*client);
@@ -130,7 +132,7 @@ proptest! {
         board.send(a, &bytes);
         board.send(b, &fixed::CLEAR_OCCURRED_ERRORS);
         board.run_ms(200);
-        // Only whole good frames get on the line.
+        // Only complete valid frames are written to the line.
         prop_assert!(board.frames.iter().all(|(_, kind, _)| *kind == Some(FrameType::ClearOccurredErrors)));
         prop_assert_eq!(board.take(b).0.len(), 1);
     }
@@ -169,7 +171,7 @@ fn one_client_commands_and_all_see_who() {
         assert!(denied.len() == 1 && denied[0].contains(why), "{denied:?}");
     }
     assert_eq!(board.arrived(FrameType::GripperControl), 0);
-    // With consent it is another's.
+    // The holder releases the lease, and the waiting client gets it.
     let now = board.now();
     board.line.want_lease(b, now).expect("somebody has it");
     assert!(board.take(a).1.contains(&"bob wants it".to_owned()));
@@ -202,7 +204,7 @@ fn a_lease_that_is_not_renewed_lapses_and_its_policy_counts() {
         board.run_ms(200);
         assert_eq!(board.line.lease(), None, "{policy:?}");
         let sent = board.frames.iter().find(|f| f.1 == Some(FrameType::TrajSetExecStatus)).map(|f| f.2[4]);
-        // An arm that was taught is held again.
+        // Teaching is ended, so that the arm is in position hold again.
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), usize::from(wanted.is_some()));
         assert_eq!(sent, wanted, "{policy:?}");
         let now = board.now();
@@ -244,7 +246,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert_eq!(board.arrived(FrameType::GripperControl), 1, "it moves nothing");
-    // It is sent again by a program that does not look at the reason, and an upload leads nowhere.
+    // A program that ignores the refusal repeats the command, and sends an upload. No frame is written.
     for _ in 0..20 {
         board.run_ms(400);
         board.send(a, &EXECUTE);
@@ -253,7 +255,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1, "nobody has asked for it since");
     assert_eq!(board.arrived(FrameType::Trajectory), 0);
-    // Who asks has to know of the Stop.
+    // A request for a motion must name the number of the last Stop.
     let (now, last) = (board.now(), board.line.last_halt());
     assert!(board.line.ask_to_move(a, last - 1, now).is_err());
     board.send(a, &EXECUTE);
@@ -263,7 +265,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.send(a, &EXECUTE);
     board.run_ms(100);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 2);
-    // Nor does what one has sent before a Stop of one's own.
+    // A client's frames from before its own Stop begin no motion either.
     let before = board.frames.len();
     board.send(a, &segment(1600));
     board.run_ms(50);
@@ -273,7 +275,7 @@ fn what_may_have_been_on_its_way_when_somebody_stopped_begins_no_motion() {
     board.run_ms(200);
     let sent: Vec<u8> = board.frames[before..].iter().filter(|f| f.1.is_some()).map(|f| f.2[4]).collect();
     assert_eq!(sent, [1]);
-    // Nobody is kept from starting again after it.
+    // After its own Stop the client may start again at once.
     board.send(a, &STOP);
     board.send(a, &EXECUTE);
     board.run_ms(100);
@@ -304,7 +306,7 @@ fn a_client_that_sends_without_end_is_put_out() {
     assert_eq!(board.line.take_deliveries(a), None);
 }
 
-/// Teaching waits for the arm to be held, and the controller refuses a Stop meanwhile: the arm would be loose behind it.
+/// Teaching begins only in position hold, and the controller refuses a Stop until then: the arm would be compliant after the Stop.
 #[test]
 fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     for damaged in [0, 10] {
@@ -323,7 +325,7 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
         board.run_ms(1_000);
         assert_eq!(board.arrived(FrameType::TeachingModeDisable), 1);
         assert!(board.line.is_idle());
-        // While it is taught, too, and not again when it is not any more.
+        // A Stop also ends Teaching that is on. After Teaching it sends no further end of Teaching.
         board.status.state = ControllerState::Teaching.into();
         board.run_ms(100);
         board.send(b, &STOP);
@@ -337,7 +339,7 @@ fn somebody_who_stops_an_arm_ends_the_teaching_that_was_asked_for() {
     }
 }
 
-/// A program that ends as it should leaves an arm at rest, and keeps nobody from moving it.
+/// A client that disconnects from an arm at rest causes no hold-off for the other clients.
 #[test]
 fn a_policy_where_nothing_moves_stops_nobody_else() {
     for (state, moves, sent) in [
@@ -367,7 +369,7 @@ fn a_policy_where_nothing_moves_stops_nobody_else() {
     }
 }
 
-/// What goes on without its client takes the lease again, also in the middle of an upload; what does not, does not.
+/// An upload with the policy Continue takes the lease again after it has lapsed. With Pause the upload ends.
 #[test]
 fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
     for (policy, arrived) in [(Policy::Continue, 4), (Policy::Pause, 0)] {
@@ -382,7 +384,7 @@ fn an_upload_whose_lease_lapses_goes_on_by_its_policy() {
         board.run_ms(9_000);
         assert_eq!(board.arrived(FrameType::Trajectory), arrived, "{policy:?}");
         assert!(board.line.lease().is_none());
-        // Nor does it take the lease by anything else that it still sends.
+        // With Pause, later commands of this client do not take the lease again either.
         board.send(a, &fixed::gripper_control(true));
         assert_eq!(board.line.lease().is_some(), policy == Policy::Continue);
         let now = board.now();
@@ -408,7 +410,7 @@ fn a_client_that_sends_too_much_can_stop_the_arm_all_the_same() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
 }
 
-/// A key that is held down has to be let go before it moves the arm again.
+/// A jog key that was held down during a Stop must be released before it moves the arm again.
 #[test]
 fn who_goes_on_asking_for_a_jog_behind_a_stop_does_not_get_it() {
     let mut board = Board::new(115_200);
@@ -434,7 +436,7 @@ fn j04_a_stop_that_the_line_damages_is_sent_again_for_whoever_asked() {
     board.run_ms(2_000);
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), 1);
     assert!(board.line.is_idle());
-    // However many ask for what, the last word is Stop, and all of them have its record.
+    // Many requests of both kinds: the last command on the line is a Stop, and all requesters receive a record.
     for _ in 0..100 {
         board.send(viewer, &PAUSE);
     }
@@ -509,7 +511,7 @@ fn a_stop_is_not_given_up_while_the_device_is_away() {
     assert!(board.line.is_idle());
 }
 
-/// Behind a Stop only that moves the arm which was asked for after it, however long it has waited.
+/// After a Stop, a motion begins only if it was requested after that Stop, however late its frame arrives.
 #[test]
 fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     let mut board = Board::new(115_200);
@@ -526,7 +528,7 @@ fn what_was_asked_for_before_a_halt_moves_nothing_however_late_it_comes() {
     assert_eq!(board.arrived(FrameType::TrajSetExecStatus), before, "it was asked for before the Stop");
     let (_, denied) = board.take(anna);
     assert!(denied.iter().any(|why| why.contains("bob has stopped")), "{denied:?}");
-    // Asked for anew it is sent, and what it pauses itself on its way it goes on from.
+    // After a new request the Execute is sent. The client's own Pause does not revoke that request.
     ask(&mut board, anna).expect("it is long ago");
     board.send(anna, &EXECUTE);
     board.run_ms(1_000);
@@ -551,7 +553,7 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     board.line.halt_for(Some(anna), "anna", ExecCommand::Pause, now);
     board.run_ms(100);
     assert!(ask(&mut board, anna).is_err(), "bob's counts");
-    // She comes again, and the three seconds are the same.
+    // A client that connects again has the same hold-off of three seconds.
     board.line.leave(anna, now);
     let again = operator(&mut board, "anna");
     assert!(ask(&mut board, again).is_err(), "bob's counts");
@@ -563,7 +565,8 @@ fn ones_own_pause_takes_nothing_back_of_somebody_elses_and_a_newcomer_waits_as_w
     ask(&mut board, again).expect("it is over");
 }
 
-/// A client whose policy has ended its motion begins no other one by itself, also where somebody else has gone on with the first.
+/// A client whose policy has ended its motion begins no other motion without a new request, even if another client has resumed the first
+/// motion meanwhile.
 #[test]
 fn a_lease_that_lapsed_with_a_pause_is_not_taken_again_by_what_waits() {
     let mut board = Board::new(115_200);
@@ -609,10 +612,10 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     let denied = board.line.want_lease(carl, now).expect_err("bob was first").to_string();
     assert!(denied.contains("bob") && denied.contains("anna"), "{denied}");
     assert_eq!(board.line.lease().and_then(|lease| lease.wanted_by), Some(bob));
-    // He gives up.
+    // The waiting client disconnects.
     board.line.leave(bob, now);
     board.line.want_lease(carl, now).expect("nobody waits any more");
-    // One without a connection of its own shows that it waits.
+    // A client without a connection to the line keeps its place in the queue by sending requests.
     let dora = operator(&mut board, "dora");
     let lasts = Some(Duration::from_secs(1));
     board.line.leave(carl, now);
@@ -628,12 +631,12 @@ fn the_first_who_asks_for_a_lease_keeps_its_place_as_long_as_it_waits() {
     let now = board.now();
     board.line.want_lease(emil, now).expect("she has lapsed");
     board.line.release_lease(anna, now).expect("it is hers");
-    // Who has got it waits no more.
+    // A client that has received the lease no longer waits for it.
     assert_eq!(board.line.lease().map(|lease| (lease.holder, lease.wanted_by)), Some((emil, None)));
     board.line.want_lease(anna, now).expect("nobody waits");
 }
 
-/// A client that commands and falls silent is noticed although another one asks all the time, also by what waits for the line.
+/// The controller detects a silent lease holder although another client sends requests all the time, even with queued requests.
 #[test]
 fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
     for (timeout_ms, every_ms) in [(600, 10), (2000, 50), (2000, 250), (5000, 100)] {
@@ -658,19 +661,19 @@ fn j59_a_holder_that_falls_silent_is_not_hidden_by_questions() {
         }
         let asked = board.frames.iter().filter(|(_, kind, _)| *kind == Some(FrameType::GetInfo));
         let shown = asked.map(|(at, ..)| at.saturating_sub(silent_from)).max().unwrap_or_default();
-        // The frame that is being written when half of the timeout is over still comes.
+        // A frame that is being written when half of the timeout has passed still arrives.
         let limit = Duration::from_millis(timeout_ms / 2 + 20);
         assert!(shown <= limit, "{timeout_ms} ms, every {every_ms} ms: a frame came after {shown:?}");
     }
 }
 
-/// While the arm moves under host supervision, only the client that commands shows the controller that its host is there.
+/// While the arm moves under host supervision, only frames of the lease holder show the controller that its host is alive.
 #[test]
 fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
     use ControllerState::{HoldPos, Operate, Teaching};
     use TrajectoryState::{Execute, Finish, Pause, Stop};
-    // Timeout (ms), what the controller shows, whether the holder lapses, how often it sends a frame (ms; 0: never), whether the viewer's
-    // questions pass.
+    // Timeout, ms; state of the controller; `true` if the holder's lease lapses; period of the holder's frames, ms, 0: none; `true` if the
+    // viewer's requests pass.
     let cases = [
         (0, (Operate, Execute), true, 0, true),
         (1500, (Operate, Execute), true, 0, false),
@@ -706,13 +709,13 @@ fn j59_questions_of_others_do_not_stand_for_the_client_that_commands() {
         board.take(bob);
         let before = board.arrived(FrameType::GetInfo);
         let (mut asked, mut own) = (0, 0);
-        // The board returns nothing, which is waited for each time: questions take longer than 3 s.
+        // The board never returns the requested frame, and each request waits for it: the requests take longer than 3 s.
         for ms in (0..13_000).step_by(250) {
             if every_ms > 0 && ms % every_ms == 0 {
                 board.send(anna, &fixed::get_settings(0));
                 own += 1;
             }
-            // Just after a frame of the holder questions may pass.
+            // Shortly after a frame of the holder, requests may pass.
             if ms < 3000 && (every_ms != 2000 || ms % 2000 >= 400) {
                 board.send(bob, &fixed::GET_INFO);
                 asked += 1;

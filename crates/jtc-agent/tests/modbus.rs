@@ -1,4 +1,4 @@
-//! PLCs at a simulated arm: what begins a motion and what does not, who commands, and who gets in.
+//! PLCs with a simulated arm: which requests begin a motion, which connection commands, and which addresses may connect.
 use std::io::{Read as _, Write as _};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
@@ -18,7 +18,7 @@ use jtc_wire::{ControllerState, Joint, Status};
 use proptest::prelude::*;
 use test_kit::patience::{LONGEST, until};
 
-/// The number before that of the first command.
+/// Sequence number before that of the first command.
 const FIRST: u16 = 700;
 const HERE: [u8; 4] = [127, 0, 0, 1];
 const THERE: [u8; 4] = [127, 0, 0, 2];
@@ -39,7 +39,7 @@ impl Cell {
         Self::with_faults(allowed, Vec::new())
     }
 
-    /// One whose arm has these faults.
+    /// Starts a cell whose arm has these faults.
     fn with_faults(allowed: &[&str], faults: Vec<Fault>) -> Self {
         let arm = Arm::avena();
         let config = SimConfig { baud: Some(921_600), ..SimConfig::new(arm.config(), &arm.parameters()) };
@@ -81,7 +81,7 @@ impl Cell {
         })
     }
 
-    /// An arm that is held.
+    /// Recovers the arm to position hold.
     fn recover(&self, client: &mut Client) {
         until("a report", || client.input(4) < 500);
         assert_eq!(client.command(Command::RecoverWithDefaults), Outcome::Done);
@@ -99,7 +99,7 @@ fn there_and_back() -> String {
     there.to_exact_csv()
 }
 
-/// A connection of a PLC.
+/// Connection of a PLC.
 struct Client(TcpStream);
 
 impl Client {
@@ -108,7 +108,7 @@ impl Client {
         self.0.write_all(&pdus.iter().flat_map(frame).collect::<Vec<u8>>()).expect("it reads");
     }
 
-    /// The next response; `None`: it is closed.
+    /// Returns the next response; `None` if the connection is closed.
     fn response(&mut self) -> Option<Vec<u8>> {
         self.0.set_read_timeout(Some(LONGEST)).expect("a time");
         let mut head = [0; 7];
@@ -133,7 +133,7 @@ impl Client {
         self.input(14).wrapping_add(1)
     }
 
-    /// A command, and what became of it.
+    /// Sends a command and returns its outcome.
     fn command(&mut self, command: Command) -> Outcome {
         let next = self.next();
         let response = self.ask(&order(command, next));
@@ -143,7 +143,7 @@ impl Client {
     }
 }
 
-/// All holding registers in one request: trajectory 3 with approach.
+/// Returns a request that writes all holding registers: trajectory 3 with approach.
 fn order(command: Command, sequence: u16) -> Vec<u8> {
     let values = [1000, 1, 3, 100, 1, 1, command as u16, sequence];
     [16, 0, 0, 0, 8, 16]
@@ -155,21 +155,22 @@ fn order(command: Command, sequence: u16) -> Vec<u8> {
 const PRESS: [u8; 5] = [5, 0, 0, 0xFF, 0];
 const LET_GO: [u8; 5] = [5, 0, 0, 0, 0];
 
-/// However near behind the start: in the same packet, as a coil that is 1 for a moment, or as the next command.
+/// The Stop follows the start immediately: in the same packet, as a coil that is 1 for a moment, or as the next command.
 #[test]
 fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     let cell = Cell::start(&[]);
     let mut client = cell.connect();
     cell.recover(&mut client);
     drop(client);
-    // By hand: what was commanded is not begun before all of it has come, which is as late as it can be.
+    // Passes the requests to the PLC directly. The command then begins only after all requests have arrived, which is the latest possible
+    // time.
     let connection = plc::Connection { number: 1000, peer: (IpAddr::from(HERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().expect("a runtime");
     let acknowledged = || {
         let pdu = cell.plc.respond(&connection, &[4, 0, 14, 0, 2]);
         (u16::from_be_bytes([pdu[2], pdu[3]]), usize::from(pdu[5]))
     };
-    // When the server has noticed that the other one is closed.
+    // Waits until the server has detected that the first connection is closed.
     let write = [6, 0, holding::SPEED as u8, 0, 100];
     until("its turn", || cell.plc.respond(&connection, &write) == write);
     for command in [Command::Start, Command::Recover, Command::TeachOn] {
@@ -197,7 +198,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     cell.plc.left(&connection);
     let mut client = cell.connect();
-    // In one packet.
+    // Start, Stop coil on and Stop coil off in one packet.
     for _ in 0..3 {
         let start = order(Command::Start, client.next());
         client.send(&[&start, &PRESS, &LET_GO]);
@@ -210,7 +211,7 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     }
     let executed = cell.jobs.list().into_iter().filter(|job| job.done.summary.is_some());
     assert_eq!(executed.count(), 0);
-    // Its own Stop: it goes on when it likes.
+    // After its own Stop the PLC needs no hold-off.
     assert_eq!(client.command(Command::Start), Outcome::Done);
     until("a motion", || {
         client.input(1);
@@ -219,13 +220,13 @@ fn a_stop_behind_a_start_leaves_the_arm_where_it_is() {
     client.ask(&PRESS);
 }
 
-/// From another address: not while the lease of the one before goes on, and never with what that one wrote.
+/// A PLC with another address cannot write while the lease of the first PLC lasts, and it never uses values that the first one has written.
 #[test]
 fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_defaults() {
     let cell = Cell::start(&["127.0.0.0/8"]);
     let mut client = cell.connect();
     until("a report", || client.input(4) < 500);
-    // By hand: where a connection of the other address comes from is not ours to choose.
+    // Passes the requests to the PLC directly, because a test cannot choose the address of a connection.
     let there = plc::Connection { number: 1000, peer: (IpAddr::from(THERE), 5).into() };
     let runtime = tokio::runtime::Builder::new_current_thread().build().expect("a runtime");
     let _entered = runtime.enter();
@@ -239,7 +240,7 @@ fn another_plc_commands_when_the_one_before_has_gone_and_begins_with_the_default
     assert!(begun.elapsed() > Duration::from_secs(1), "{:?}", begun.elapsed());
     let read = |at: usize| cell.plc.respond(&there, &[3, 0, at as u8, 0, 1])[3];
     assert_eq!((read(holding::SPEED), read(holding::TRAJECTORY)), (100, 5));
-    // As long as its watchdog, or until it has gone: it has no lease.
+    // A commanding PLC without a lease keeps its turn for the time of its watchdog, or until it disconnects.
     let here = plc::Connection { number: 1001, peer: (IpAddr::from(HERE), 5).into() };
     assert_eq!(cell.plc.respond(&there, &[6, 0, holding::WATCHDOG as u8, 0xEA, 0x60])[0], 6);
     assert_eq!(cell.plc.respond(&here, &[6, 0, 2, 0, 1]), [0x86, 6]);
@@ -261,13 +262,13 @@ fn eight_may_connect_and_the_ninth_takes_the_place_of_one_that_asks_for_nothing(
     for other in &mut others[1..] {
         other.input(0);
     }
-    // The one that commands is as silent as the one that gives way.
+    // The commanding connection was silent for as long as the closed one.
     assert_eq!(cell.connect().input(0), 1);
     assert!(others[0].response().is_none());
     assert_eq!(first.input(0), 1);
 }
 
-/// It may be closed before or behind what is sent.
+/// Returns true if the server closes the connection, before or after it receives the request.
 fn is_refused(mut client: Client) -> bool {
     let _ = client.0.write_all(&[0, 1, 0, 0, 0, 6, 9, 4, 0, 0, 0, 1]);
     client.response().is_none()
@@ -278,7 +279,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let cell = Cell::start(&[]);
     let mut clients: Vec<Client> = (0..8).map(|_| cell.connect()).collect();
     let silence = || std::thread::sleep(Duration::from_millis(2100));
-    // The last of them would be the next to give way but for the others' coils.
+    // The coils of the first seven connections keep them open, so the last connection is closed.
     for (n, client) in clients.iter_mut().enumerate() {
         client.input(0);
         assert_eq!(if n < 7 { client.ask(&PRESS) } else { PRESS.to_vec() }, PRESS);
@@ -287,7 +288,7 @@ fn a_connection_that_holds_the_arm_by_a_coil_does_not_give_way() {
     let mut ninth = cell.connect();
     assert_eq!(ninth.input(0), 1);
     assert!(clients.pop().expect("the last").response().is_none());
-    // Where all hold the arm nobody comes, until one lets it go.
+    // If coils of all connections hold the arm, no new connection is accepted until one coil is 0 again.
     assert_eq!(ninth.ask(&PRESS), PRESS);
     silence();
     assert!(is_refused(cell.connect()));
@@ -320,7 +321,7 @@ fn without_a_controller_a_stop_fails_and_nothing_else_is_done() {
     }
 }
 
-/// A request that is made up.
+/// Random requests that write.
 fn requests() -> impl Strategy<Value = Vec<u8>> {
     let values = prop::collection::vec(prop_oneof![0..15_u16, 690..720_u16, any::<u16>()], 1..9);
     let written = (0..10_u16, values.clone()).prop_map(|(at, values)| {
@@ -334,12 +335,12 @@ fn requests() -> impl Strategy<Value = Vec<u8>> {
     });
     let bytes = (0..24_u8, prop::collection::vec(any::<u8>(), 0..30))
         .prop_map(|(function, rest)| [vec![function], rest].concat());
-    // No coil: its Stop is to be seen below.
+    // No coils, because the Stop of a coil would be counted below.
     prop_oneof![4 => written, 4 => single, 2 => bytes]
         .prop_filter("no coil", |pdu| pdu[0] != 5 && pdu[0] != 15)
 }
 
-/// The number behind the last would be written by this.
+/// Returns true if the request would write the next sequence number.
 fn is_next(pdu: &[u8]) -> bool {
     let sequence = holding::SEQUENCE;
     let value = match pdu {
@@ -356,10 +357,10 @@ fn is_next(pdu: &[u8]) -> bool {
     u16::from_be_bytes(value) == FIRST + 1
 }
 
-/// The cause stands in no status: the agent asks for it. After the errors were cleared an arm whose encoder has jumped executes nothing.
+/// No status contains the cause, so the agent requests it. After the errors were cleared, an arm whose encoder has jumped executes nothing.
 #[test]
 fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
-    // Long after the drives are enabled.
+    // Long after the drives were enabled.
     let jump = Fault {
         kind: FaultKind::EncoderJump { joint: Joint::ALL[2], rad: 0.02 },
         trigger: Trigger::InState(ControllerState::HoldPos, 10_000),
@@ -381,7 +382,7 @@ fn j69_a_held_stop_is_read_with_its_cause_and_cleared() {
     assert_eq!((client.input(20), client.input(21)), (33, 3));
 }
 
-/// Whatever a PLC writes without the next number: nothing goes to the controller, no job begins, nobody commands.
+/// Without the next sequence number, no write of a PLC sends a frame to the controller, begins a job or takes the lease.
 #[test]
 fn nothing_goes_to_the_controller_without_the_next_number() {
     let cell = Cell::start(&[]);

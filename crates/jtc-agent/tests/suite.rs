@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! All tests of the crate in one program, which links as fast as a single one: each file here is a module of it.
 mod board;
 mod description;
 mod fuzz_regressions;

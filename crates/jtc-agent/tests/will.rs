@@ -1,4 +1,4 @@
-//! Whose policy acts on what moves when the agent is killed.
+//! Policy that applies to the motion after the agent was killed.
 use crate::board;
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use jtc_agent::line::{Applied, Moves, Will};
 use jtc_agent::{LineEvent, Policy, Role};
 use jtc_wire::{ControllerState, ExecCommand, FrameType, RawPoint, TrajectoryState, fixed, trajectory};
 
-/// The wills that were reported since, in order.
+/// Returns the wills that were reported since the last call, in order.
 fn wills(board: &mut Board) -> Vec<Option<Will>> {
     let events = board.line.take_events().into_iter();
     events.filter_map(|event| if let LineEvent::Will(will) = event { Some(will) } else { None }).collect()
@@ -35,7 +35,7 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.send(anna, &segment());
     board.run_ms(300);
     assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Upload)]);
-    // Before any status shows it.
+    // The will changes before any status shows the motion.
     board.send(anna, &fixed::exec(ExecCommand::Execute));
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Stop, Moves::Motion)]);
@@ -44,11 +44,11 @@ fn a_will_is_there_from_the_upload_to_rest_and_is_that_of_who_commands() {
     board.line.set_policy(anna, Policy::Continue);
     board.run_ms(20);
     assert_eq!(wills(&mut board), [will("anna", Policy::Continue, Moves::Motion)]);
-    // Nothing is received: in doubt it moves on.
+    // No status is received: the arm may still move, and the will stays.
     board.deaf_until = board.now() + Duration::from_secs(3);
     board.run_ms(3_500);
     assert_eq!(wills(&mut board), []);
-    // What she has left it to lasts without her, and somebody else's counts when somebody else commands.
+    // The will stays after its client has disconnected. When another client takes the lease, the policy of that client applies.
     let now = board.now();
     board.line.leave(anna, now);
     let bob = board.join("bob", Role::Operator, Policy::Pause);
@@ -81,7 +81,7 @@ fn teaching_has_a_will_before_it_shows_and_an_upload_that_leads_nowhere_none_aft
     assert_eq!(wills(&mut board), [will("anna", Policy::Pause, Moves::Upload), None]);
 }
 
-/// Whoever has asked for more than the policy has it from the next agent, too, where the controller has not taken it.
+/// A Stop that the controller has not confirmed replaces a weaker policy in the will, so that the next agent sends it.
 #[test]
 fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let mut board = Board::new(115_200);
@@ -94,7 +94,7 @@ fn a_stop_that_the_controller_does_not_take_is_left_to_the_next_agent() {
     let now = board.now();
     board.line.halt_for(None, "the desk", ExecCommand::Stop, now);
     board.run_ms(900);
-    // The owner looks also where nothing is received.
+    // The owner also calls this without received bytes.
     let now = board.now();
     board.line.from_device(&[], now);
     assert_eq!(wills(&mut board), [will("the desk", Policy::Stop, Moves::Motion)]);
@@ -126,7 +126,7 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
             "{policy:?} {state:?} {trajectory:?}"
         );
         board.run_ms(300);
-        // Nobody is held up where nothing moves; what moves on does so with what was left.
+        // A hold-off begins only if a command was sent to a moving arm. A motion that continues keeps the applied will.
         let sent = matches!(applied, Applied::Sent(_));
         assert_eq!(board.line.last_halt(), u64::from(sent));
         assert_eq!(
@@ -139,7 +139,7 @@ fn what_was_left_is_done_and_nothing_where_nothing_moves() {
     }
 }
 
-/// Where nothing is received, nobody knows that nothing moves: what was left stays in force for an agent that comes after this one.
+/// Without a status the agent cannot know that the arm stands: the applied will stays in force for the next agent.
 #[test]
 fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     for policy in [Policy::Continue, Policy::Pause, Policy::Stop] {
@@ -151,7 +151,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
         board.run_ms(3_000);
         assert_eq!(board.line.will().cloned(), will("anna", policy, Moves::Motion), "{policy:?}");
         assert_eq!(wills(&mut board), [], "{policy:?}: it is as it was");
-        // It reports again, and rests.
+        // The controller reports again, and the arm stands.
         board.status.trajectory = TrajectoryState::Finish.into();
         board.status.state = ControllerState::HoldPos.into();
         board.run_ms(3_000);
@@ -159,7 +159,7 @@ fn what_was_left_stays_in_force_while_the_controller_is_silent() {
     }
 }
 
-/// What a controller does not let be taught is not taught.
+/// Teaching that the controller refuses leaves no will.
 #[test]
 fn teaching_that_is_refused_leaves_no_will() {
     let mut board = Board::new(115_200);

@@ -66,7 +66,7 @@ impl Commander {
         let (name, policy) = (introduction.name.clone(), introduction.policy);
         let port = line.connect(introduction);
         let client = port.client();
-        // One function can wait while the one before is being received.
+        // The channel has room for the next function while the thread receives the last one.
         let (work, incoming) = sync_channel(1);
         std::thread::spawn(move || serve(port, &incoming));
         let seen = Mutex::new(Instant::now());

@@ -128,7 +128,7 @@ impl Handshake {
         })
     }
 
-    /// Reports the outcome of a command. Ignores a command that is no longer pending.
+    /// Reports the outcome of a command. Has no effect unless `sequence` is that of the last accepted command.
     pub fn acknowledge(&mut self, sequence: u16, outcome: Outcome, error: u16) {
         if sequence == self.taken {
             (self.acknowledged, self.outcome, self.error) = (sequence, outcome, error);

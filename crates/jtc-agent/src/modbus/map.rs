@@ -124,7 +124,7 @@ impl View {
 /// Format of a value in registers. The first of two registers has the upper 16 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// One register, unsigned.
+    /// A single register, unsigned.
     U16,
     /// Two registers, unsigned.
     U32,

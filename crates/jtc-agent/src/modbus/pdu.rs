@@ -33,7 +33,7 @@ pub enum Table {
 pub enum Exception {
     /// The device does not have the function.
     Function = 1,
-    /// One of the addresses does not exist.
+    /// An address of the request does not exist.
     Address = 2,
     /// A quantity, a length or a value is invalid.
     Value = 3,

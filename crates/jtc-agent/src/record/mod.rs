@@ -1,8 +1,8 @@
 //! Recordings of every motion of any client, made by a client of the agent with read-only access.
 //!
-//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses.
-//! One thread follows and another one writes, so a slow disk delays only the writer. Neither thread delays the line:
-//! samples that find no place between them are counted, and the recording contains their number.
+//! [`Prepared`] opens the directory, [`Witness`] receives the frames on the line, [`Recorder`] follows the statuses. A thread follows the
+//! statuses and another one writes, so a slow disk delays only the writer. Neither thread delays the line: samples that the queue between
+//! them cannot hold are counted, and the recording contains their number.
 mod disk;
 mod motion;
 mod shelf;

@@ -1,4 +1,5 @@
-//! A controller's end of a serial line, bit by bit in virtual time, that shares no code with what is tested but the parser of the wire.
+//! The controller's end of a serial line, bit by bit in virtual time. The only code that it shares with the tested code is the parser of
+//! `jtc-wire`.
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -6,11 +7,11 @@ use jtc_agent::line::{ClientId, Delivery};
 use jtc_agent::{Introduction, Policy, Role, SharedLine};
 use jtc_wire::{DataStatus, FRAME_MAX, FrameType, LinkEvent, Receiver, Response, Status};
 
-/// What one step of time is, µs: a byte at 115,200 Bd takes 86.8.
+/// Step of the virtual time, µs; a byte at 115,200 Bd takes 86.8 µs.
 const STEP_US: u64 = 20;
-/// How often the owner of a line has its turn, µs, at worst.
+/// Longest interval between two turns of the line's owner, µs.
 const TURN_US: u64 = 2000;
-/// How often the controller reports, µs.
+/// Interval between two statuses, µs.
 const REPORT_US: u64 = 15_500;
 
 /// Line and board.
@@ -18,26 +19,27 @@ pub struct Board {
     pub line: SharedLine,
     baud: f64,
     now_us: u64,
-    /// Bytes that the operating system has taken, and when the next of them is over.
+    /// Bytes that the operating system has accepted; the next field is the time at which the first of them has been carried.
     queue: VecDeque<u8>,
     byte_over_us: f64,
-    /// Most of them at once.
+    /// Largest number of these bytes so far.
     pub queued_most: usize,
-    /// So long the operating system takes to take bytes, µs, each time; and those that it is being given, with when it has them.
+    /// Delays with which the operating system accepts bytes, µs, one for each write; the next field has the bytes of the present write and
+    /// the time of their acceptance.
     pub held_up_us: VecDeque<u64>,
     handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,
     records: VecDeque<Response>,
-    /// What came at the board: when, which type (`None`: a bad one), its first bytes.
+    /// Frames that arrived at the board: time, type (`None`: a bad frame), first bytes.
     pub frames: Vec<(Duration, Option<FrameType>, Vec<u8>)>,
-    /// When each byte was written to the operating system.
+    /// Bytes of each write to the operating system, with the time.
     pub written: Vec<(Duration, Vec<u8>)>,
     pub status: Status,
-    /// So many of the next bytes arrive with other contents.
+    /// Number of next bytes that arrive damaged.
     pub damaged: usize,
-    /// No status comes before.
+    /// Time before which no status is sent.
     pub deaf_until: Duration,
-    /// Frames of this type are not carried out.
+    /// Type of the frames that the board refuses.
     pub refuses: Option<FrameType>,
 }
 
@@ -134,12 +136,12 @@ impl Board {
         }
     }
 
-    /// Frames of this type that have arrived.
+    /// Returns the number of frames of this type that have arrived.
     pub fn arrived(&self, frame_type: FrameType) -> usize {
         self.frames.iter().filter(|(_, t, _)| *t == Some(frame_type)).count()
     }
 
-    /// Records that a client has got, and the reasons of what was denied.
+    /// Returns the records that a client has received, and the reasons for its refused requests.
     pub fn take(&mut self, client: ClientId) -> (Vec<Response>, Vec<String>) {
         let (mut records, mut denied) = (Vec::new(), Vec::new());
         for delivery in self.line.take_deliveries(client).expect("it is there") {

@@ -15,7 +15,7 @@ use load::{Load, OTHERS_MAX};
 use crate::python;
 use crate::shell::{self, cargo, command, root, run};
 
-/// Pinocchio's inverse dynamics on the machine on which the absolute targets were set, in an equal build, ns.
+/// Time of Pinocchio's inverse dynamics in an equal build on the machine on which the absolute targets were set, ns.
 const PINOCCHIO_WHERE_TARGETS_WERE_SET: f64 = 640.0;
 
 /// Figures by name.
@@ -36,7 +36,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let frames = work.join("ucom-frames.log");
     let kernels = dynamics_program(&work)?;
     let rounds = if quick { 1 } else { 5 };
-    // All builds are done first, so that no build runs between the programs that are compared.
+    // All builds are done first, so that no build disturbs the measurements.
     let mut skipped = Vec::new();
     anchors(&work, &kernels, 0, &mut skipped)?;
     for Example { package, name, .. } in EXAMPLES {
@@ -58,7 +58,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
         samples.append(&mut failed.attempt(&["plan."], planned));
         keep_best(&mut figures, samples);
     }
-    // Once: the worst of many is not the best of some worst.
+    // Measured once: the minimum of several maxima would not be a maximum.
     figures.append(&mut stops(quick, &mut failed));
     let others = load.others();
     if let Some(ns) = figures.get("sim_ms_ns").copied() {
@@ -98,8 +98,8 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(if missed == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Keeps the better of two measurements of a figure, because other programs can only make it worse: of a time or a size the smaller
-/// one, of a throughput the greater.
+/// Keeps the better of two measurements of a figure: the smaller time or size, the greater throughput. Other programs can only make a
+/// measurement worse.
 fn keep_best(figures: &mut Figures, samples: Figures) {
     for (name, value) in samples {
         let throughput = ["_gb_s", "_frames_s"].iter().any(|end| name.ends_with(end));
@@ -108,7 +108,7 @@ fn keep_best(figures: &mut Figures, samples: Figures) {
     }
 }
 
-/// Returns the timing program of jtc-dynamics, copied, because other crates have an example of that name, too.
+/// Returns a copy of the timing program of jtc-dynamics, because other crates have an example with the same name.
 fn dynamics_program(work: &Path) -> Result<PathBuf> {
     run(&mut cargo(&["build", "--profile", "dist", "--package", "jtc-dynamics", "--example", "time"]))?;
     let program = work.join("dynamics_time");
@@ -116,12 +116,12 @@ fn dynamics_program(work: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-/// Measurements that failed: the beginnings of the names of their figures, and the cause.
+/// Failed measurements: the beginnings of the names of their figures, and the cause.
 #[derive(Default)]
 pub struct Failed(Vec<(&'static [&'static str], String)>);
 
 impl Failed {
-    /// Measures; if that fails, notes the cause and returns no figure.
+    /// Runs a measurement. If it fails, notes the cause and returns no figure.
     fn attempt(
         &mut self,
         figures: &'static [&'static str],
@@ -150,10 +150,10 @@ impl Failed {
     }
 }
 
-/// The figures of the anchors.
+/// Beginnings of the names of the anchors' figures.
 const ANCHORS: &[&str] = &["ours.", "pinocchio", "casadi", "mujoco", "kdl", "rbdl", "libm_sin_cos_6"];
 
-/// Program with which a crate measures itself.
+/// Program that measures a crate.
 struct Example {
     package: &'static str,
     name: &'static str,
@@ -173,13 +173,13 @@ const EXAMPLES: [Example; 4] = [
 ];
 
 impl Example {
-    /// Measures its figures. The UCoM frames that it read go to `frames`, too.
+    /// Runs the program and returns its figures. The UCoM frames that it has decoded are written to `frames`.
     fn measure(&self, frames: &Path) -> Result<Figures> {
         let Self { package, name, .. } = *self;
         let mut example =
             cargo(&["run", "--profile", "dist", "--quiet", "--package", package, "--example", name]);
         let text = shell::read(example.env("OPENJTC_UCOM_FRAMES", frames))?;
-        // Some print an object, some a name and a number a line.
+        // Some programs print a JSON object, others lines with a name and a number.
         let mut figures = if text.trim_start().starts_with('{') { object(&text)? } else { lines(&text) };
         if let Some(bytes) = figures.get("controller_bytes").copied() {
             figures.insert("controller_kib".into(), bytes / 1024.0);
@@ -192,7 +192,7 @@ impl Example {
     }
 }
 
-/// Those frames of `frames` that python-can and cantools read in a second.
+/// Measures how many of the `frames` python-can and cantools decode in a second.
 fn cantools(frames: &Path) -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/ucom/read_frames.py")).arg(frames.with_extension("dbc")).arg(frames);
@@ -201,7 +201,7 @@ fn cantools(frames: &Path) -> Result<Figures> {
     Ok(Figures::from([("cantools_frames_s".to_owned(), rate)]))
 }
 
-/// Planned motions, and those of toppra and Ruckig.
+/// Measures planned motions, ours and those of toppra and Ruckig.
 fn planned() -> Result<Figures> {
     let mut script = command(python::environment("requirements.txt")?);
     script.arg(root().join("references/plan/bench_plan.py")).arg(shell::target().join("dist/examples/plans"));
@@ -232,20 +232,20 @@ fn stops(quick: bool, failed: &mut Failed) -> Figures {
     figures
 }
 
-/// The numbers of a JSON object.
+/// Returns the numbers in the text of a JSON object.
 fn object(text: &str) -> Result<Figures> {
     let value: Value =
         serde_json::from_str(text.trim()).with_context(|| format!("no JSON object: {text}"))?;
     Ok(numbers(&value))
 }
 
-/// The numbers in `value`, an object.
+/// Returns the numbers in the object `value`.
 fn numbers(value: &Value) -> Figures {
     let pairs = value.as_object().into_iter().flatten();
     pairs.filter_map(|(name, value)| Some((name.clone(), value.as_f64()?))).collect()
 }
 
-/// Lines of a name and a number.
+/// Returns the figures in lines with a name and a number.
 fn lines(text: &str) -> Figures {
     text.lines()
         .filter_map(|line| {
@@ -255,7 +255,7 @@ fn lines(text: &str) -> Figures {
         .collect()
 }
 
-/// Our dynamics and those of others in turn, on the same arm and states; without `rounds` they are only built.
+/// Measures our dynamics and those of others in turn, with the same arm and states. If `rounds` is 0, it only builds them.
 fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) -> Result<Figures> {
     for (header, package) in [
         ("/usr/include/eigen3/Eigen/Core", "libeigen3-dev"),
@@ -290,7 +290,7 @@ fn anchors(work: &Path, kernels: &Path, rounds: u32, skipped: &mut Vec<String>) 
     Ok(figures)
 }
 
-/// Each joint, with our control law and with the plain one.
+/// Prints the errors of each joint, with our control law and with the plain one.
 fn print_tracking(figures: &Figures) {
     let figure = |name: String| figures.get(&name).map_or("?".into(), |value| format!("{value:.2}"));
     println!("\ntracking, mrad (RMS, largest) | ours | straight lines, PID and gravity only");

@@ -1,4 +1,4 @@
-//! `cargo xtask book`: docs/ as a book of HTML, and checks of it that every test run performs without building it.
+//! `cargo xtask book`: makes docs/ into an HTML book. Every test run checks the pages without building the book.
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -17,7 +17,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns cargo for the program that makes the book: a separate workspace, so that a build of the project does not build mdbook.
+/// Returns cargo for the program that makes the book. It is a separate workspace, so that a build of the project does not build mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));
@@ -36,15 +36,15 @@ pub fn make(out: &Path) -> Result<()> {
     run(tool(&["run"]).arg("--").arg(root()).arg(out))
 }
 
-/// The program's own tests, and the book with all its links.
+/// Tests the program, makes the book, and checks all its links.
 pub fn made() -> Result<()> {
     run(&mut tool(&["test"]))?;
     let scratch = Scratch::new("book")?;
     make(&scratch.path().join("book"))
 }
 
-/// Every page of docs/ is in the book, every link to a place in a page leads to a heading of it, and every block of commands is one that
-/// tests run, or shows why not.
+/// Checks that every page of docs/ is in the book, and that every link to a section leads to a heading of the page. Checks that tests run
+/// every block of commands, or that the block tells why not.
 pub fn check() -> Result<()> {
     let docs = root().join("docs");
     let summary = std::fs::read_to_string(docs.join("SUMMARY.md")).context("docs/SUMMARY.md")?;
@@ -88,12 +88,12 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
-/// Targets of the links in a page, those in fenced blocks left out.
+/// Returns the targets of the links in a page, without those in fenced blocks.
 fn targets(page: &str) -> impl Iterator<Item = &str> {
     prose(page).flat_map(|line| line.split("](").skip(1)).filter_map(|rest| Some(rest.split_once(')')?.0))
 }
 
-/// The lines of a page that stand in no fenced block.
+/// Returns the lines of a page that are not in a fenced block.
 fn prose(page: &str) -> impl Iterator<Item = &str> {
     let mut fenced = false;
     page.lines().filter(move |line| {
@@ -103,7 +103,7 @@ fn prose(page: &str) -> impl Iterator<Item = &str> {
     })
 }
 
-/// The names of the headings of a page, as links to them are written.
+/// Returns the names of the headings of a page, as links contain them.
 fn anchors(page: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     for heading in prose(page).filter(|line| line.starts_with('#')) {
@@ -129,7 +129,7 @@ enum Block {
     Forgotten,
 }
 
-/// The blocks of commands of a page, by the line that they begin in.
+/// Returns the blocks of commands in a page, with the line in which each begins.
 fn blocks(page: &str) -> Vec<(usize, Block)> {
     let mut found = Vec::new();
     let (mut named, mut generated, mut fenced, mut above) = (false, false, false, "");
@@ -142,7 +142,7 @@ fn blocks(page: &str) -> Vec<(usize, Block)> {
             generated = comment.ends_with(" begin") || (generated && !comment.ends_with(" end"));
         } else if let Some(kind) = line.strip_prefix("```") {
             fenced = true;
-            // Python's are run by the tests of the Python package: all of them.
+            // The tests of the Python package run all Python blocks.
             if ["console", "sh"].contains(&kind) {
                 let own = above.contains("program:");
                 found.push((

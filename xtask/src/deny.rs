@@ -1,6 +1,6 @@
 //! deny.toml, the file of cargo-deny: licences, sources and bans, compared with cargo's resolution.
 //!
-//! cargo-deny itself takes minutes to install, a cost for every test run; `cargo xtask dist` runs it. The checks here read the same file.
+//! cargo-deny itself takes minutes to install, too long for every test run; `cargo xtask dist` runs it. The checks here read the same file.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use toml::{Table, Value};
 use crate::dist::graph::{self, Crate};
 use crate::shell::{self, root, run};
 
-/// The version of cargo-deny that reads deny.toml in a release.
+/// Version of cargo-deny that reads deny.toml for a release.
 const CARGO_DENY: &str = "0.20.2";
 
 /// Workspaces with shipped parts.
@@ -100,7 +100,7 @@ fn targets(rules: &Table) -> Vec<String> {
     strings(graph.and_then(|graph| graph.get("targets"))).map(str::to_owned).collect()
 }
 
-/// An error for a crate whose licence is not allowed.
+/// Returns an error if the licence of a crate is not allowed.
 fn licence(rules: &Table, found: &Crate) -> Result<()> {
     let label = format!("{} {}", found.name, found.version);
     let text = found.licence.as_deref().with_context(|| format!("{label} names no licence"))?;
@@ -128,7 +128,7 @@ fn banned(rules: &Table, name: &str) -> Option<String> {
     Some(format!("{name} is banned: {reason}"))
 }
 
-/// Crates of a lock file that come from elsewhere than is allowed.
+/// Returns the crates of a lock file whose source is not allowed.
 fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     let allowed: BTreeSet<String> =
         strings(rules.get("sources").and_then(|table| table.get("allow-registry")))
@@ -143,7 +143,7 @@ fn sources(rules: &Table, lock: &Table) -> Vec<String> {
     packages.filter_map(elsewhere).collect()
 }
 
-/// Dependencies of a manifest without a version; a path is one of the project's own.
+/// Adds the dependencies of a manifest that have no version. A path dependency is one of the project's own crates.
 fn wildcards(table: &Table, found: &mut Vec<String>) {
     for (key, value) in table {
         let Some(inner) = value.as_table() else { continue };

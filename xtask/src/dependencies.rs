@@ -1,4 +1,5 @@
-//! Every direct dependency of a manifest, of a list of Python's or of Node's, has its line in docs/dependencies.md, and no line has lost its dependency.
+//! Checks that every direct dependency of a manifest, or of a list of Python or Node.js, has its line in docs/dependencies.md, and that
+//! every line has its dependency.
 use std::collections::BTreeSet;
 
 use anyhow::{Context, Result, ensure};
@@ -6,7 +7,7 @@ use serde_json::Value;
 
 use crate::shell::{files, root};
 
-/// Names under the dependency tables of a manifest.
+/// Returns the names under the dependency tables of a manifest.
 fn direct(manifest: &str) -> BTreeSet<String> {
     let mut names = BTreeSet::new();
     let mut inside = false;
@@ -20,7 +21,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
             }
         } else if inside && let Some((key, _)) = line.split_once('=') {
             let name = key.trim().split('.').next().unwrap_or_default();
-            // Comments, and further lines of a value, are not names.
+            // Comments, and continuation lines of a value, are not names.
             let is_name = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
             if !name.is_empty() && name.chars().all(is_name) {
                 names.insert(name.to_owned());
@@ -30,7 +31,7 @@ fn direct(manifest: &str) -> BTreeSet<String> {
     names
 }
 
-/// Names in the first column of the page's tables (`` | `name` | … ``).
+/// Returns the names in the first column of the page's tables (`` | `name` | … ``).
 fn documented(page: &str) -> BTreeSet<String> {
     page.lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once('`'))

@@ -53,7 +53,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes all files of a release into a folder without other files; returns the parts that had to be left out, with the reasons.
+/// Makes all files of a release into a folder without other files. Returns the omitted parts with the reasons.
 fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     let mut left_out = Vec::new();
     empty(out)?;
@@ -113,7 +113,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
             }
         }
     }
-    // No file is written before all are ready: a failed run leaves an empty folder.
+    // The files are written only after all of them are ready, so a failed run leaves an empty folder.
     for Made { name, bytes } in made {
         std::fs::write(out.join(&name), bytes).with_context(|| name.clone())?;
     }
@@ -121,7 +121,7 @@ fn make(out: &Path, quick: bool) -> Result<Vec<String>> {
     Ok(left_out)
 }
 
-/// The version of the workspace.
+/// Returns the version of the workspace.
 fn version() -> Result<String> {
     let manifest = std::fs::read_to_string(shell::root().join("Cargo.toml")).context("Cargo.toml")?;
     let manifest: toml::Table = toml::from_str(&manifest).context("Cargo.toml")?;
@@ -129,7 +129,8 @@ fn version() -> Result<String> {
     Ok(version.context("the workspace has no version")?.to_owned())
 }
 
-/// A folder without the files of an earlier release, which its list names; one with any other file is left as it is, with an error.
+/// Creates the folder, or removes the files of an earlier release, which its list names. With any other file in it, the folder is not
+/// changed and an error is returned.
 fn empty(out: &Path) -> Result<()> {
     std::fs::create_dir_all(out).with_context(|| out.display().to_string())?;
     let list = std::fs::read_to_string(out.join(tree::SUMS)).unwrap_or_default();
@@ -148,7 +149,7 @@ fn empty(out: &Path) -> Result<()> {
     earlier.iter().try_for_each(|path| std::fs::remove_file(path).with_context(|| path.display().to_string()))
 }
 
-/// The packages and archives with the programs that `folder` has already, made twice from one commit and the same images of the boards.
+/// Makes the packages and archives with the existing programs in `folder` twice, from one commit and the same images of the boards.
 fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
     let (time, own) = (programs::time()?, programs::own()?);
     let mut images = images::build()?;
@@ -162,7 +163,7 @@ fn assembled_twice(folder: &Path) -> Result<[Vec<Made>; 2]> {
     Ok([again()?, again()?])
 }
 
-/// Writes files into a folder of their own; their paths.
+/// Writes files into a new temporary folder and returns their paths.
 fn write(made: &[Made], name: &str) -> Result<(Scratch, Vec<PathBuf>)> {
     let scratch = Scratch::new(name)?;
     let mut paths = Vec::new();

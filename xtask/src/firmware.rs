@@ -1,4 +1,4 @@
-//! `cargo xtask firmware`: the ELF of each board, its sizes by region, and that no panic can be reached from the tick.
+//! `cargo xtask firmware`: builds the ELF of each board, prints its sizes by region, and checks that the tick cannot reach a panic.
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
@@ -17,11 +17,11 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The boards, by the feature that selects each.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Functions that run at the priority of the tick. The second is the one place to which the tick jumps through a register:
-/// it wakes the links.
+/// Functions that run at the priority of the tick. The second one wakes the links, and is the only function that the tick calls through a
+/// register.
 const ROOTS: [&str; 2] = ["TIM7", "embassy_executor::raw::waker::wake"];
 
-/// A memory of the chip: name, first address, bytes.
+/// Memories of the chip: name, first address, bytes.
 const REGIONS: [(&str, u64, u64); 8] = [
     ("flash bank 1", 0x0800_0000, 1024 * 1024),
     ("flash bank 2", 0x0810_0000, 1024 * 1024),
@@ -35,7 +35,7 @@ const REGIONS: [(&str, u64, u64); 8] = [
 
 /// Adds the compiler's target for the board if rustup manages the toolchain.
 pub fn add_target() -> Result<()> {
-    // A toolchain that is not rustup's brings its own targets.
+    // A toolchain that rustup does not manage has its own targets.
     if let Ok(installed) = shell::read(shell::command("rustup").args(["target", "list", "--installed"]))
         && !installed.lines().any(|target| target == TARGET)
     {
@@ -44,13 +44,13 @@ pub fn add_target() -> Result<()> {
     Ok(())
 }
 
-/// Cargo in `firmware/`, for one board.
+/// Returns a command that runs cargo in `firmware/` for one board.
 fn cargo_for(board: &str, subcommand: &str) -> Result<Command> {
     let mut cargo =
         shell::cargo(&[subcommand, "--locked", "--release", "--no-default-features", "--features", board]);
     cargo.current_dir(shell::root().join("firmware"));
     cargo.env("CARGO_TARGET_DIR", directory());
-    // Paths of one machine would make the sizes those of one machine.
+    // Paths of this machine in the program would change its sizes.
     cargo.arg("--config").arg(paths::remapped(TARGET)?);
     Ok(cargo)
 }
@@ -78,8 +78,8 @@ pub fn build(board: &str) -> Result<PathBuf> {
 /// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program for the fastest lines, which tests need in addition to the flashed programs. It has a
-/// directory of its own, so that neither build makes the other stale.
+/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. It has its own build
+/// directory, so that neither build makes the other one stale.
 pub fn build_fast() -> Result<PathBuf> {
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;
@@ -89,7 +89,7 @@ pub fn build_fast() -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// Bytes of static data in each region, in the order of [`REGIONS`].
+/// Returns the bytes of static data in each region, in the order of [`REGIONS`]: name, used bytes, size.
 pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
     let bytes = std::fs::read(elf)?;
     let file = object::File::parse(&*bytes)?;
@@ -106,7 +106,7 @@ pub fn used(elf: &Path) -> Result<Vec<(&'static str, u64, u64)>> {
             add(section.address(), section.size())?;
         }
     }
-    // Initial values of .data are in flash, too.
+    // Flash also contains the initial values of .data.
     for segment in file.segments() {
         let (_, in_file) = segment.file_range();
         if in_file > 0 && segment.address() >= 0x2000_0000 {
@@ -129,7 +129,7 @@ pub fn check(board: &str, elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Lints of the board's code, with every `unsafe` block explained; prints how many there are.
+/// Lints the board's code. Every `unsafe` block must be explained; prints their number.
 pub fn lints() -> Result<()> {
     add_target()?;
     for board in BOARDS {
@@ -147,7 +147,7 @@ pub fn lints() -> Result<()> {
     Ok(())
 }
 
-/// Tests of the part that needs no hardware, on this machine.
+/// Tests the part that needs no hardware, on this machine.
 pub fn tests() -> Result<Outcome> {
     let host = shell::read(shell::command("rustc").args(["--print", "host-tuple"]))?;
     let mut cargo = shell::cargo(&["test", "--lib", "--target", host.trim()]);
@@ -160,7 +160,7 @@ pub fn tests() -> Result<Outcome> {
     Ok(Outcome::Counted(counts, String::new()))
 }
 
-/// `arguments`: names of boards; none means all.
+/// `arguments`: names of boards; without a name all boards.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let boards: Vec<&str> = match arguments {
         [] => BOARDS.to_vec(),

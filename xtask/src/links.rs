@@ -1,11 +1,11 @@
-//! Links between the documents lead to files that exist.
+//! Checks that the links between documents lead to existing files.
 use std::path::Path;
 
 use anyhow::{Result, ensure};
 
 use crate::shell::{files, root};
 
-/// Targets of the Markdown links in `page` that are files of this project.
+/// Returns the targets of the Markdown links in `page` that are files of this project.
 fn targets(page: &str) -> impl Iterator<Item = &str> {
     page.split("](")
         .skip(1)
@@ -14,7 +14,7 @@ fn targets(page: &str) -> impl Iterator<Item = &str> {
         .filter(|target| !target.is_empty() && !target.contains("://"))
 }
 
-/// An error that lists the links without a file.
+/// Returns an error that lists the links to missing files.
 pub fn check() -> Result<()> {
     let (mut links, mut broken) = (0, Vec::new());
     for path in files(root(), &["md"]) {

@@ -1,4 +1,4 @@
-//! One command for all chores of the workspace: `cargo xtask help`.
+//! The command for all chores of the workspace: `cargo xtask help`.
 #![forbid(unsafe_code)]
 
 mod ahead;
@@ -12,7 +12,7 @@ mod docs;
 mod emulate;
 mod firmware;
 mod links;
-// For the checks of the board's program.
+// Used by the checks of the board's program.
 mod package;
 mod panics;
 mod paths;

@@ -1,5 +1,5 @@
-//! The Python package: its wheel is built, installed in an empty environment, and tested there; not the source tree, which lacks the
-//! compiled part.
+//! Python package: builds its wheel, installs it in an empty environment, and tests it there. The source tree is not tested, because it
+//! lacks the compiled part.
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
@@ -111,7 +111,7 @@ fn tested(wheel: &Path, log: &Path) -> Result<Ended> {
     beside::run(&mut tests, log)
 }
 
-/// The numbers in the last line of pytest.
+/// Returns the counts in the last line of pytest.
 fn counted(output: &str) -> Counts {
     let line = output.lines().rev().find(|line| line.contains(" in ")).unwrap_or_default();
     let words: Vec<&str> = line.split([' ', ',', '=']).filter(|word| !word.is_empty()).collect();

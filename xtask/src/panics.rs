@@ -1,8 +1,8 @@
-//! No panic can be reached from the control tick: a walk over the calls of the linked program.
+//! Checks that the control tick can reach no panic, by following the calls of the linked program.
 //!
-//! Only the compiled code counts, so the ELF is read and not the source. From each root every branch that leaves its function
-//! is followed; a function whose address is formed in code that was reached counts as called. Calls through a register are
-//! listed, because their targets are not known here.
+//! The check reads the ELF and not the source, because only compiled code counts. From each root it follows every branch that leaves the
+//! function. If reached code forms the address of a function, that function counts as called. Calls through a register are listed, because
+//! their targets are not known here.
 
 mod thumb;
 
@@ -27,16 +27,16 @@ const PANICS: [&str; 8] = [
     "len_mismatch_fail",
 ];
 
-/// Result of a walk from the roots.
+/// Result of the search from the roots.
 #[derive(Debug)]
 pub struct Report {
-    /// Functions reached, roots included.
+    /// Number of reached functions, including the roots.
     pub functions: usize,
-    /// Instructions in them.
+    /// Number of their instructions.
     pub instructions: usize,
     /// Calls and jumps through a register: function and address.
     pub indirect: Vec<String>,
-    /// A way to each place that panics or traps: function names with the address at which each is left, and the place reached.
+    /// A path to each place that panics or traps: names of functions, each with the address of the branch that leaves it, then the place.
     pub paths: Vec<String>,
 }
 
@@ -60,12 +60,12 @@ impl fmt::Display for Report {
     }
 }
 
-/// The ways from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
+/// Returns the paths from `roots` (names of functions, as linked or as in the source) to a panic in a program for ARMv7-M.
 ///
 /// The program must have its symbol table. `llvm-addr2line -i -e ELF ADDRESS` prints the line of an address.
 pub fn reachable_panics(elf: &[u8], roots: &[&str]) -> Result<Report> {
     let program = Program::read(elf)?;
-    // Each reached function with the function it was reached from and the address of the branch.
+    // Reached functions, each with the calling function and the address of the branch.
     let mut from: BTreeMap<u32, Option<(u32, u32)>> = BTreeMap::new();
     let mut queue = VecDeque::new();
     for root in roots {
@@ -112,7 +112,7 @@ fn way(program: &Program<'_>, from: &BTreeMap<u32, Option<(u32, u32)>>, at: u32)
 /// Target of a place in a function.
 enum End {
     Function(u32),
-    /// An address without a function.
+    /// An address outside all functions.
     Nowhere(u32),
     Indirect,
     Trap,
@@ -127,11 +127,11 @@ struct Function {
 }
 
 struct Program<'a> {
-    /// By address.
+    /// Functions by their first address.
     functions: BTreeMap<u32, Function>,
     /// Executable sections: first address and bytes.
     sections: Vec<(u32, &'a [u8])>,
-    /// Addresses at which data in the code begins (true) and at which code goes on (false).
+    /// Addresses at which data in the code begins (true) and at which code continues (false).
     data: BTreeMap<u32, bool>,
 }
 
@@ -153,7 +153,7 @@ impl<'a> Program<'a> {
             if let Some(kind) = name.strip_prefix('$') {
                 program.data.insert(address, kind.starts_with('d'));
             } else if symbol.kind() == SymbolKind::Text {
-                // The lowest bit says Thumb.
+                // The lowest bit marks Thumb code.
                 let (start, end) = (address & !1, (address & !1) + symbol.size() as u32);
                 let name = format!("{:#}", rustc_demangle::demangle(name));
                 let panics = PANICS.iter().any(|part| name.contains(part));
@@ -164,14 +164,14 @@ impl<'a> Program<'a> {
                     section,
                 });
                 function.end = function.end.max(end);
-                // Equal functions are folded into one with several names.
+                // The linker merges equal functions into one with several names.
                 if panics && !function.panics {
                     (function.name, function.panics) = (name, true);
                 }
             }
         }
         ensure!(!program.functions.is_empty(), "the program has no symbols of functions");
-        // Functions in assembly have no size: they go as far as the next one.
+        // Functions in assembly have no size: they extend to the next function.
         let starts: Vec<u32> = program.functions.keys().copied().collect();
         for (start, next) in starts.iter().zip(starts.iter().skip(1).map(Some).chain([None])) {
             let Some(function) = program.functions.get_mut(start) else { continue };
@@ -190,7 +190,7 @@ impl<'a> Program<'a> {
         self.functions.iter().find(|(_, function)| named(function)).map(|(start, _)| *start)
     }
 
-    /// The function that `address` is in; a branch may lead into the middle of one.
+    /// Returns the function that contains `address`, because a branch may lead into the middle of a function.
     fn function_at(&self, address: u32) -> Option<u32> {
         let (start, function) = self.functions.range(..=address).next_back()?;
         (address < function.end).then_some(*start)
@@ -202,7 +202,7 @@ impl<'a> Program<'a> {
         bytes.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]))
     }
 
-    /// The pieces of a function: true for data.
+    /// Returns the pieces of a function; true for data.
     fn pieces(&self, function: &Range<u32>) -> Vec<(Range<u32>, bool)> {
         let mut is_data = self.data.range(..=function.start).next_back().is_some_and(|(_, data)| *data);
         let mut at = function.start;
@@ -215,7 +215,7 @@ impl<'a> Program<'a> {
         pieces
     }
 
-    /// Calls `found` for everything in the function that leads out of it.
+    /// Calls `found` for everything in the function that leaves it.
     fn scan(&self, start: u32, function: &Function, count: &mut usize, mut found: impl FnMut(u32, End)) {
         let whole = start..function.end;
         let mut halves = [None; 16];
@@ -226,7 +226,7 @@ impl<'a> Program<'a> {
                 let Some(first) = self.halfword(function.section, address) else { break };
                 let second = self.halfword(function.section, address + 2).unwrap_or(0);
                 if is_data {
-                    // Literals: addresses of functions have the lowest bit set.
+                    // Literals: the addresses of functions have the lowest bit set.
                     let word = u32::from(second) << 16 | u32::from(first);
                     if address.is_multiple_of(4) && word & 1 == 1 && self.functions.contains_key(&(word & !1))
                     {
@@ -244,7 +244,7 @@ impl<'a> Program<'a> {
                         call = true;
                         found(address, self.function_at(to).map_or(End::Nowhere(to), End::Function));
                     }
-                    // A jump to a constant address: how the linker bridges long distances.
+                    // A jump to a constant address, which the linker uses for long distances.
                     Flow::Indirect(register) => match halves[usize::from(register)] {
                         Some((at, to)) if at + 4 == address => {
                             found(address, self.function_at(to & !1).map_or(End::Nowhere(to), End::Function));
@@ -263,7 +263,7 @@ impl<'a> Program<'a> {
                             }
                         }
                     }
-                    // After a call that does not return a trap is never executed.
+                    // A trap after a call that does not return is never executed.
                     Flow::Trap if !after_call => found(address, End::Trap),
                     Flow::Trap | Flow::Other => {}
                 }

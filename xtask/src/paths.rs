@@ -26,7 +26,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
             path.display()
         );
     }
-    // A checkout reached through a link has two names.
+    // A checkout that is reached through a link has two names.
     for at in 0..folders.len() {
         let (path, name) = folders[at].clone();
         if let Ok(real) = path.canonicalize()
@@ -38,7 +38,7 @@ pub fn folders() -> Result<Vec<(PathBuf, &'static str)>> {
     Ok(folders)
 }
 
-/// Returns the switches for cargo's `--config` by which the compiler for `triple` writes none of these paths.
+/// Returns the switches for cargo's `--config` that keep these paths out of the compiler's output for `triple`.
 pub fn remapped(triple: &str) -> Result<String> {
     let flags = folders()?.into_iter();
     let flags: Vec<String> =

@@ -1,6 +1,6 @@
-//! `cargo xtask plain-words`: marks of sentences that are hard to read, counted in comments, messages, help and documents.
+//! `cargo xtask plain-words`: counts marks of sentences that are hard to read in comments, messages, help and documents.
 //!
-//! The counts are kept for each part of the project, and may only fall. CONTRIBUTING.md says how to write instead.
+//! The counts of each part of the project are kept, and may only fall. CONTRIBUTING.md tells how to write instead.
 mod marks;
 mod texts;
 
@@ -14,24 +14,24 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, files, root};
 
-/// The counts that are kept.
+/// File with the kept counts.
 const KEPT: &str = "xtask/plain-words.txt";
 /// Files with prose.
 const EXTENSIONS: [&str; 7] = ["rs", "py", "pyi", "md", "toml", "ts", "svelte"];
-/// A record of the past, and files that another project wrote or a command writes.
+/// Excluded files: a record of the past, and files that another project or a command has written.
 const EXCLUDED: [&str; 3] = ["CHANGELOG.md", "Cargo.toml", "api-types.ts"];
 
-/// A mark in a file.
+/// Mark in a file.
 struct Place {
     part: String,
-    /// File and line.
+    /// Path and line.
     at: String,
     mark: &'static str,
-    /// The sentence around it.
+    /// Sentence with the mark.
     sentence: String,
 }
 
-/// `arguments`: `--update`, or the name of a part whose places are printed.
+/// `arguments`: `--update`, or the name of a part whose marks are printed.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     let mut arguments = arguments.to_vec();
     let update = shell::flag(&mut arguments, "--update");
@@ -124,7 +124,7 @@ fn places() -> Result<Vec<Place>> {
     Ok(places)
 }
 
-/// A crate by its name; else the folder, and `pages` for files at the root.
+/// Returns the name of the crate; for other files the folder, and `pages` for files at the root.
 fn part(path: &Path) -> String {
     let mut folders = path.iter().map(|folder| folder.to_string_lossy());
     let first = folders.next().unwrap_or_default();

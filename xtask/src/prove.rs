@@ -1,4 +1,4 @@
-//! `cargo xtask prove`: checks that take hours and are therefore not in `cargo xtask test`. Their results are in docs/evidence.md.
+//! `cargo xtask prove`: checks that take hours and are therefore not part of `cargo xtask test`. Their results are in docs/evidence.md.
 mod changes;
 mod evidence;
 mod fuzz;
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::{Result, bail};
 
-/// `arguments`: `mutants` or `fuzz`, then its own.
+/// `arguments`: `mutants` or `fuzz`, then the arguments of that check.
 pub fn main(arguments: &[String]) -> Result<ExitCode> {
     match arguments.split_first() {
         Some((what, rest)) if what == "mutants" => mutants::main(rest),

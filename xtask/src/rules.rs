@@ -5,17 +5,17 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{files, root};
 
-/// The protocol pages, the letter of their rules, and how many rules each has at least.
+/// Protocol pages, with the letter of their rules and the least number of rules of each.
 const PAGES: [(&str, char, usize); 2] =
     [("docs/protocol-jtc.md", 'J', 30), ("docs/protocol-ucom.md", 'D', 30)];
 
-/// The rules that a protocol page defines (`**J-13**`), as numbers.
+/// Returns the numbers of the rules that a protocol page defines (`**J-13**`).
 fn defined(page: &str, letter: char) -> BTreeSet<u32> {
     let start = format!("**{letter}-");
     page.split(&start).skip(1).filter_map(|rest| rest.split_once("**")?.0.parse().ok()).collect()
 }
 
-/// The rules that a source names: `j13_…`, `J-13`, `j_13`, in either case.
+/// Returns the numbers of the rules that a source names: `j13_…`, `J-13`, `j_13`, in either case.
 fn named(source: &str, letter: char) -> BTreeSet<u32> {
     let mut rules = BTreeSet::new();
     let bytes = source.as_bytes();
@@ -35,7 +35,7 @@ fn named(source: &str, letter: char) -> BTreeSet<u32> {
     rules
 }
 
-/// The part of a source that is tests: a file under tests/, or from its `#[cfg(test)]` on.
+/// Returns the part of a source that contains tests: a whole file in tests/, or the part from `#[cfg(test)]` on.
 fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
     let is_test_file = path.components().any(|c| c.as_os_str() == "tests")
         || path.file_stem().is_some_and(|stem| stem.to_string_lossy().ends_with("tests"));
@@ -45,7 +45,7 @@ fn test_part<'a>(path: &std::path::Path, source: &'a str) -> &'a str {
     source.find("#[cfg(test)]").map_or("", |at| &source[at..])
 }
 
-/// An error that lists the rules without a test.
+/// Returns an error that lists the rules without a test.
 pub fn check() -> Result<()> {
     let mut tests = Vec::new();
     for directory in ["crates", "emulator", "firmware"] {

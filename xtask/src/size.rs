@@ -1,4 +1,4 @@
-//! `cargo xtask size`: static memory: the controller's with its trajectory against the limit, the boards' by region.
+//! `cargo xtask size`: static memory of the controller with its trajectory, compared with the limit, and that of the boards by region.
 use std::process::ExitCode;
 
 use anyhow::{Context, Result, ensure};
@@ -6,11 +6,11 @@ use anyhow::{Context, Result, ensure};
 use crate::shell;
 use crate::{firmware, suite};
 
-/// Bytes that the controller may take with its trajectory: 432 000 of points, and 40 KiB of the board's fast memory for all else, the
-/// stored arm included. The receive buffers of 60 000 bytes come in addition.
+/// Largest size of the controller with its trajectory, bytes: 432 000 for the points, and 40 KiB of the board's fast memory for the rest,
+/// including the stored arm. The receive buffers of 60 000 bytes come in addition.
 pub const LIMIT: u64 = 432_000 + 40 * 1024;
 
-/// Bytes of the controller with the memory of 12 000 points, as the compiler lays it out.
+/// Returns the bytes of the controller with memory for 12 000 points, as the compiler arranges it.
 pub fn controller_bytes() -> Result<u64> {
     let text = shell::read(&mut shell::command(suite::programs()?.join("examples/tick")))?;
     let line = text.lines().find_map(|line| line.strip_prefix("controller_bytes "));
@@ -20,7 +20,7 @@ pub fn controller_bytes() -> Result<u64> {
         .context("controller_bytes")
 }
 
-/// An error when the limit is passed.
+/// Returns an error if the size is above the limit.
 pub fn check() -> Result<()> {
     let bytes = controller_bytes()?;
     println!(
@@ -32,7 +32,7 @@ pub fn check() -> Result<()> {
     Ok(())
 }
 
-/// Memory that the program of a board, which must be built, takes by region: one line each.
+/// Returns the memory that a board's program uses by region, one line each. The program must have been built.
 pub fn regions(board: &str) -> Result<String> {
     let used = firmware::used(&firmware::elf(board))?;
     Ok(used.iter().map(|(name, bytes, size)| format!("  {name}: {bytes} of {size} B\n")).collect())

@@ -1,4 +1,4 @@
-//! Steps of a run: a heading each, failures collected, one closing line.
+//! Steps of a run: a heading for each, the collected failures, and a closing line.
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -8,28 +8,28 @@ use crate::shell;
 
 /// Outcome of a step.
 pub enum Outcome {
-    /// A single check, passed.
+    /// A single check that passed.
     Passed,
-    /// Numbers of several tests, and the output of those that failed.
+    /// Counts of several tests, and the output of the failed ones.
     Counted(Counts, String),
-    /// Not run, and why.
+    /// The step was not run, for this reason.
     Skipped(String),
 }
 
-/// Numbers of tests.
+/// Counts of tests.
 #[derive(Clone, Copy, Default)]
 pub struct Counts {
-    /// Passed.
+    /// Passed tests.
     pub passed: u64,
-    /// Failed.
+    /// Failed tests.
     pub failed: u64,
-    /// Skipped.
+    /// Skipped tests.
     pub skipped: u64,
-    /// Programs of tests that failed at first and passed when they ran again, alone.
+    /// Test programs that failed at first and passed when they ran again, alone.
     pub passed_alone: u64,
 }
 
-/// The steps so far.
+/// Finished steps.
 #[derive(Default)]
 pub struct Tally {
     only: Option<String>,
@@ -74,7 +74,7 @@ impl Tally {
                 self.counts.skipped += counts.skipped;
                 self.passed_alone(counts.passed_alone);
                 if counts.failed > 0 {
-                    // Repeated at the end: the last part of a long log shows the reason.
+                    // The failures are printed again at the end, so that the last part of a long log shows the reason.
                     let failure = format!("{title}: {} failed\n{}", counts.failed, printed.trim());
                     self.failures.push(failure.trim_end().to_owned());
                 }
@@ -119,7 +119,7 @@ impl Tally {
     }
 }
 
-/// Returns the output from the first line on that begins with `heading`: there test runners describe the failures.
+/// Returns the output from the first line that begins with `heading`, where test runners describe the failures.
 pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

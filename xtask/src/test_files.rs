@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::shell::{self, root};
 
-/// The roots of a crate's test programs, if it names them.
+/// Returns the roots of a crate's test programs, if its manifest names them.
 fn programs(package: &Path) -> Result<Option<Vec<PathBuf>>> {
     let manifest: toml::Table = read_to_string(package.join("Cargo.toml"))?.parse()?;
     if manifest["package"].get("autotests").and_then(toml::Value::as_bool) != Some(false) {
@@ -32,7 +32,7 @@ fn parents(file: &Path, tests: &Path, programs: &[PathBuf]) -> Option<(Vec<PathB
     Some((parents, module.file_stem()?.to_string_lossy().into_owned()))
 }
 
-/// An error that lists the files under `package`'s tests/ that are in no program.
+/// Returns the files in `package`'s tests/ that belong to no program.
 fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
     let Some(programs) = programs(package)? else { return Ok(Vec::new()) };
     let tests = package.join("tests");
@@ -54,7 +54,7 @@ fn forgotten(package: &Path) -> Result<Vec<PathBuf>> {
     Ok(forgotten)
 }
 
-/// An error that lists the files with tests that are in no program.
+/// Returns an error that lists the files with tests that belong to no program.
 pub fn check() -> Result<()> {
     let mut missing = Vec::new();
     for manifest in shell::files(&root().join("crates"), &["toml"]) {

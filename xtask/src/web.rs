@@ -1,6 +1,6 @@
-//! The dashboard: its source is checked, rebuilt and compared with the files that the agents carry, and used in a browser.
+//! Dashboard: checks its source, builds it again and compares the result with the files in the agents, and uses it in a browser.
 //!
-//! A build of the programs needs none of these steps: the built files are in the repository.
+//! A build of the programs needs none of these steps, because the built files are in the repository.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -14,7 +14,7 @@ use crate::tally::{self, Counts, Outcome, Tally};
 /// Path of Debian's browser.
 pub const BROWSER: &str = "/usr/bin/chromium";
 
-/// Returns `program` of Node.js in `web/`: from the references' environment, so that no Node.js has to be installed.
+/// Returns a command for `program` of Node.js in `web/`. It uses Node.js from the references' environment, which needs no installation.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;
@@ -37,7 +37,7 @@ fn install() -> Result<()> {
         .context("the packages could not be installed; is the network there?")
 }
 
-/// The steps of the source.
+/// Runs the steps of the source.
 pub fn steps(tally: &mut Tally) {
     tally.step("dashboard: types and tests of its source", || {
         install()?;
@@ -53,7 +53,7 @@ pub fn steps(tally: &mut Tally) {
     });
 }
 
-/// Builds it elsewhere, and compares each file.
+/// Builds the dashboard in a temporary folder, and compares each file.
 fn same_build() -> Result<()> {
     let (kept, scratch) = (shell::root().join("web/dist"), Scratch::new("web-dist")?);
     let built = scratch.path().join("dist");
@@ -75,7 +75,7 @@ fn same_build() -> Result<()> {
     Ok(())
 }
 
-/// All files below a folder, by their names in it.
+/// Returns all files in a folder, with their paths relative to it.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let (mut found, mut waiting) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(directory) = waiting.pop() {
@@ -117,11 +117,11 @@ fn use_in_browser(log: &Path) -> Result<Option<Ended>> {
     let mut npm = command("npm")?;
     npm.args(["run", "--silent", "e2e"]);
     npm.env("JTC", release.join("jtc")).env("UCOM", release.join("ucom")).env("CHROMIUM", BROWSER);
-    // The browser draws in 3D without the hardware for it: parallel programs that watch a clock have priority.
+    // The browser draws 3D without hardware support, so parallel programs that depend on the time get priority.
     beside::run(&mut shell::nice(&npm, 5), log).map(Some)
 }
 
-/// The numbers of Node's own test runner.
+/// Returns the counts of Node's own test runner.
 fn counted(Ended { output, passed, .. }: &Ended) -> Result<Outcome> {
     let number = |word: &str| {
         let lines = output.lines().map(|line| line.trim_start_matches(['#', 'ℹ', ' ']));

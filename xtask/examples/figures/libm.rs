@@ -1,4 +1,4 @@
-//! Sine and cosine by the system's mathematics library, an anchor of the dynamics.
+//! Sine and cosine of the system's mathematics library, an anchor for the dynamics.
 use std::hint::black_box;
 
 use test_kit::clock::least_ns;

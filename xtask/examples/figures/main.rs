@@ -1,7 +1,7 @@
-//! Measures what the crates reach together and prints lines `name value`; `cargo xtask bench` puts them beside the others.
+//! Measures figures that need several crates and prints lines `name value`, which `cargo xtask bench` adds to those of the crates.
 //!
-//! `figures [libm|tick|line|tracking|ucom|recording]`: all, or one group. Everything in virtual time is the same on every run.
-//! `figures recording-file FILE SECONDS` writes the recording that `recording` measures, of any length.
+//! Run `figures [libm|tick|line|tracking|ucom|recording]` for all groups, or for one. Figures in virtual time are the same in every run.
+//! `figures recording-file FILE SECONDS` writes a recording like that of `recording`, of any length.
 
 mod libm;
 mod line;
@@ -43,7 +43,7 @@ fn main() -> world::Result<()> {
     Ok(())
 }
 
-/// One figure.
+/// Prints a figure.
 fn print(name: &str, value: f64) {
     println!("{name} {value:.6}");
 }

@@ -1,18 +1,18 @@
-//! Trajectories to measure with.
+//! Trajectories for the measurements.
 use jtc_host::Point;
 use jtc_wire::RawPoint;
 
-/// ms between points.
+/// Time between points, ms.
 pub const STEP_MS: u16 = 10;
 
-/// A smooth motion of all joints from rest at zero to rest at zero, `points` long, in whole swings of about 10 s.
+/// Returns `points` points of a smooth motion of all joints, from rest at zero to rest at zero, in whole periods of about 10 s.
 pub fn smooth(points: usize) -> Vec<Point> {
     const AMPLITUDE: [f64; 6] = [0.8, -0.5, 0.9, 0.7, -0.8, 1.0];
     let seconds = points.saturating_sub(1) as f64 * f64::from(STEP_MS) * 1e-3;
     let omega = std::f64::consts::TAU * (seconds / 10.0).round().max(1.0) / seconds;
     (0..points)
         .map(|i| {
-            // (1 − cos ωt)²/4 starts and ends each swing with velocity and acceleration zero.
+            // (1 − cos ωt)²/4 has velocity and acceleration zero at the start and the end of each period.
             let t = i as f64 * f64::from(STEP_MS) * 1e-3;
             let (s, c) = (omega * t).sin_cos();
             let u = 1.0 - c;
@@ -28,7 +28,7 @@ pub fn smooth(points: usize) -> Vec<Point> {
         .collect()
 }
 
-/// Points as the wire carries them.
+/// Returns the points in the format of the wire.
 pub fn raw(points: &[Point]) -> Result<Vec<RawPoint>, Box<dyn std::error::Error>> {
     Ok(points.iter().enumerate().map(|(i, point)| point.raw(i)).collect::<Result<_, _>>()?)
 }

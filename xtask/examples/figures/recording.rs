@@ -1,4 +1,4 @@
-//! Reports of long recordings: how long one of an hour at 1 kHz takes, and how much memory.
+//! Reports of long recordings: the time and the memory for an hour at 1 kHz.
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -14,11 +14,12 @@ use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use crate::print;
 use crate::world::Result;
 
-/// What is measured, and how often it is in an hour.
+/// Duration of the measured recording, and the factor from it to an hour.
 const SECONDS: u32 = 300;
 const IN_AN_HOUR: f64 = 3600.0 / SECONDS as f64;
 
-/// Times of both formats, each beside that of reading the same file, and the memory of a program that does no more.
+/// Prints, for both formats, the time of a report, the time for only reading the same file, and the memory of a program that only makes the
+/// report.
 pub fn figures() -> Result<()> {
     let dir = tempfile::tempdir()?;
     for format in ["mcap", "csv"] {
@@ -42,7 +43,7 @@ pub fn figures() -> Result<()> {
     Ok(())
 }
 
-/// The most memory that a report takes, MB, where the system reports it.
+/// Prints the largest memory of a report, MB, if the system reports it.
 pub fn memory(path: &Path) -> Result<()> {
     report(path)?;
     let status = std::fs::read_to_string("/proc/self/status")?;
@@ -53,7 +54,7 @@ pub fn memory(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// As `jtc report` does it.
+/// Makes a report in the same way as `jtc report`.
 fn report(path: &Path) -> Result<()> {
     let mut digest = Digest::new();
     let found = scan(path, |sample| digest.push(sample))?;
@@ -66,7 +67,7 @@ fn report(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Each record of the file, unpacked.
+/// Reads and decompresses each record of the file.
 fn decompress(path: &Path) -> Result<()> {
     let file = BufReader::with_capacity(1 << 18, File::open(path)?);
     let mut records = 0_u64;
@@ -77,7 +78,7 @@ fn decompress(path: &Path) -> Result<()> {
     if records == 0 { Err("no record".into()) } else { Ok(()) }
 }
 
-/// Each byte of the file, and the ends of its lines among them.
+/// Reads each byte of the file and counts its lines.
 fn lines(path: &Path) -> Result<()> {
     let (mut file, mut piece, mut lines) = (File::open(path)?, vec![0; 1 << 18], 0);
     loop {
@@ -89,14 +90,14 @@ fn lines(path: &Path) -> Result<()> {
     }
 }
 
-/// A recording of so long at 1 kHz, every value of it known.
+/// Writes a recording of `seconds` at 1 kHz in which all values are known.
 pub fn write(path: &Path, seconds: u32) -> Result<()> {
     let arm = Arm::avena();
     let info = RecordingInfo { trajectory: "long".into(), ..RecordingInfo::of(&arm) };
     let mut recorder = Recorder::create(path, &info)?;
     for i in 0..seconds * 1000 {
         recorder.write(&sample(i))?;
-        // As a recording that is written while it is made.
+        // A recording of a running motion is written as often.
         if i % 200 == 199 {
             recorder.flush()?;
         }
@@ -105,7 +106,7 @@ pub fn write(path: &Path, seconds: u32) -> Result<()> {
     Ok(())
 }
 
-/// The sample of a millisecond, with noise in what is measured.
+/// Returns the sample of a millisecond, with noise in the measured values.
 fn sample(i: u32) -> Sample {
     let time_s = f64::from(i) * 1e-3;
     let noise = |n: u32| {

@@ -1,5 +1,5 @@
-//! The longest tick: a run against the simulator, with a friction table and a segment taken over on the way, is kept and
-//! given again to fresh controllers.
+//! Longest time of a tick. A run against the simulator, with a friction table and with a segment that arrives during the run, is recorded
+//! and replayed with new controllers.
 use std::hint::black_box;
 
 use jtc_bus::Frame;
@@ -14,17 +14,17 @@ use crate::{path, print};
 
 /// Ticks of the motion.
 const MOVING: usize = 5_000;
-/// Times that the whole run is given again.
+/// Number of replays of the whole run.
 const ROUNDS: usize = 15;
 
-/// What the controller saw in one tick.
+/// Inputs of the controller in one tick.
 struct Seen {
     bus: Vec<Frame>,
     /// Index of the host's frame that was offered.
     host: Option<usize>,
 }
 
-/// A command as bytes.
+/// Returns a command as bytes.
 fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
     let mut bytes = vec![0; FRAME_MAX];
     let length = command.emit(&mut bytes)?;
@@ -32,7 +32,7 @@ fn bytes(command: &Command<'_>) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Frames that a host sends, and the state in which each is offered.
+/// Returns the frames of a host, with the state of the controller in which each frame is offered.
 fn script() -> Result<Vec<(ControllerState, Vec<u8>)>> {
     use Command::{ArmModelUseDefault, FrictionTableUseDefault, PidParamUseDefault, TrajSetExecStatus};
     let mut frames = Vec::new();
@@ -61,7 +61,8 @@ fn inputs<'a>(bus: &'a [Frame], host: &'a Option<HostEvent<'a>>) -> Inputs<'a> {
     Inputs { bus, host: host.as_slice(), ..Inputs::QUIET }
 }
 
-/// A whole run: bring-up, parameters, upload, motion. The world answers a controller of its own, which sees the same.
+/// Records a whole run: bring-up, parameters, upload, motion. The world answers its own controller; a second controller with the same
+/// inputs tells when the next frame is offered.
 fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
     let mut world = World::new(SimConfig { baud: None, ..SimConfig::default() });
     let mut shadow = controller();
@@ -91,7 +92,7 @@ fn record(frames: &[(ControllerState, Vec<u8>)]) -> Vec<Seen> {
 pub fn figures() -> Result<()> {
     let frames = script()?;
     let seen = record(&frames);
-    // The least of all rounds leaves out what the machine did meanwhile.
+    // The minimum of all rounds excludes the time that the machine spent on other programs.
     let mut least = vec![f64::INFINITY; seen.len()];
     for _ in 0..ROUNDS {
         let mut controller = controller();

@@ -1,4 +1,4 @@
-//! How well the arm follows with the errors of the demo's model, and how it would without feed-forward.
+//! Position errors of the arm with the errors of the demo's model, and without feed-forward.
 use std::cell::RefCell;
 use std::path::PathBuf;
 use std::rc::Rc;
@@ -35,7 +35,7 @@ impl Errors {
     }
 }
 
-/// The recorded motion of the existing arm where the data are at hand, else a smooth one.
+/// Returns the recorded motion of the existing arm if its data are available (`true`), else a smooth motion.
 fn motion() -> Result<(Vec<RawPoint>, bool)> {
     let data = std::env::var_os("OPENJTC_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/avena")),
@@ -56,7 +56,7 @@ fn motion() -> Result<(Vec<RawPoint>, bool)> {
     Ok((points, true))
 }
 
-/// Points every millisecond on straight lines, velocity and acceleration 0: what is left is PID and gravity.
+/// Returns a point per millisecond on straight lines, with velocity and acceleration 0: the controller then uses only PID and gravity.
 fn straight(points: &[RawPoint]) -> Result<Vec<RawPoint>> {
     let step = usize::from(path::STEP_MS);
     let mut fine = Vec::with_capacity(points.len() * step);

@@ -1,4 +1,4 @@
-//! UCoM: numbers for 31 boards and 60 KiB of firmware for one, against the time that their frames take on the bus; reading
+//! UCoM: numbering of 31 boards and an update of 60 KiB for one board, compared with the time of their frames on the bus; decoding of
 //! frames; memory of a board.
 use std::hint::black_box;
 
@@ -18,21 +18,21 @@ use crate::world::Result;
 const BITRATE: u32 = 1_000_000;
 const NS_PER_US: u64 = 1000;
 
-/// The PC side, a bus and a chain of boards, in virtual time.
+/// PC, bus and chain of boards in virtual time.
 struct Bench {
     master: Master,
     bus: TimedBus,
     tool: MemberId,
     boards: Vec<MemberId>,
     chain: ChainSim,
-    /// Every frame, in the order of the bus.
+    /// All frames in the order of the bus.
     received: Vec<CanFrame>,
-    /// When the last frame of program data was over, and the time that boards took to answer such ones, ns.
+    /// Time when the last frame of program data ended on the bus. The next field is the time that boards took to answer such frames, ns.
     asked_at: Option<u64>,
     turn_round_ns: u64,
 }
 
-/// What a procedure cost.
+/// Cost and outcome of a procedure.
 struct Cost {
     seconds: f64,
     busy_seconds: f64,
@@ -63,7 +63,7 @@ impl Bench {
         self.bus.now_ns() / NS_PER_US
     }
 
-    /// Runs a procedure to its end.
+    /// Runs a procedure to its end and returns its cost.
     fn run(&mut self, request: Request) -> Result<Cost> {
         let before = self.bus.stats();
         self.turn_round_ns = 0;
@@ -87,7 +87,7 @@ impl Bench {
         }
     }
 
-    /// Lets all parties send, then goes on to the next thing that happens.
+    /// Lets all parties send, then advances the time to the next event.
     fn step(&mut self) -> Result<()> {
         let now = self.now_us();
         self.chain.advance(now);
@@ -166,7 +166,7 @@ pub fn figures() -> Result<()> {
     Ok(())
 }
 
-/// 60 KiB for one board; from the start of the procedure to the last read-back.
+/// Updates one board with 60 KiB. The measured time is from the start of the procedure to the last read-back.
 fn update(name: &str, profile: Profile) -> Result<()> {
     let mut bench = Bench::new(1, profile);
     bench.run(Request::Init(InitOptions::default()))?;
@@ -181,13 +181,13 @@ fn update(name: &str, profile: Profile) -> Result<()> {
     print(&format!("{name}_s"), cost.seconds);
     print(&format!("{name}_bus_s"), cost.busy_seconds);
     print(&format!("{name}_turn_round_s"), cost.turn_round_seconds);
-    // What the PC adds to the bus's own time, the boards' answers and the wait for a board that restarts.
+    // The share is the time that the PC adds to the time of the bus. Answers of the boards and the wait for the restart do not count.
     let waits = cost.turn_round_seconds + f64::from(profile.xreset_wait) * 1e-3;
     print(&format!("{name}_share"), (cost.seconds - waits) / cost.busy_seconds);
     Ok(())
 }
 
-/// Frames that are read in a second, of those that numbering a chain takes.
+/// Prints the number of frames that are decoded in a second. The frames are those for numbering a chain.
 fn decode(received: &[CanFrame]) -> Result<()> {
     let profile = Profile::default();
     let frames: Vec<Frame> = received
@@ -208,7 +208,7 @@ fn decode(received: &[CanFrame]) -> Result<()> {
     }
     print("ucom_decode_frames_s", 1e9 / best);
     if let Some(path) = std::env::var_os("OPENJTC_UCOM_FRAMES") {
-        // For the other reader: one frame a line.
+        // The benchmark of python-can reads this file: one frame per line.
         let text: String = received.iter().map(|frame| format!("(0.0) can0 {}\n", candump(frame))).collect();
         std::fs::write(&path, text)?;
         let board = |number| DbcBoard { number, ..DbcBoard::default() };
@@ -218,7 +218,7 @@ fn decode(received: &[CanFrame]) -> Result<()> {
     Ok(())
 }
 
-/// As candump writes it.
+/// Returns a frame in the format of candump.
 fn candump(frame: &CanFrame) -> String {
     let data: String = frame.data().iter().map(|byte| format!("{byte:02X}")).collect();
     format!("{:03X}#{data}", frame.id().value())

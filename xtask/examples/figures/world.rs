@@ -6,10 +6,10 @@ use jtc_host::port::sim::SimPort;
 use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, RawPoint};
 
-/// Everything of a session may fail.
+/// Result whose error is of any type.
 pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// A controller in HoldPos with its default parameters.
+/// Returns a session with a controller in HoldPos that uses its default parameters.
 pub fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     let mut session = Session::new(SimPort::new(World::new(config)));
     session.use_defaults()?;
@@ -17,8 +17,8 @@ pub fn holding(config: SimConfig) -> Result<Session<SimPort>> {
     Ok(session)
 }
 
-/// `points` uploaded and started, by the simulator's own operator: a library session takes only what passes its check, and a path
-/// whose points have no velocities is here to be measured.
+/// Uploads and starts `points` with the simulator's own operator. A session of the library uploads only points that pass its check, and
+/// points without velocities must be measured, too.
 pub fn executing(config: SimConfig, points: &[RawPoint], step_ms: u16) -> Result<Session<SimPort>> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;

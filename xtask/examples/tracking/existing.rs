@@ -1,24 +1,24 @@
 //! The control law of the existing firmware, as it was published in April 2022, for comparison.
 //!
-//! τ = 1.3·(inverse dynamics + PID + friction). Points are joined by straight lines in each channel; the inverse dynamics are those of
-//! the rigid links at the measured position, with the commanded velocity and acceleration; the measured position, two
-//! milliseconds old, is compared with the present set position; the derivative is that of the mean of five errors; the sign of the
-//! friction polynomial steps at zero. A joint whose answer is lost is where it was last seen.
+//! τ = 1.3·(inverse dynamics + PID + friction). Each channel of the trajectory is interpolated linearly between points. The inverse
+//! dynamics use rigid links at the measured position, with the commanded velocity and acceleration. The error is the present set position
+//! minus the measured position, which is two milliseconds old. The derivative is that of the mean of five errors. The sign in the friction
+//! polynomial is a step at zero. A joint whose answer is lost keeps its last measured position.
 use jtc_bus::{Answer, Frame, JOINTS, NodeState, Request, Scale, Target, config};
 use jtc_core::{Config, Friction, Parameters, PidGains, SetPoint};
 use jtc_dynamics::Dynamics;
 use jtc_wire::RawPoint;
 
-/// What its torque is multiplied by.
+/// Factor of the torque.
 const GAIN: f64 = 1.3;
-/// Seconds in a tick.
+/// Duration of a tick, s.
 const DT: f64 = 0.001;
-/// Errors whose mean the derivative is taken of.
+/// Number of errors in the mean for the derivative.
 const WINDOW: usize = 5;
-/// Ticks for which the arm is held before it moves.
+/// Ticks in position hold before the motion.
 const SETTLE: u32 = 2_000;
 
-/// A PID controller: the errors of the last ticks are zeros after a reset.
+/// PID controller. After a reset the errors of the last ticks are zero.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pid {
     errors: [f64; WINDOW],
@@ -39,20 +39,20 @@ impl Pid {
     }
 }
 
-/// What it does at the moment.
+/// Phase of the existing controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Phase {
-    /// Drives are configured and enabled.
+    /// The drives are being configured and enabled.
     BringUp,
-    /// The arm is held, for so many ticks so far.
+    /// The arm is in position hold, for this number of ticks.
     Hold(u32),
-    /// The path is followed, at this millisecond.
+    /// The arm follows the path and is at this millisecond of it.
     Operate(u32),
-    /// The end was reached.
+    /// The end of the path was reached.
     Finish,
 }
 
-/// The existing controller.
+/// The existing firmware's controller.
 pub struct Existing {
     dynamics: Dynamics,
     gains: [PidGains; JOINTS],
@@ -65,16 +65,16 @@ pub struct Existing {
     temperature: [f64; JOINTS],
     ticks: u32,
     configured: bool,
-    /// What it does.
+    /// Current phase.
     pub phase: Phase,
-    /// Commanded in this tick.
+    /// Commanded point of this tick.
     pub set: SetPoint,
-    /// Measured, rad.
+    /// Measured positions, rad.
     pub measured: [f64; JOINTS],
 }
 
 impl Existing {
-    /// With the parameters of the built-in arm, which are its own, and a path.
+    /// Creates the controller for a path, with the parameters of the built-in arm, which are those of the existing firmware.
     pub fn new(config: &Config, parameters: &Parameters, points: &[RawPoint], step_ms: u16) -> Self {
         let Friction::Polynomial(friction) = parameters.friction else { unreachable!("it has a polynomial") };
         Self {
@@ -95,7 +95,7 @@ impl Existing {
         }
     }
 
-    /// One millisecond: the answers since the last one, and the frame to send.
+    /// Takes the answers since the last call and returns the frame to send. Called once per millisecond.
     pub fn tick(&mut self, received: &[Frame]) -> Frame {
         for frame in received {
             if let Ok(Answer::Joint { node, report }) = Answer::parse(frame, self.scale) {
@@ -117,7 +117,7 @@ impl Existing {
         Request::Move { torque: self.torque(), pump: false }.emit()
     }
 
-    /// Its Move and another request take turns while joints are not enabled.
+    /// Returns a Move or another request, in turn, until all joints are enabled.
     fn bring_up(&mut self) -> Frame {
         const TORQUE_MODE: u8 = 1;
         let states = self.states;
@@ -151,7 +151,7 @@ impl Existing {
         self.pid = [Pid::default(); JOINTS];
     }
 
-    /// The point of this millisecond; the last two are left out.
+    /// Sets the point of this millisecond. The last two milliseconds are omitted.
     fn follow(&mut self, k: u32) {
         let end = (self.points.len() as u32 - 1) * self.step_ms;
         self.phase = Phase::Operate(k);
@@ -185,7 +185,7 @@ impl Existing {
     }
 }
 
-/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), N·m; s is the sign of v, 0 at 0.
+/// Friction torque (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), N·m; s is the sign of v, and 0 at v = 0.
 fn friction([c0, c1, c2, c3, c4, c5]: &[f64; 6], v: f64, celsius: f64) -> f64 {
     let s = if v == 0.0 { 0.0 } else { v.signum() };
     (1.0 + c4 * (celsius - c5)) * (c0 * s + c1 * v + c2 * v * v * s + c3 * v * v * v)

@@ -1,4 +1,4 @@
-//! The existing firmware's control law and ours, along the same paths on the same simulated plant; writes docs/tracking.md.
+//! Runs the existing firmware's control law and ours along the same paths on the same simulated plant, and writes docs/tracking.md.
 mod existing;
 mod page;
 mod paths;
@@ -10,31 +10,31 @@ use jtc_sim::{FrictionModel, LuGre, ModelError, SimConfig};
 
 use run::{Figures, Outcome, Path, Result};
 
-/// Arms that are drawn for each figure, which is the median of theirs.
+/// Number of random arms; each figure is the median over them.
 const SEEDS: u64 = 10;
 
-/// What a run is like.
+/// Condition of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Condition {
     /// Heading on the page.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the condition.
     pub what: &'static str,
-    /// Torque that the drives deliver of what they are asked for.
+    /// Share of the requested torque that the drives deliver.
     delivers: f64,
     /// Our torque gain (J-61).
     gain: f64,
     friction: FrictionModel,
-    /// Speed around zero in which our compensation of friction changes its sign, rad/s (a setting).
+    /// Speed around zero within which our friction compensation changes its sign, rad/s (a setting).
     sign_width: f64,
-    /// How far masses and friction are from what both controllers believe.
+    /// Error of the masses and the friction in the model that both controllers use.
     error: ModelError,
-    /// At the flange, which no controller knows of, kg.
+    /// Mass at the flange that both controllers do not know, kg.
     mass: f64,
-    /// Share of receptions that fail.
+    /// Probability that the reception of a frame fails.
     lost: f64,
     jitter_ms: u8,
-    /// The goal is judged.
+    /// `true` if the result is compared with the goal.
     pub judged: bool,
 }
 
@@ -110,12 +110,12 @@ impl Condition {
         },
     ];
 
-    /// The same with a model that is right where `error` is zero.
+    /// Returns the condition with these errors of the model's masses and friction.
     fn believing(self, mass: f64, friction: f64) -> Self {
         Self { error: ModelError { mass, friction, ..self.error }, ..self }
     }
 
-    /// The world of a seed. Gravity is that of the existing firmware, whose arm hangs; `gain`: our torque gain.
+    /// Returns the simulation of a seed. Gravity is that of the existing firmware, whose arm hangs; `gain` is our torque gain.
     fn world(&self, seed: u64, start: [f64; JOINTS], gain: f64) -> SimConfig {
         let mut controller = Config { gravity: [0.0, 0.0, 9.81], ..Config::avena() };
         controller.friction_sign_width = self.sign_width;
@@ -137,7 +137,7 @@ impl Condition {
         world
     }
 
-    /// Medians of each figure of each joint over the seeds that got to the end of the path, for the existing law and for ours.
+    /// Returns the results of the existing law and of ours: the median of each figure over the seeds that reached the end of the path.
     pub fn compare(&self, path: &Path) -> Result<[Runs; 2]> {
         let start = path.points.first().map(jtc_wire::RawPoint::position_rad).ok_or("an empty path")?;
         let (mut existing, mut ours) = (Vec::new(), Vec::new());
@@ -149,14 +149,14 @@ impl Condition {
     }
 }
 
-/// What became of a controller's runs.
+/// Results of a controller's runs.
 #[derive(Clone, Debug)]
 pub struct Runs {
-    /// Those that got to the end of the path.
+    /// Number of runs that reached the end of the path.
     pub finished: usize,
-    /// Their medians.
+    /// Medians over these runs.
     pub figures: Option<Figures>,
-    /// How the others ended.
+    /// Reasons why the other runs ended.
     pub errors: Vec<String>,
 }
 
@@ -189,7 +189,7 @@ fn median(all: &[Figures]) -> Figures {
     }
 }
 
-/// What is left of our error where the model is right: a heading, and mrad per joint.
+/// Returns our error with a model that is partly or completely correct: a heading, and mrad per joint.
 fn bounds(path: &Path, condition: &Condition) -> Result<Vec<(&'static str, [f64; JOINTS])>> {
     let sharp = match condition.friction {
         FrictionModel::Smooth { width } => width,

@@ -1,4 +1,4 @@
-//! The page: text and tables.
+//! Text and tables of the page docs/tracking.md.
 use std::fmt::Write as _;
 
 use jtc_bus::JOINTS;
@@ -6,22 +6,22 @@ use jtc_bus::JOINTS;
 use crate::run::Figures;
 use crate::{Condition, Runs, paths};
 
-/// Both controllers under one condition on one path.
+/// Results of both controllers under one condition on one path.
 pub struct Comparison {
     pub path: &'static str,
     pub condition: Condition,
     pub existing: Runs,
     pub ours: Runs,
-    /// Where the goal was missed: what is left of our error with a better model, mrad.
+    /// Errors of our law with a better model, mrad, if the goal was missed.
     pub bounds: Vec<(&'static str, [f64; JOINTS])>,
 }
 
-/// A fifth of the existing firmware's error, but no less than what an encoder of 16 bits a turn lets be seen, mrad.
+/// Goal: a fifth of the existing firmware's error, but at least the error that an encoder of 16 bits can show, mrad.
 const SHARE: f64 = 0.2;
 const LEAST: f64 = 0.04;
 
-/// What the existing firmware's own code did on this plant, compiled for a PC: commanded − measured and commanded − true, mrad,
-/// and the change of torque, N·m/ms, with ideal drives; commanded − measured with drives that deliver 1/1.3.
+/// Figures of the existing firmware's own code on this plant, compiled for a PC. With ideal drives: commanded − measured and commanded −
+/// true, mrad, and the change of torque, N·m/ms. With drives that deliver 1/1.3: commanded − measured, mrad.
 const REFERENCE: [(&str, [f64; JOINTS]); 4] = [
     ("ideal drives, commanded − measured", [0.258, 0.416, 0.368, 0.121, 0.127, 0.136]),
     ("ideal drives, commanded − true", [1.07, 0.88, 1.14, 0.76, 0.65, 0.91]),
@@ -65,7 +65,7 @@ impl Comparison {
         all.filter(|(_, ours, goal)| self.condition.judged && rounded(*ours) > *goal).collect()
     }
 
-    /// One sentence.
+    /// Returns the result in one sentence.
     pub fn verdict(&self) -> String {
         if self.ours.finished < self.existing.finished {
             return format!(
@@ -122,12 +122,12 @@ impl Comparison {
     }
 }
 
-/// As many digits as the page shows.
+/// Rounds to the digits that the page shows.
 fn rounded(value: f64) -> f64 {
     (1e3 * value).round() / 1e3
 }
 
-/// Goals of the joints, mrad.
+/// Returns the goal of each joint, mrad.
 fn goals(existing: &Figures) -> [f64; JOINTS] {
     existing.true_error.map(|error| rounded((SHARE * rounded(error)).max(LEAST)))
 }
@@ -137,7 +137,7 @@ fn row(page: &mut String, name: &str, values: &[f64; JOINTS], digits: usize) {
     let _ = writeln!(page, "| {name} | {cells} |");
 }
 
-/// The existing law here beside the existing firmware's own code.
+/// Writes the table that compares the existing law here with the existing firmware's own code.
 fn reference(page: &mut String, all: &[Comparison]) {
     let figures = |name: &str| {
         let found = all.iter().find(|c| c.path == "demo path" && c.condition.name == name);
@@ -165,7 +165,7 @@ fn reference(page: &mut String, all: &[Comparison]) {
     let _ = writeln!(page, "\nThe largest difference is {:.1} %.", 100.0 * most);
 }
 
-/// The whole page.
+/// Returns the whole page.
 pub fn text(all: &[Comparison]) -> String {
     let mut page = INTRODUCTION.to_owned();
     reference(&mut page, all);

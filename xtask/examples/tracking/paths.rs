@@ -1,17 +1,17 @@
-//! The paths that are followed.
+//! Paths of the comparison.
 use jtc_host::example;
 use jtc_wire::RawPoint;
 
 use crate::run::{Path, Result};
 
-/// Points of the recorded path after which one is missing in its recording, from 0.
+/// Points of the recorded path, from 0, after which its recording lacks a point.
 const MISSING_AFTER: [usize; 5] = [184, 358, 544, 726, 906];
-/// Its name on the page.
+/// Name of the recorded path on the page.
 pub const RECORDED: &str = "recorded path";
-/// ms between its points.
+/// Time between its points, ms.
 const STEP_MS: u16 = 10;
 
-/// The path of `jtc demo` and, where the data of the existing arm are at hand, the one that was recorded with it.
+/// Returns the path of `jtc demo`, and the path that was recorded with the existing arm if its data are available.
 pub fn all() -> Result<Vec<Path>> {
     let demo = example::demo_motion();
     let mut paths = vec![Path { name: "demo path", points: demo.raw()?, step_ms: demo.step_ms }];
@@ -21,7 +21,7 @@ pub fn all() -> Result<Vec<Path>> {
     Ok(paths)
 }
 
-/// `TrajectoryInt.csv`, with the points in it that its recording has left out.
+/// Returns the points of `TrajectoryInt.csv`, with the points that the recording lacks filled in.
 fn recorded() -> Option<Vec<RawPoint>> {
     let raw =
         |[position, velocity, acceleration]: [[i16; 6]; 3]| RawPoint { position, velocity, acceleration };
@@ -37,7 +37,7 @@ fn recorded() -> Option<Vec<RawPoint>> {
     Some(points)
 }
 
-/// In the middle between two points 20 ms apart: that of the cubic in the position.
+/// Returns the point in the middle between two points that are 20 ms apart. The position is that of a cubic.
 fn between(a: &RawPoint, b: &RawPoint) -> RawPoint {
     let mean = |a: &[i16; 6], b: &[i16; 6]| {
         core::array::from_fn(|j| ((i32::from(a[j]) + i32::from(b[j])) / 2) as i16)

@@ -1,4 +1,4 @@
-//! One run of a controller along a path, on the simulated plant, and what it amounts to.
+//! Run of a controller along a path on the simulated plant, and its figures.
 use jtc_bus::{JOINTS, Scale};
 use jtc_core::{ControllerState, Parameters, TrajectoryState, joint_error};
 use jtc_sim::{Bus, Fault, FaultKind, Operator, Plant, SimConfig, Trigger, host};
@@ -8,24 +8,24 @@ use crate::existing::{Existing, Phase};
 
 pub type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
-/// The figures of a run, or how it ended before its end.
+/// Figures of a run, or the reason why the run ended early.
 pub type Outcome = std::result::Result<Figures, String>;
 
-/// A path: points and the time between them.
+/// Path: points, and the time between them.
 pub struct Path {
     pub name: &'static str,
     pub points: Vec<RawPoint>,
     pub step_ms: u16,
 }
 
-/// Per joint, RMS over the path.
+/// RMS over the path, per joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {
-    /// Commanded minus true position when the command begins to act, mrad.
+    /// Commanded minus true position at the time when the command begins to act, mrad.
     pub true_error: [f64; JOINTS],
-    /// The position error of the controller: what it compares, mrad.
+    /// Position error that the controller calculates, mrad.
     pub own_error: [f64; JOINTS],
-    /// Change of the torque at the joint in a millisecond, N·m.
+    /// Change of the torque at the joint from a millisecond to the next, N·m.
     pub roughness: [f64; JOINTS],
 }
 
@@ -66,7 +66,7 @@ impl Sums {
     }
 }
 
-/// Ours: the simulated world with its controller.
+/// Runs our controller in the simulated world.
 pub fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     let mut operator = Operator::new(config);
     operator.bring_up()?;
@@ -101,7 +101,7 @@ pub fn ours(config: SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     Err(format!("{} takes longer than a minute", path.name).into())
 }
 
-/// The existing law, on the same plant and bus.
+/// Runs the existing law on the same plant and bus.
 pub fn existing(config: &SimConfig, lost: f64, path: &Path) -> Result<Outcome> {
     let mut plant = Plant::new(config);
     let mut bus = Bus::new(

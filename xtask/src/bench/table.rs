@@ -19,7 +19,7 @@ enum Target {
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// The smallest of these counts; one that could not be had is named.
+    /// Anchors, of which the smallest counts; an anchor that could not be measured is named.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,
@@ -276,7 +276,7 @@ pub fn print(figures: &Figures, failed: &Failed, quiet: bool) -> usize {
 }
 
 impl Row {
-    /// The row of the table, and whether its target was missed.
+    /// Returns the row of the table, and whether its target was missed.
     fn judge(&self, figures: &Figures, failed: &Failed, quiet: bool) -> (String, bool) {
         let ours = figures.get(self.ours).copied();
         let anchor = self
@@ -317,7 +317,7 @@ impl Row {
     }
 }
 
-/// A number with about four significant digits.
+/// Formats a number with about four significant digits.
 fn short(value: f64) -> String {
     match value.abs() {
         v if v >= 1000.0 => format!("{value:.0}"),
@@ -331,7 +331,7 @@ fn short(value: f64) -> String {
 mod tests {
     use super::*;
 
-    /// Every figure of the table exists except those of one failed measurement.
+    /// Every figure of the table exists, except those of one failed measurement.
     #[test]
     fn a_failed_measurement_is_printed_with_its_cause_and_all_other_rows_are_printed() {
         let names = ROWS.iter().flat_map(|row| row.anchors.iter().copied().chain([row.ours]));
@@ -352,7 +352,7 @@ mod tests {
             }
         }
         assert!(gone > 0 && there > 20, "{gone} {there}");
-        // A figure that was not measured did not fail.
+        // A figure that was not measured has not failed.
         let (text, _) = ROWS[0].judge(&Figures::new(), &Failed::default(), true);
         assert!(text.ends_with("| not measured |"), "{text}");
     }

@@ -1,4 +1,4 @@
-//! `cargo xtask bench tracking`: the control law compared with that of the existing firmware, in docs/tracking.md.
+//! `cargo xtask bench tracking`: compares the control law with that of the existing firmware, and writes docs/tracking.md.
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -17,14 +17,14 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
 mod tests {
     use super::*;
 
-    /// Rows of a section: name and six figures.
+    /// Rows of a section: names with six figures.
     type Rows = Vec<(String, [f64; 6])>;
 
     fn page() -> String {
         std::fs::read_to_string(root().join("docs/tracking.md")).expect("docs/tracking.md is there")
     }
 
-    /// Heading, rows and text of each section; a row that is not a name and six numbers is a failure.
+    /// Returns heading, rows and text of each section. Panics if a row is not a name and six numbers.
     fn sections(page: &str) -> Vec<(String, Rows, String)> {
         let mut sections = Vec::new();
         for section in page.split("\n##").skip(1) {
@@ -47,7 +47,7 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page calls a goal met if its figures meet it, and names the joints that miss it, with the limiting quantity.
+    /// The page calls a goal met only if its figures meet the goal. It names the joints that miss it, with the limiting quantity.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));
@@ -87,7 +87,7 @@ mod tests {
         }
     }
 
-    /// The existing law is that of the existing firmware within a tenth, in each figure that is known of it.
+    /// The existing law agrees with the existing firmware within a tenth, in each known figure of it.
     #[test]
     fn j62_the_existing_law_of_the_page_is_that_of_the_existing_firmware() {
         let sections = sections(&page());

@@ -1,4 +1,4 @@
-//! Packages on trial: installed in a Debian of their own, used, removed and purged, after which nothing is left.
+//! Trial of the packages: they are installed in a separate Debian, used, removed and purged, after which no file is left.
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::{assembled_twice, programs, write};
 use crate::shell::{self, run};
 use crate::tally::{Outcome, Tally};
 
-/// The steps of `cargo xtask test`: with the programs that it has built.
+/// Runs the steps of `cargo xtask test`, with the programs that it has built.
 pub fn steps(tally: &mut Tally) {
     tally.step("packages: assembled twice, installed, used, removed", || {
         if programs::own().is_err() || !Path::new("/var/lib/dpkg/status").exists() {
@@ -50,7 +50,7 @@ fn debs(paths: &[PathBuf]) -> Vec<PathBuf> {
     debs
 }
 
-/// From the installation to nothing.
+/// Tries the packages from the installation to the purge.
 fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     ensure!(debs.len() == 2, "there are {} packages to try, not those of jtc and ucom", debs.len());
     let before = root.files()?;
@@ -58,7 +58,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     run(root.dpkg().args(["--verify", "jtc", "ucom"]))?;
     used(root)?;
     units(root)?;
-    // Files that an agent would have left.
+    // Files that an agent leaves.
     let state = root.path().join("var/lib/jtc/cell1");
     fs::create_dir_all(&state)?;
     fs::write(state.join("tokens.toml"), "")?;
@@ -91,7 +91,7 @@ fn trial(root: &Root, debs: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
-/// The programs run for a user without any right, with their pages and completions.
+/// Runs the programs as a user without privileges, and checks their pages and completions.
 fn used(root: &Root) -> Result<()> {
     for name in ["jtc", "ucom"] {
         print!("{}", shell::read(root.as_nobody(name).arg("--version"))?);
@@ -142,7 +142,7 @@ fn units(root: &Root) -> Result<()> {
     }
     let users = fs::read_to_string(root.path().join("etc/passwd"))?;
     ensure!(users.lines().any(|line| line.starts_with("jtc:")), "the user jtc was not made");
-    // The check must find a mistake before its silence counts.
+    // First checks that the method finds a mistake in a broken unit.
     let broken = root.path().join("etc/systemd/system/jtc-broken.service");
     fs::write(&broken, "[Service]\nExecStart=/usr/bin/no-such-program\nNoSuchKey=1\n")?;
     let found = complaints(root, "jtc-broken.service")?;
@@ -157,7 +157,8 @@ fn units(root: &Root) -> Result<()> {
     Ok(())
 }
 
-/// Returns systemd's complaints about a unit of this project. Other units, whose dependencies the copied Debian may lack, are not checked.
+/// Returns systemd's complaints about a unit of this project. Other units are not checked, because the copied Debian may lack their
+/// dependencies.
 fn complaints(root: &Root, unit: &str) -> Result<Vec<String>> {
     let verified = root.command("systemd-analyze").args(["verify", "--man=no", unit]).output()?;
     let text = String::from_utf8_lossy(&verified.stderr).into_owned();

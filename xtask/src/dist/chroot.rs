@@ -1,4 +1,4 @@
-//! A small Debian in a folder, in which packages are installed on trial.
+//! Small Debian system in a folder, for trial installations of packages.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, symlink};
@@ -10,9 +10,9 @@ use anyhow::{Context, Result, bail, ensure};
 use super::tree::sha256;
 use crate::shell::{self, Scratch, apt_install, run, works};
 
-/// Folders that are not compared: dpkg's own records, and files that do not survive a reboot.
+/// Folders that are not compared: dpkg's own records, and files that are lost at a reboot.
 const UNCOMPARED: [&str; 6] = ["var/lib/dpkg", "var/log", "var/cache", "proc", "tmp", "run"];
-/// Backups by the programs that change users.
+/// Backups written by the programs that change users.
 const BACKUPS: [&str; 7] = [
     "etc/passwd-",
     "etc/group-",
@@ -24,14 +24,14 @@ const BACKUPS: [&str; 7] = [
 ];
 /// Packages that the trial uses if this computer has them, in addition to the essential ones.
 const WANTED: [&str; 3] = ["passwd", "systemd", "man-db"];
-/// Files without use in the trial.
+/// Files that the trial does not need.
 const LEFT_OUT: [&str; 5] =
     ["/usr/share/doc", "/usr/share/locale", "/usr/share/info", "/usr/share/man", "/usr/lib/udev/hwdb.d"];
 
-/// The folder, removed when dropped.
+/// Folder of the system; it is removed on drop.
 pub struct Root(Scratch);
 
-/// A package of this computer, as dpkg knows it.
+/// Package of this computer, as dpkg knows it.
 struct Installed {
     essential: bool,
     /// Names of its dependencies: for each dependency a list of alternatives.
@@ -39,7 +39,7 @@ struct Installed {
 }
 
 impl Root {
-    /// The essential packages of this computer's Debian, copied; needs no network, and takes seconds.
+    /// Copies the essential packages of this computer's Debian. Needs no network, and takes seconds.
     pub fn copied(name: &str) -> Result<Self> {
         let root = Self(Scratch::new(name)?);
         for folder in ["bin", "sbin", "lib", "lib32", "lib64", "libx32"] {
@@ -60,7 +60,7 @@ impl Root {
         Ok(root)
     }
 
-    /// A fresh Debian 12 from its archive, with the programs that the trial uses.
+    /// Creates a new Debian 12 from its archive, with the programs that the trial uses.
     pub fn bootstrapped(name: &str) -> Result<Self> {
         if !works(shell::command("debootstrap").arg("--version")) {
             apt_install(&["debootstrap"])?;
@@ -72,12 +72,12 @@ impl Root {
         Ok(root)
     }
 
-    /// Returns the path.
+    /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 
-    /// Writes dpkg's records of the new root: for the copied packages the records of this computer.
+    /// Writes dpkg's records of the new system: those of this computer for the copied packages.
     fn remember(&self, packages: &BTreeSet<String>) -> Result<()> {
         let to = self.path().join("var/lib/dpkg");
         for folder in ["info", "updates", "triggers", "alternatives"] {
@@ -94,7 +94,7 @@ impl Root {
         Ok(())
     }
 
-    /// Makes the files that the scripts of essential packages make at their installation.
+    /// Creates the files that the installation scripts of essential packages create.
     fn complete(&self) -> Result<()> {
         for (file, from) in [("passwd", "passwd.master"), ("group", "group.master")] {
             fs::copy(Path::new("/usr/share/base-passwd").join(from), self.path().join("etc").join(file))?;
@@ -117,17 +117,17 @@ impl Root {
         Ok(())
     }
 
-    /// A file of it.
+    /// Returns the path of a file of the system, if it exists.
     pub fn has(&self, path: &str) -> Option<PathBuf> {
         Some(self.path().join(path)).filter(|path| path.symlink_metadata().is_ok())
     }
 
-    /// `program` in it, as root.
+    /// Returns a command that runs `program` in the system as root.
     pub fn command(&self, program: &str) -> Command {
         self.chroot(&[], program)
     }
 
-    /// `program` in it, as a user without any right.
+    /// Returns a command that runs `program` in the system as a user without privileges.
     pub fn as_nobody(&self, program: &str) -> Command {
         self.chroot(&["--userspec=65534:65534"], program)
     }
@@ -143,7 +143,7 @@ impl Root {
         chroot
     }
 
-    /// dpkg on it. Some containers tell dpkg to leave out manual pages; here they are wanted.
+    /// Returns a command that runs dpkg on the system. It installs manual pages, too, which some containers tell dpkg to leave out.
     pub fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
@@ -151,7 +151,7 @@ impl Root {
         dpkg
     }
 
-    /// Everything in it that packages could have left: kind, mode, owner and content by path.
+    /// Returns everything that packages could have left: kind, mode, owner and content by path.
     pub fn files(&self) -> Result<BTreeMap<String, String>> {
         let mut found = BTreeMap::new();
         let mut waiting = vec![self.path().to_owned()];
@@ -180,7 +180,7 @@ impl Root {
     }
 }
 
-/// All packages of this computer.
+/// Returns all packages of this computer.
 fn installed() -> Result<BTreeMap<String, Installed>> {
     let mut query = shell::command("dpkg-query");
     let format = "${db:Status-Abbrev}\t${Package}\t${Essential}\t${Pre-Depends}, ${Depends}\t${Provides}\n";
@@ -203,14 +203,14 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
         packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
         provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
     }
-    // A package that is provided by another one is a package that needs that one.
+    // The name that a package provides counts as a package that depends on it.
     for (other, by) in provided {
         packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
     }
     Ok(packages)
 }
 
-/// The essential packages, those that the trial uses, and all that these need.
+/// Returns the essential packages, those that the trial uses, and all their dependencies.
 fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> {
     let begins = |name: &str, package: &Installed| package.essential || WANTED.contains(&name);
     let mut waiting: Vec<&str> =
@@ -236,7 +236,7 @@ fn closure(installed: &BTreeMap<String, Installed>) -> Result<BTreeSet<String>> 
     Ok(real)
 }
 
-/// Debian's name of this computer's kind.
+/// Returns Debian's name of this computer's architecture.
 fn shell_architecture() -> Result<&'static str> {
     Ok(super::programs::own()?.debian)
 }

@@ -4,18 +4,18 @@ use serde_json::Value;
 
 use crate::shell::root;
 
-/// The libraries whose scripts are a part of the built files; the others of web/package.json build and test them.
+/// Libraries whose scripts are part of the built files. The other entries of web/package.json are needed only for the build and the tests.
 const NAMES: [&str; 4] = ["clsx", "svelte", "three", "uplot"];
 
 /// Library of the dashboard.
 pub struct Library {
     /// Name in the registry npm.
     pub name: String,
-    /// The version that the lock file has.
+    /// Version in the lock file.
     pub version: String,
-    /// Licence, the identifier of SPDX.
+    /// Licence, as an SPDX identifier.
     pub licence: String,
-    /// The text of its licence.
+    /// Text of its licence.
     pub text: String,
 }
 

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::tree::Tree;
 
-/// A package.
+/// Debian package.
 pub struct Deb<'a> {
     /// Name.
     pub name: &'a str,
@@ -13,21 +13,21 @@ pub struct Deb<'a> {
     pub version: &'a str,
     /// Architecture: `amd64`, `arm64`.
     pub architecture: &'a str,
-    /// More fields of the control file, a line each: `Section: science`.
+    /// More lines of the control file, such as `Section: science`.
     pub fields: &'a str,
-    /// Files that it installs.
+    /// Files that the package installs.
     pub tree: &'a Tree,
     /// Scripts by name: `postinst`, `postrm`.
     pub scripts: &'a [(&'a str, &'a str)],
 }
 
 impl Deb<'_> {
-    /// `jtc_0.2.0-1_amd64.deb`.
+    /// Returns the file name, such as `jtc_0.2.0-1_amd64.deb`.
     pub fn file_name(&self) -> String {
         format!("{}_{}_{}.deb", self.name, self.version, self.architecture)
     }
 
-    /// The package, all of whose files have this `time` (Unix time, s).
+    /// Returns the bytes of the package, in which all files have this `time` (Unix time, s).
     pub fn bytes(&self, time: u64) -> Result<Vec<u8>> {
         let mut ar = ar::Builder::new(Vec::new());
         for (name, bytes) in [

@@ -1,4 +1,4 @@
-//! The crates of others that a release is made of, as cargo resolves them.
+//! Third-party crates that a release contains, as cargo resolves them.
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -8,14 +8,14 @@ use serde_json::Value;
 use super::programs::PLATFORMS;
 use crate::{firmware, shell};
 
-/// A crate.
+/// Crate.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Crate {
     /// Name.
     pub name: String,
-    /// Its version.
+    /// Version.
     pub version: String,
-    /// Its licence, an SPDX expression; `None` if its manifest names none.
+    /// Licence as an SPDX expression; `None` if its manifest has none.
     pub licence: Option<String>,
     /// Source of the crate; `None` for the project's own.
     pub source: Option<String>,
@@ -23,7 +23,7 @@ pub struct Crate {
     pub authors: Vec<String>,
     /// Address of its repository.
     pub repository: Option<String>,
-    /// The folder of its source.
+    /// Folder of its source.
     pub folder: PathBuf,
     /// SHA-256 of its archive in the registry.
     pub checksum: Option<String>,
@@ -47,8 +47,8 @@ pub enum Kind {
     All,
 }
 
-/// Returns the contents of the programs, the Python package and the boards' programs. Features are those of the whole workspace: the
-/// graph may have more than a program has, and never less.
+/// Returns the crates in the programs, the Python package and the boards' programs. The features are those of the whole workspace, so the
+/// graph may contain more crates than a program, but never fewer.
 pub fn shipped() -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in PLATFORMS {
@@ -65,7 +65,7 @@ pub fn shipped() -> Result<Graph> {
     Ok(graph)
 }
 
-/// All that a manifest leads to on these platforms, tests included.
+/// Returns all dependencies of a manifest on these platforms, including those of tests.
 pub fn all(manifest: &Path, platforms: &[String]) -> Result<Graph> {
     let mut graph = Graph::default();
     for platform in platforms {
@@ -142,7 +142,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Adds the sums that the lock files have.
+    /// Adds the checksums in the lock files.
     fn checksums(&mut self) -> Result<()> {
         for lock in ["Cargo.lock", "firmware/Cargo.lock"] {
             let text = std::fs::read_to_string(shell::root().join(lock)).context(lock)?;
@@ -160,7 +160,7 @@ impl Graph {
         Ok(())
     }
 
-    /// Those that others wrote.
+    /// Returns the third-party crates.
     pub fn foreign(&self) -> impl Iterator<Item = &Crate> {
         self.crates.values().filter(|found| found.source.is_some())
     }

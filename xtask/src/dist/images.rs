@@ -1,4 +1,4 @@
-//! The boards' programs as they lie in flash, and the list of them that `jtc firmware flash` reads.
+//! The boards' programs as images of flash, and their list that `jtc firmware flash` reads.
 use anyhow::{Context, Result, ensure};
 use object::{Object as _, ObjectSegment as _};
 use serde_json::json;
@@ -8,15 +8,15 @@ use crate::firmware;
 
 /// First address of flash.
 const FLASH: u64 = 0x0800_0000;
-/// Bytes from there to the stored arm, the last two sectors of bank 2, which no image may touch. Where bank 2 begins stand the few words of the
-/// second core of an H745, so that the images of these boards have a gap of erased flash in them.
+/// Bytes from there to the stored arm, which has the last two sectors of bank 2 and which no image may overwrite. The few words for the
+/// second core of an H745 are at the start of bank 2, so the images of these boards contain a gap of erased flash.
 const ROOM: u64 = (2048 - 2 * 128) * 1024;
 /// Value of flash that is not written.
 const ERASED: u8 = 0xff;
 
-/// The program of a board.
+/// Program of a board.
 pub struct Image {
-    /// The board's name.
+    /// Name of the board.
     pub board: &'static str,
     /// Contents of flash from 0x0800_0000 on.
     pub bin: Vec<u8>,
@@ -43,7 +43,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         if bytes.is_empty() {
             continue;
         }
-        // The load address, which differs from the address at which it is used.
+        // The load address, which differs from the run address.
         let address = u64::from(segment.elf_program_header().p_paddr.get(file.endian()));
         let end = address + bytes.len() as u64;
         ensure!(
@@ -55,7 +55,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
         bin.resize(bin.len().max(to), ERASED);
         bin[from..to].copy_from_slice(bytes);
     }
-    // The vector table: the stack's first address in RAM, then that of the first instruction, odd as all of Thumb are.
+    // The vector table: the initial stack pointer in RAM, then the address of the first instruction, which is odd for Thumb.
     let word = |at: usize| bin.get(at..at + 4).and_then(|word| word.try_into().ok()).map(u32::from_le_bytes);
     let (stack, start) = (word(0).context("the image is empty")?, word(4).context("the image is empty")?);
     ensure!(
@@ -69,7 +69,7 @@ fn flash(elf: &[u8]) -> Result<Vec<u8>> {
     Ok(bin)
 }
 
-/// The images with their list, `firmware.json`, in a folder.
+/// Adds the images and their list, `firmware.json`, to a folder.
 pub fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -> Result<()> {
     for image in images {
         tree.put(format!("{folder}/{}", name(image)), &*image.bin);
@@ -78,12 +78,12 @@ pub fn install(images: &[Image], version: &str, folder: &str, tree: &mut Tree) -
     Ok(())
 }
 
-/// `nucleo-h745zi-q.bin`.
+/// Returns the file name, such as `nucleo-h745zi-q.bin`.
 pub fn name(image: &Image) -> String {
     format!("{}.bin", image.board)
 }
 
-/// Returns the list of images: the file, its board, sum and address.
+/// Returns the list of images: file, board, SHA-256, address and size of each.
 pub fn list(images: &[Image], version: &str) -> Result<String> {
     let images: Vec<_> = images
         .iter()

@@ -1,4 +1,4 @@
-//! The licences of everything that a release contains, with their texts.
+//! Licences, with their texts, of all parts of a release.
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use super::dashboard;
 use super::graph::{Crate, Graph};
 use crate::shell;
 
-/// Beginnings of the names of files in which crates have their licences.
+/// Beginnings of the names of licence files in crates.
 const NAMES: [&str; 5] = ["licen", "copying", "unlicense", "notice", "copyright"];
 
 /// Folders of a crate that are not shipped in a program.
@@ -19,7 +19,7 @@ pub fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
 
-/// THIRD-PARTY.txt: each crate and library with its licence, then each text once. An error for a crate without a licence.
+/// Returns THIRD-PARTY.txt: each crate and library with its licence, then each text once. Returns an error for a crate without a licence.
 pub fn third_party(graph: &Graph) -> Result<String> {
     let mut list =
         String::from("openjtc contains what others wrote. Their licences, and below them the texts.\n\n");
@@ -28,7 +28,7 @@ pub fn third_party(graph: &Graph) -> Result<String> {
         let label = format!("{} {}", found.name, found.version);
         let licence = found.licence.as_deref();
         let licence = licence.with_context(|| format!("{label} names no licence; it cannot be shipped"))?;
-        // The address of the source, which some licences require.
+        // Some licences require the address of the source.
         let source = format!("https://crates.io/crates/{}/{}", found.name, found.version);
         writeln!(list, "{label}: {}, {source}", expression(licence))?;
         texts.of(found, &label)?;
@@ -58,7 +58,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     let version = version.split(' ').nth(1).unwrap_or_default().to_owned();
     let label = format!("Rust's standard library {version}");
     writeln!(list, "{label}: MIT OR Apache-2.0")?;
-    // The project's own are the same texts.
+    // The project's licences have the same texts.
     let apache = std::fs::read_to_string(shell::root().join("LICENSE-APACHE"))?;
     texts.add(&label, &apache);
     for (name, licence) in RUNTIME {
@@ -73,7 +73,7 @@ fn runtime(list: &mut String, texts: &mut Texts) -> Result<()> {
     Ok(())
 }
 
-/// Texts in the order in which they were met, with those to whom each belongs.
+/// Licence texts in the order of their first use, each with the labels of the parts that have it.
 #[derive(Default)]
 struct Texts(Vec<(String, Vec<String>)>);
 
@@ -89,7 +89,7 @@ impl Texts {
         }
     }
 
-    /// Those in the source of a crate, or else the standard one.
+    /// Adds the texts in the source of a crate; if it has none, adds the standard text.
     fn of(&mut self, found: &Crate, label: &str) -> Result<()> {
         let files = files(&found.folder)?;
         for file in &files {
@@ -119,7 +119,7 @@ impl Texts {
     }
 }
 
-/// Files with licences in the source of a crate, those of C code and other parts below it among them; tests and examples are not shipped.
+/// Returns the licence files in the source of a crate, including those of C code and other parts in it. Tests and examples are not shipped.
 fn files(source: &Path) -> Result<Vec<PathBuf>> {
     let (mut found, mut waiting) = (Vec::new(), vec![source.to_owned()]);
     while let Some(folder) = waiting.pop() {
@@ -139,7 +139,7 @@ fn files(source: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// Programs about licences begin with the same words.
+/// Returns true for source code, because programs about licences have names that begin in the same way.
 fn is_code(path: &Path) -> bool {
     path.extension()
         .is_some_and(|ending| ["rs", "py", "c", "h", "sh", "toml"].iter().any(|code| ending == *code))

@@ -13,7 +13,7 @@ use crate::shell::root;
 /// The revision of the Debian packages of one version.
 const REVISION: u32 = 1;
 
-/// Rules of udev, the same in both packages under names of their own.
+/// Rules of udev; both packages install them, under different names.
 const RULES: &str = include_str!("../../packaging/serial.rules");
 
 /// Findings of lintian that are intended, with the reasons.
@@ -28,27 +28,27 @@ NAME: maintainer-script-calls-systemctl
 
 /// Data shared by all packages of a release.
 pub struct Release {
-    /// The version, such as `0.2.0`.
+    /// Version, such as `0.2.0`.
     pub version: String,
-    /// Its time: Unix time, s.
+    /// Unix time of the release, s.
     pub time: u64,
-    /// THIRD-PARTY.txt.
+    /// Text of THIRD-PARTY.txt.
     pub third_party: String,
-    /// The boards' programs.
+    /// Programs of the boards.
     pub images: Vec<Image>,
 }
 
-/// A release file.
+/// File of a release.
 pub struct Made {
     /// Name.
     pub name: String,
-    /// Its bytes.
+    /// Contents.
     pub bytes: Vec<u8>,
 }
 
 impl Release {
-    /// The Debian package and the archive of each command; `programs` is their folder, `runnable` the folder of those that run on this
-    /// computer.
+    /// Returns the Debian package and the archive of each command. `programs` is the folder of the programs, `runnable` the folder of
+    /// programs that run on this computer.
     pub fn packages(&self, platform: Platform, programs: &Path, runnable: &Path) -> Result<Vec<Made>> {
         let mut made = Vec::new();
         for (name, _) in PROGRAMS {
@@ -116,7 +116,7 @@ impl Release {
         tree.put("THIRD-PARTY.txt", &*self.third_party);
         tree.put("udev/70-openjtc.rules", RULES);
         if name == "jtc" {
-            // The program looks for them here, next to its own folder.
+            // The program searches for the images there, next to its own folder.
             images::install(&self.images, &self.version, "share/openjtc/firmware", &mut tree)?;
         }
         let folder = format!("{name}-{}-{}-linux", self.version, platform.machine);
@@ -125,7 +125,7 @@ impl Release {
     }
 }
 
-/// The project has no address for mail: its repository takes reports.
+/// The project has no mail address: problems are reported in its repository.
 const MAINTAINER: &str = "The openjtc contributors <openjtc@noreply.invalid>";
 
 const JTC: &str = "\
@@ -151,7 +151,7 @@ fn fields(description: &str) -> String {
     )
 }
 
-/// The project's licences, as Debian writes them down.
+/// Returns the project's licences in Debian's format.
 fn copyright() -> Result<String> {
     let mit = std::fs::read_to_string(root().join("LICENSE-MIT")).context("LICENSE-MIT")?;
     let (line, terms) =
@@ -172,7 +172,7 @@ fn copyright() -> Result<String> {
     ))
 }
 
-/// Unix time as mail writes it.
+/// Returns a Unix time in the format of mails.
 fn rfc2822(time: u64) -> Result<String> {
     let mut date = crate::shell::command("date");
     let text = crate::shell::read(date.env("LC_ALL", "C").args(["-u", "-R", "-d", &format!("@{time}")]))

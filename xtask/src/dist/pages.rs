@@ -1,4 +1,4 @@
-//! Manual pages and completions, as the programs print them.
+//! Manual pages and completions, as printed by the programs.
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
@@ -6,7 +6,7 @@ use anyhow::{Context, Result, ensure};
 use super::tree::Tree;
 use crate::shell::{self, Scratch};
 
-/// Pages that `program`, which must run on this computer, prints.
+/// Pages printed by `program`, which must run on this computer.
 pub struct Pages {
     /// Manual pages by their file names, such as `jtc-serve.1`.
     pub manual: Vec<(String, Vec<u8>)>,
@@ -16,10 +16,10 @@ pub struct Pages {
 }
 
 impl Pages {
-    /// Asks the program of this name in `folder`.
+    /// Returns the pages of the program with this name in `folder`.
     pub fn of(folder: &Path, name: &str) -> Result<Self> {
         let program = folder.join(name);
-        // Options that this user has set by the environment do not belong into the packages.
+        // Options that this user has set through environment variables do not belong in the packages.
         let ask = || {
             let mut ask = shell::command(&program);
             ask.env_clear();

@@ -1,4 +1,4 @@
-//! The programs of a release: static, stripped, and the same bytes wherever the checkout and cargo's folders are.
+//! Programs of a release: static, stripped, and with the same bytes for every location of the checkout and of cargo's folders.
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use crate::shell::{self, run};
 use crate::{paths, python};
 
-/// The programs, with the package of each.
+/// Names of the programs, with their packages.
 pub const PROGRAMS: [(&str, &str); 2] = [("jtc", "jtc-cli"), ("ucom", "ucom-cli")];
 
 /// Platform of a program.
@@ -23,7 +23,7 @@ pub struct Platform {
     pub library: &'static str,
 }
 
-/// All that a release has programs for.
+/// Platforms for which a release has programs.
 pub const PLATFORMS: [Platform; 2] = [
     Platform {
         machine: "x86_64",
@@ -39,7 +39,7 @@ pub const PLATFORMS: [Platform; 2] = [
     },
 ];
 
-/// The one of this computer, if it is any of them.
+/// Returns the platform of this computer. Returns an error if a release has no programs for it.
 pub fn own() -> Result<Platform> {
     let machine = std::env::consts::ARCH;
     let own = PLATFORMS.into_iter().find(|platform| platform.machine == machine);
@@ -55,7 +55,7 @@ pub fn add_target(triple: &str) -> Result<()> {
     run(shell::command("rustup").args(["target", "add", triple]))
 }
 
-/// The seconds since 1970 that stand in every archive: those of the last commit, or of `SOURCE_DATE_EPOCH`.
+/// Returns the Unix time that all archives contain, s: that of the last commit, or `SOURCE_DATE_EPOCH`.
 pub fn time() -> Result<u64> {
     let time = match std::env::var("SOURCE_DATE_EPOCH") {
         Ok(time) => time,
@@ -66,16 +66,16 @@ pub fn time() -> Result<u64> {
     time.trim().parse().with_context(|| format!("SOURCE_DATE_EPOCH is {time:?}, and no number of seconds"))
 }
 
-/// Folder of the tools that requirements-dist.txt lists.
+/// Returns the folder of the tools that requirements-dist.txt lists.
 pub fn tools() -> Result<PathBuf> {
     let python = python::environment("requirements-dist.txt")?;
     Ok(python.parent().context("an interpreter in no folder")?.to_owned())
 }
 
-/// Adds the switches for `triple` that keep paths of this computer out of the output, to a cargo that `command` begins.
+/// Adds to a cargo command the switches for `triple` that keep paths of this computer out of the output.
 pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     command.arg("--config").arg(paths::remapped(triple)?);
-    // C and its assembler.
+    // For C and its assembler.
     let folders = paths::folders()?;
     let maps: Vec<String> =
         folders.iter().map(|(path, name)| format!("-ffile-prefix-map={}={name}", path.display())).collect();
@@ -83,7 +83,7 @@ pub fn without_paths(command: &mut Command, triple: &str) -> Result<()> {
     Ok(())
 }
 
-/// Sets for the compilers and the linker of `tools`.
+/// Sets the environment in which the compilers and the linker of `tools` are used.
 pub fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> {
     let others = std::env::var_os("PATH").unwrap_or_default();
     let all = [tools.to_owned()].into_iter().chain(std::env::split_paths(&others));
@@ -91,7 +91,7 @@ pub fn with_tools(command: &mut Command, tools: &Path, time: u64) -> Result<()> 
     Ok(())
 }
 
-/// Builds the programs; the folder in which they are.
+/// Builds the programs and returns their folder.
 pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     add_target(platform.triple)?;
     let tools = tools()?;
@@ -115,7 +115,7 @@ pub fn build(platform: Platform, time: u64) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// An error for a program that asks for a loader, and so for libraries of the system.
+/// Returns an error if the program requests a loader, because it then needs libraries of the system.
 fn is_static(name: &str, bytes: &[u8]) -> Result<()> {
     use object::read::elf::{FileHeader as _, ProgramHeader as _};
     let header = object::elf::FileHeader64::<object::Endianness>::parse(bytes)?;

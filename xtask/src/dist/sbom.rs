@@ -72,7 +72,7 @@ fn component(found: &Crate) -> Value {
     component
 }
 
-/// The address of a crate; those of the project are in no registry.
+/// Returns the package URL of a crate. The project's own crates are in no registry.
 fn purl(found: &Crate) -> String {
     reference(if found.source.is_some() { "cargo" } else { "generic" }, &found.name, &found.version)
 }
@@ -81,7 +81,7 @@ fn reference(kind: &str, name: &str, version: &str) -> String {
     format!("pkg:{kind}/{name}@{}", version.replace('+', "%2B"))
 }
 
-/// Unix time as RFC 3339 writes it.
+/// Returns a Unix time in the format of RFC 3339.
 fn stamp(time: u64) -> Result<String> {
     let text =
         shell::read(shell::command("date").args(["-u", "+%Y-%m-%dT%H:%M:%SZ", "-d", &format!("@{time}")]))
@@ -89,7 +89,7 @@ fn stamp(time: u64) -> Result<String> {
     Ok(text.trim().to_owned())
 }
 
-/// Holds a bill against the schema of CycloneDX, with the library of its makers.
+/// Validates a bill against the schema of CycloneDX, with CycloneDX's own library.
 pub fn validate(bill: &str) -> Result<()> {
     let scratch = Scratch::new("sbom")?;
     let file = scratch.path().join("bill.json");

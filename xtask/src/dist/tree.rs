@@ -11,7 +11,7 @@ use sha2::{Digest as _, Sha256};
 #[derive(Clone, Default, Debug, PartialEq)]
 pub struct Tree(BTreeMap<String, File>);
 
-/// Content and kind of a file.
+/// File: content and kind.
 #[derive(Clone, Debug, PartialEq)]
 pub struct File {
     /// Its bytes.
@@ -38,7 +38,7 @@ impl Tree {
         Ok(())
     }
 
-    /// The files in the order of their paths.
+    /// Returns the files in the order of their paths.
     pub fn files(&self) -> impl Iterator<Item = (&str, &File)> {
         self.0.iter().map(|(path, file)| (path.as_str(), file))
     }
@@ -80,13 +80,13 @@ fn header(kind: tar::EntryType, mode: u32, size: u64, time: u64) -> tar::Header 
     header.set_mtime(time);
     header.set_uid(0);
     header.set_gid(0);
-    // The names of number 0 fit into their fields.
+    // The names of user and group 0 fit into their fields.
     let _ = header.set_username("root");
     let _ = header.set_groupname("root");
     header
 }
 
-/// A page or text as small as gzip makes it, as Debian wants it.
+/// Compresses a page or a text as much as gzip can, as Debian requires.
 pub fn gzip(bytes: &[u8]) -> Result<Vec<u8>> {
     compress(bytes, Compression::best())
 }
@@ -98,15 +98,15 @@ fn compress(bytes: &[u8], by: Compression) -> Result<Vec<u8>> {
     Ok(gzip.finish()?)
 }
 
-/// SHA-256 as `sha256sum` writes it.
+/// Returns the SHA-256 in the format of `sha256sum`.
 pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The list that `sha256sum --check` reads.
+/// Name of the list that `sha256sum --check` reads.
 pub const SUMS: &str = "SHA256SUMS";
 
-/// Writes that list, of all files in a folder but itself, which it is written into; its path.
+/// Writes this list into a folder, for all other files of the folder.
 pub fn write_sums(folder: &Path) -> Result<()> {
     let mut lines = BTreeMap::new();
     for entry in std::fs::read_dir(folder)? {
@@ -152,7 +152,7 @@ mod tests {
                 (path, header.mode().unwrap())
             })
             .collect();
-        // The archiver leaves out a `./` before a name; dpkg and tar read them the same.
+        // The archiver leaves out a `./` before a name; dpkg and tar accept both forms.
         let expected = [
             ("./", 0o755),
             ("etc/", 0o755),

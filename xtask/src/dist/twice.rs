@@ -1,4 +1,4 @@
-//! Makes a release again, by a copy of the checkout in another folder, and compares it byte for byte.
+//! Makes a release again from a copy of the checkout in another folder, and compares it byte for byte.
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -7,9 +7,9 @@ use anyhow::{Context, Result, bail};
 
 use crate::shell::{self, run};
 
-/// Makes the release of `first` again elsewhere. An error that lists each file that differs; both are kept then.
+/// Makes the release of `first` again elsewhere. If files differ, returns an error that lists them and keeps both releases.
 pub fn compare(first: &Path, quick: bool) -> Result<()> {
-    // Not with the temporary files, which some systems keep in memory: it takes gigabytes.
+    // Not in the folder for temporary files, which some systems keep in memory: this needs gigabytes.
     let folder = shell::target().join("made-again-in-a-folder-with-a-longer-name");
     if folder.exists() {
         fs::remove_dir_all(&folder).with_context(|| folder.display().to_string())?;
@@ -22,7 +22,7 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     if quick {
         again.arg("--quick");
     }
-    // The toolchain comes from the checkout alone.
+    // Only the checkout selects the toolchain.
     for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("CARGO") && name != "CARGO_HOME") {
         again.env_remove(name);
     }
@@ -62,7 +62,7 @@ pub fn compare(first: &Path, quick: bool) -> Result<()> {
     Ok(())
 }
 
-/// Copies the present checkout, uncommitted changes and history included, without build output and the release.
+/// Copies the present checkout with uncommitted changes and history, without build output and the release.
 fn copy(to: &Path, release: &Path) -> Result<()> {
     run(shell::command("git").args(["clone", "--quiet", "--no-local", "."]).arg(to))?;
     let listed = shell::read(shell::command("git").args([

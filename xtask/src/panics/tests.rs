@@ -1,4 +1,4 @@
-//! Small programs in machine code, made into ELF files.
+//! Small programs in machine code, in ELF files.
 use object::write::{Object, SectionId, Symbol, SymbolSection};
 use object::{Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope};
 
@@ -21,7 +21,7 @@ fn add(file: &mut Object<'_>, section: SectionId, name: &str, kind: SymbolKind, 
     });
 }
 
-/// A program of functions, one after the other, each at the next multiple of 4.
+/// Returns a program of consecutive functions, each at the next multiple of 4.
 fn program(parts: &[(&str, &[u16])]) -> Vec<u8> {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
@@ -38,7 +38,7 @@ fn check(parts: &[(&str, &[u16])]) -> Report {
     reachable_panics(&program(parts), &["tick"]).unwrap()
 }
 
-/// BL from `at` to `to`, for short ways forward.
+/// Returns BL from `at` to `to`, for short distances forward.
 fn call(at: u32, to: u32) -> [u16; 2] {
     [0xF000, 0xF800 | ((to - at - 4) >> 1) as u16]
 }
@@ -46,7 +46,7 @@ fn call(at: u32, to: u32) -> [u16; 2] {
 #[test]
 fn a_panic_behind_two_calls_is_found_with_its_way() {
     let [a, b] = call(0, 4);
-    // `helper` ends in a jump with a condition: BNE.W to 12.
+    // `helper` ends in a conditional jump: BNE.W to 12.
     let report = check(&[("tick", &[a, b]), ("helper", &[0xF040, 0x8002, RETURN, NOP]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x0) > helper (0x4) > core::panicking::panic_fmt"]);
     assert_eq!((report.functions, report.indirect.len()), (2, 0));
@@ -73,7 +73,7 @@ fn what_is_not_called_does_not_count() {
     assert_eq!((report.functions, report.instructions), (2, 5));
 }
 
-/// `tick` from 0 to 8 returns, followed by two halfwords of data or code; the panic is at 8.
+/// Returns the report of a `tick` at 0 to 8 that returns, followed by two halfwords of data or code; the panic is at 8.
 fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
     let mut file = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
     let section = file.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
@@ -93,13 +93,13 @@ fn behind_return(kind: &str, halves: [u16; 2]) -> Report {
 fn data_between_code_is_no_code() {
     assert_eq!(behind_return("$t", call(4, 8)).paths.len(), 1);
     assert!(behind_return("$d", call(4, 8)).paths.is_empty());
-    // But the address of a function in it counts.
+    // The address of a function in the data counts as a call.
     assert_eq!(behind_return("$d", [9, 0]).paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
 
 #[test]
 fn a_function_whose_address_is_formed_counts_as_called() {
-    // MOVW r0, #9; MOVT r0, #0: the panic at 8, in Thumb.
+    // MOVW r0, #9; MOVT r0, #0: the address of the panic at 8, in Thumb.
     let report = check(&[("tick", &[0xF240, 0x0009, 0xF2C0, 0x0000]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.paths, ["tick (0x4) > core::panicking::panic_fmt"]);
 }
@@ -109,7 +109,7 @@ fn calls_through_a_register_are_listed_and_bridges_are_crossed() {
     // BLX r3.
     let report = check(&[("tick", &[0x4798, RETURN]), (PANIC, &[0xE7FE])]);
     assert_eq!(report.indirect, ["tick at 0x0"]);
-    // MOVW r12, #13; MOVT r12, #0; BX r12: the panic at 12.
+    // MOVW r12, #13; MOVT r12, #0; BX r12: a jump to the panic at 12.
     let report = check(&[("tick", &[0xF240, 0x0C0D, 0xF2C0, 0x0C00, 0x4760, NOP]), (PANIC, &[0xE7FE])]);
     assert!(report.indirect.is_empty() && !report.paths.is_empty(), "{report}");
 }

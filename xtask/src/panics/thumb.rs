@@ -17,17 +17,17 @@ pub enum Flow {
     Other,
 }
 
-/// Bytes of the instruction that begins with this halfword.
+/// Returns the number of bytes of the instruction that begins with this halfword.
 pub fn len(first: u16) -> u32 {
     if first >> 11 >= 0b11101 { 4 } else { 2 }
 }
 
-/// The instruction at `address`; `second` counts only for those of four bytes.
+/// Decodes the instruction at `address`; `second` is used only for instructions of four bytes.
 pub fn flow(address: u32, first: u16, second: u16) -> Flow {
     if len(first) == 4 { wide(address, first.into(), second.into()) } else { narrow(address, first.into()) }
 }
 
-/// `value` with `bits` bits is a signed number.
+/// Extends a signed number of `bits` bits to 32 bits.
 fn signed(value: u32, bits: u32) -> u32 {
     ((value << (32 - bits)) as i32 >> (32 - bits)) as u32
 }
@@ -36,10 +36,10 @@ fn narrow(address: u32, code: u32) -> Flow {
     let to = |offset: u32| Flow::Direct(address.wrapping_add(4).wrapping_add(offset));
     let register = (code >> 3 & 0xF) as u8;
     match code {
-        // BX; to the link register it is a return. BLX.
+        // BX, which is a return if it uses the link register; BLX.
         0x4700..=0x47FF if register == 14 && code & 0x80 == 0 => Flow::Other,
         0x4700..=0x47FF => Flow::Indirect(register),
-        // MOV to the program counter; from the link register it is a return.
+        // MOV to the program counter, which is a return if it uses the link register.
         0x4687..=0x46FF if code & 0x87 == 0x87 && register != 14 => Flow::Indirect(register),
         // ADD to the program counter.
         0x4487..=0x44FF if code & 0x87 == 0x87 => Flow::Indirect(15),
@@ -63,7 +63,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             let offset = sign << 24 | i1 << 23 | i2 << 22 | (first & 0x3FF) << 12 | (second & 0x7FF) << 1;
             to(signed(offset, 25))
         }
-        // UDF; B with a condition (14 and 15 are not conditions: barriers and the like).
+        // UDF; B with a condition. 14 and 15 are not conditions, but barriers and similar instructions.
         (0xF000, 0x8000) if first & 0xFFF0 == 0xF7F0 && second & 0xF000 == 0xA000 => Flow::Trap,
         (0xF000, 0x8000) if first >> 7 & 7 != 7 => {
             let offset = sign << 20 | j2 << 19 | j1 << 18 | (first & 0x3F) << 12 | (second & 0x7FF) << 1;
@@ -74,7 +74,7 @@ fn wide(address: u32, first: u32, second: u32) -> Flow {
             0xF2C0 => Flow::High(register, immediate as u16),
             _ => Flow::Other,
         },
-        // LDR to the program counter from anywhere but the stack, which is used for returns.
+        // LDR to the program counter from any memory but the stack, which is used for returns.
         _ if first & 0xFF70 == 0xF850 && second >> 12 == 15 && first & 0xF != 13 => Flow::Indirect(15),
         _ => Flow::Other,
     }
@@ -86,7 +86,7 @@ mod tests {
 
     const AT: u32 = 0x0800_1000;
 
-    /// Code (the two halfwords of a long instruction in reading order) and what LLVM's assembler and disassembler say it is,
+    /// Code (the two halfwords of a long instruction in reading order), and its meaning according to LLVM's assembler and disassembler:
     /// offsets from the instruction's address + 4.
     const BRANCHES: [(u32, i32); 11] = [
         (0xF001_F918, 4_656),      // bl

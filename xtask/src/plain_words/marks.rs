@@ -1,9 +1,9 @@
-//! The marks: words and turns that hide who does what, or that mean something else in most other texts.
+//! Marks: words and constructions that hide the actor, or that have another meaning in most texts.
 use std::sync::LazyLock;
 
 use regex::Regex;
 
-/// Names of the marks, and the pattern of each.
+/// Names of the marks, with the pattern of each.
 pub const MARKS: [(&str, &str); 10] = [
     ("begins with What, Who, Whose, Whether", r"(?:^|[.!;:] )(?:What|Who|Whose|Whether)\b"),
     (
@@ -24,7 +24,7 @@ static PATTERNS: LazyLock<Vec<(&str, Regex)>> = LazyLock::new(|| {
     MARKS.iter().filter_map(|(mark, pattern)| Some((*mark, Regex::new(pattern).ok()?))).collect()
 });
 
-/// The marks in a text, and the byte at which each begins.
+/// Returns the marks in a text, with the byte at which each begins.
 pub fn find(words: &str) -> Vec<(&'static str, usize)> {
     let mut found = Vec::new();
     for (mark, pattern) in PATTERNS.iter() {
@@ -33,7 +33,7 @@ pub fn find(words: &str) -> Vec<(&'static str, usize)> {
     found
 }
 
-/// The sentence around a byte.
+/// Returns the sentence around a byte.
 pub fn sentence(words: &str, at: usize) -> &str {
     let start = words[..at].rfind(". ").map_or(0, |end| end + 2);
     let end = words[at..].find(". ").map_or(words.len(), |end| at + end + 1);

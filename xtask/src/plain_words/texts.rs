@@ -1,18 +1,18 @@
-//! The prose of a file: comments and strings of a program, paragraphs of a page.
+//! Prose of a file: comments and strings of a program, paragraphs of a page.
 use ra_ap_rustc_lexer::{FrontmatterAllowed, LiteralKind, TokenKind, tokenize};
 
-/// A comment, a string or a paragraph, in one line.
+/// Comment, string or paragraph, in one line.
 #[derive(Debug, Default, PartialEq)]
 pub struct Text {
     pub words: String,
-    /// Beginning of each line of the file in `words`, and its number.
+    /// Beginning of each line of the file in `words`, with the number of the line.
     lines: Vec<(usize, usize)>,
 }
 
 impl Text {
-    /// The line of the file that has this byte of `words`.
+    /// Returns the number of the line that contains this byte of `words`.
     pub fn line_at(&self, offset: usize) -> usize {
-        // A mark may begin with the end of the sentence before.
+        // A mark may begin at the end of the previous sentence.
         let before = |(start, _): &&(usize, usize)| *start <= offset + 2;
         self.lines.iter().rev().find(before).map_or(1, |(_, number)| *number)
     }
@@ -26,7 +26,7 @@ impl Text {
     }
 }
 
-/// The prose of a file with this extension.
+/// Returns the prose of a file with this extension.
 pub fn of(source: &str, extension: &str) -> Vec<Text> {
     let prose: fn(&str) -> Option<&str> = match extension {
         "rs" => return rust(source),
@@ -37,7 +37,7 @@ pub fn of(source: &str, extension: &str) -> Vec<Text> {
     paragraphs((1..).zip(source.lines().map(prose)))
 }
 
-/// Lines that follow each other are one text, outside fenced code. A list item begins a new one.
+/// Joins consecutive lines outside fenced code into one text. A list item begins a new text.
 fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<Text> {
     let (mut texts, mut open, mut fenced) = (Vec::new(), Text::default(), false);
     for (number, line) in lines {
@@ -57,7 +57,7 @@ fn paragraphs<'a>(lines: impl Iterator<Item = (usize, Option<&'a str>)>) -> Vec<
     texts
 }
 
-/// A comment after `mark`, and what may be a line of a longer comment or of a docstring.
+/// Returns the comment after `mark`, or a line that may belong to a longer comment or a docstring.
 fn comment_or_prose<'a>(line: &'a str, mark: &str) -> Option<&'a str> {
     let line = line.trim();
     match line.split_once(mark) {

@@ -8,15 +8,15 @@ use serde_json::{Value, json};
 
 use crate::shell::{command, root};
 
-/// Changes of a file since it was tested, as `git diff -U0` has them.
+/// Changes of a file since it was tested, from `git diff -U0`.
 pub(super) struct Changes {
     pub(super) diff: String,
-    /// First old line, old lines and new lines of each piece.
+    /// Pieces: first old line, number of old lines, number of new lines.
     pieces: Vec<(u64, u64, u64)>,
 }
 
 impl Changes {
-    /// `old` and the file as it is now.
+    /// Compares `old` with the present file.
     fn of(old: &Path, file: &str) -> Result<Self> {
         let mut git = command("git");
         git.args(["diff", "--no-index", "-U0"]).arg(old).arg(file);
@@ -29,7 +29,7 @@ impl Changes {
     fn now(&self, line: u64) -> Option<u64> {
         let mut shifted = line;
         for &(first, old, new) in &self.pieces {
-            // A piece without old lines comes after the line that it names.
+            // A piece without old lines comes after the named line.
             let first = if old == 0 { first + 1 } else { first };
             if line < first {
                 break;
@@ -43,7 +43,7 @@ impl Changes {
     }
 }
 
-/// First old line, old lines and new lines of `@@ -12,2 +13 @@`.
+/// Returns first old line, number of old lines and number of new lines of a header such as `@@ -12,2 +13 @@`.
 fn piece(line: &str) -> Option<(u64, u64, u64)> {
     let (old, new) = line.strip_prefix("@@ -")?.split_once(" +")?;
     let new = new.split(' ').next()?;

@@ -1,4 +1,4 @@
-//! docs/evidence.md: generated tables between marks, and manual explanations of mutants that no test can see.
+//! docs/evidence.md: generated tables between marks, and written explanations of mutants that no test can detect.
 use std::collections::BTreeSet;
 use std::fs::{read_to_string, write};
 
@@ -8,7 +8,7 @@ use crate::shell::root;
 
 const PAGE: &str = "docs/evidence.md";
 
-/// The page.
+/// Returns the page.
 pub fn read() -> Result<String> {
     read_to_string(root().join(PAGE)).with_context(|| format!("cannot read {PAGE}"))
 }
@@ -39,16 +39,15 @@ fn parts<'a>(page: &'a str, name: &str) -> Result<(&'a str, (&'a str, &'a str))>
 /// Mutant, named independently of its line number: file, its line of source without indentation, change.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Named {
-    /// From the root of the workspace.
+    /// Path from the root of the workspace.
     pub file: String,
-    /// The line in which it begins.
+    /// Line in which the mutant begins.
     pub line: String,
     /// Change as described by cargo-gamma.
     pub change: String,
 }
 
-/// Mutants that the page shows to be equivalent: below a heading `### FILE` the items
-/// ``- `LINE` → `CHANGE`: sentence``.
+/// Returns the mutants that the page explains as equivalent: below a heading `### FILE` the items ``- `LINE` → `CHANGE`: sentence``.
 pub fn explained(page: &str) -> BTreeSet<Named> {
     let mut file = "";
     let mut explained = BTreeSet::new();

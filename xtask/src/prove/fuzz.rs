@@ -1,4 +1,4 @@
-//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain, both installed when missing.
+//! `cargo xtask prove fuzz`: runs the fuzz targets with cargo-fuzz on the nightly toolchain. Installs both if they are missing.
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs::create_dir_all;
@@ -21,7 +21,7 @@ const TABLE: &str = "fuzz";
 /// Longer inputs only repeat the contents of shorter ones, and are slow; kept inputs must be readable and small enough for git.
 const LENGTH: &str = "-max_len=4096";
 
-/// A command of the nightly toolchain; the pinned toolchain's variables are taken away.
+/// Returns a command of the nightly toolchain, without the variables of the pinned toolchain.
 fn nightly(arguments: &[&str]) -> Command {
     let mut rustup = command("rustup");
     rustup.args(["run", "nightly"]).args(arguments).env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
@@ -59,7 +59,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
             done += portion;
         }
         if keep {
-            // The merge counts the code that is reached, not how often, and keeps few inputs.
+            // The merge ignores how often code is reached, and keeps few inputs.
             let merge = ["-set_cover_merge=1", "-use_counters=0", LENGTH];
             run(&mut fuzz(&target, &COMPARISONS, &[directories[1], directories[0]], &merge))?;
         }
@@ -67,7 +67,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The nightly toolchain and cargo-fuzz, when missing.
+/// Installs the nightly toolchain and cargo-fuzz if they are missing.
 fn install() -> Result<()> {
     if !works(&mut nightly(&["rustc", "--version"])) {
         run(command("rustup").args(["toolchain", "install", "nightly", "--profile", "minimal"]))?;
@@ -80,7 +80,7 @@ fn install() -> Result<()> {
 
 /// Returns the folders of inputs: found ones, kept ones, and regressions if there are any.
 fn directories(target: &str) -> Result<Vec<String>> {
-    // The found inputs grow from run to run in the build folder, outside git; git has the kept inputs.
+    // The found inputs accumulate in the build folder, outside git. Git has the kept inputs.
     let mut directories = vec![format!("fuzz/target/corpus/{target}"), format!("fuzz/corpus/{target}")];
     for directory in &directories {
         let path = root().join(directory);
@@ -105,7 +105,7 @@ fn count(target: &str, portion: u64) -> Result<()> {
     evidence::replace(TABLE, &with(&table, target, &commit()?, portion))
 }
 
-/// Rows of the table: target, commit, executions.
+/// Returns the rows of the table: target and commit, with the number of executions.
 fn rows(table: &str) -> BTreeMap<(String, String), u64> {
     let row = |line: &str| {
         let mut cells = line.split('|').map(|cell| cell.trim().trim_matches('`').to_owned()).skip(1);
@@ -115,12 +115,12 @@ fn rows(table: &str) -> BTreeMap<(String, String), u64> {
     table.lines().filter_map(row).collect()
 }
 
-/// Executions of `target` on all commits.
+/// Returns the number of executions of `target` on all commits.
 fn executions(table: &str, target: &str) -> u64 {
     rows(table).iter().filter(|((name, _), _)| name == target).map(|(_, executions)| executions).sum()
 }
 
-/// The table with `portion` more executions of `target` on `commit`.
+/// Returns the table with `portion` more executions of `target` on `commit`.
 fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
     let mut rows = rows(table);
     *rows.entry((target.into(), commit.into())).or_default() += portion;
@@ -131,20 +131,20 @@ fn with(table: &str, target: &str, commit: &str, portion: u64) -> String {
     table
 }
 
-/// Build led by coverage and by comparisons.
+/// Arguments of the build that is guided by coverage and by comparisons.
 const COMPARISONS: [&str; 0] = [];
-/// Build led by coverage alone, in a separate folder so that neither build is repeated.
+/// Arguments of the build that is guided only by coverage, in a separate folder so that neither build is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// Returns the fuzzer on `directories`; new inputs go into the first. Without address sanitizer: there is no unsafe code,
-/// and the fuzzer is several times as fast.
+/// Returns the fuzzer on `directories`; new inputs are written to the first one. It runs without address sanitizer, because the code has no
+/// `unsafe`, and is then several times as fast.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);
     fuzz
 }
 
-/// Names of the fuzz targets.
+/// Returns the names of the fuzz targets.
 fn targets() -> Vec<String> {
     shell::files(&root().join("fuzz/fuzz_targets"), &["rs"])
         .iter()
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!((executions(&table, "stream_parser"), executions(&table, "bus_frame")), (521, 0));
     }
 
-    /// Every target runs over its kept inputs in every test run, too, and all kept inputs belong to a target.
+    /// Every test run executes each target with its kept inputs, and all kept inputs belong to a target.
     #[test]
     fn every_target_is_built_and_tested() {
         let manifest = read_to_string(root().join("fuzz/Cargo.toml")).unwrap();

@@ -13,23 +13,23 @@ use super::changes::{changes, complete};
 use super::evidence::{self, Named};
 use crate::shell::{self, cargo, command, run, target, works};
 
-/// Reports of another version may differ.
+/// Version of cargo-gamma; reports of other versions may differ.
 const VERSION: &str = "0.4.0";
 const REPORT: &str = "gamma-report.json";
 /// File with the commit of the report.
 const COMMIT: &str = "commit";
 /// Crates that run on a board, those with the quickest tests first.
 const PACKAGES: [&str; 5] = ["jtc-bus", "jtc-dynamics", "jtc-wire", "ucom", "jtc-core"];
-/// Crates whose tests judge the mutants of `ucom`: its board is tried from the PC's side as well.
+/// Crates whose tests judge the mutants of `ucom`: its board is also tested from the PC's side.
 const JUDGES_OF_UCOM: [&str; 3] = ["ucom", "ucom-sim", "ucom-host"];
-/// At most this share of a crate's mutants may be left alive, with a sentence or without.
+/// Largest share of a crate's mutants that may survive, explained or not.
 const SURVIVING_MAX: f64 = 0.03;
 
 /// Results of the mutants of a crate.
 #[derive(Default)]
 struct Tally {
     killed: usize,
-    /// A test that never ends is a failing test.
+    /// Number of mutants with which a test never ended, which counts as a failure of the test.
     endless: usize,
     equivalent: usize,
     unexplained: Vec<String>,
@@ -52,13 +52,13 @@ impl Tally {
 /// Selection of mutants of a crate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Which {
-    /// All of them.
+    /// All mutants.
     All,
-    /// Those that survived the last run.
+    /// Mutants that survived the last run.
     Survivors,
-    /// Those on lines that have changed since the last run.
+    /// Mutants on lines that have changed since the last run.
     Changed,
-    /// Those that an interrupted run has left.
+    /// Mutants that an interrupted run has not reached.
     Left,
 }
 
@@ -115,13 +115,13 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(if met { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// cargo-gamma, when missing.
+/// Installs cargo-gamma if it is missing.
 fn install() -> Result<()> {
     if !works(command(program()).args(["gamma", "--version"])) {
         let mut install = cargo(&["install", "cargo-gamma", "--locked", "--version", VERSION, "--root"]);
         run(install.arg(target().join("tools")))?;
     }
-    // cargo-gamma asks cargo offline for the dependencies of every platform.
+    // cargo-gamma calls cargo offline, and needs the dependencies of every platform.
     run(&mut cargo(&["fetch", "--locked"]))
 }
 
@@ -138,14 +138,14 @@ fn results(package: &str) -> PathBuf {
 fn campaign(package: &str, which: Which) -> Result<()> {
     let results = results(package);
     create_dir_all(&results).with_context(|| format!("cannot create {}", results.display()))?;
-    // Its report covers only the mutants of this run: the whole report is kept, and updated.
+    // The report covers only the mutants of this run, so the complete report is kept and updated.
     let whole = results.join(REPORT);
     let in_part = matches!(which, Which::Survivors | Which::Changed);
     let before = if in_part { Some(read_report(&whole)?) } else { None };
     let commit = commit()?;
     let mut gamma: Command = command(program());
     gamma.args(["gamma", "run", "--color", "never", "--progress", "never"]);
-    // This profile keeps all assertions and optimises the crates that compute: simulated arms take most of the time.
+    // This profile keeps all assertions and optimises the crates that compute, because simulated arms need most of the time.
     gamma.args(["--profile", "release"]);
     gamma.arg("--artifact-dir").arg(&results);
     if which == Which::Left {
@@ -169,7 +169,7 @@ fn campaign(package: &str, which: Which) -> Result<()> {
     }
     println!("== {package}");
     let status = gamma.status().context("cannot start cargo-gamma")?;
-    // 2: too many survived.
+    // Exit code 2: too many mutants survived.
     ensure!(
         matches!(status.code(), Some(0 | 2)),
         "cargo-gamma ended with {status}; go on with `cargo xtask prove mutants --package {package} --resume`"
@@ -249,7 +249,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
                         tally.unexplained.push(format!("{file}:{at}\n- `{line}` → `{change}`:"));
                     }
                 }
-                // Does not compile, or was not in this run.
+                // The mutant does not compile, or was not in this run.
                 _ => {}
             }
         }
@@ -257,7 +257,7 @@ fn tally(report: &Value, page: &str) -> Result<Tally> {
     Ok(tally)
 }
 
-/// A row for each crate; of one without results here the row that the page has.
+/// Returns the table with a row for each crate. A crate without results on this computer keeps its row of the page.
 fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     let mut table = String::from(
         "| crate | mutants | killed | never ended | equivalent | unexplained | alive | commit |\n\
@@ -283,7 +283,7 @@ fn table(tallies: &BTreeMap<&str, (Tally, String)>, before: &str) -> String {
     table
 }
 
-/// The commit that is tested.
+/// Returns the tested commit.
 pub(super) fn commit() -> Result<String> {
     Ok(shell::read(command("git").args(["rev-parse", "--short=9", "HEAD"]))?.trim().to_owned())
 }

@@ -1,4 +1,4 @@
-//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls, integrated by Runge-Kutta at 1 ms, or in parts of it.
+//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls. It is integrated with Runge-Kutta in steps of 1 ms or less.
 //!
 //! The true arm deliberately differs from the controller's model of it: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
@@ -22,20 +22,20 @@ const STOP_DAMPING: f64 = 200.0;
 const BRAKE_DECELERATION: f64 = 40.0;
 /// Inertia that represents a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
-/// Least inertia of a rotor, kg·m²: a lighter one would be through its range within a few steps.
+/// Least inertia of a rotor, kg·m²: a lighter one would cross its whole range within a few steps.
 const LIGHTEST: f64 = 0.02;
-/// Largest turn of a joint in a sub-step, rad: a joint of 100 rad/s and more takes several in a millisecond.
+/// Largest turn of a joint in a sub-step, rad: a joint of 100 rad/s or more takes several sub-steps in a millisecond.
 const LARGEST_TURN: f64 = 0.1;
-/// Most sub-steps of a step for speed alone.
+/// Largest number of sub-steps of a step because of speed alone.
 const MOST_SUBSTEPS: f64 = 32.0;
-/// Largest angle of a vibration on a wall or on gears in a sub-step, rad, and largest part of its decay.
+/// Largest phase angle of a vibration on a wall or on gears in a sub-step, rad; the next constant is the largest part of its decay.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
-/// Most sub-steps of a step for walls and gears; damping of walls that would need more is reduced to the limit of these.
+/// Largest number of sub-steps of a step because of walls and gears. If walls would need more, their damping is reduced.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
-/// Decay in a sub-step from which damping is reduced; Runge-Kutta is unstable from 2.7 on.
+/// Decay in a sub-step above which damping is reduced; Runge-Kutta is unstable from 2.7 on.
 const UNSTABLE_DECAY: f64 = 2.0;
-/// Seconds between two updates of the temperatures.
+/// Time between two updates of the temperatures, s.
 const WARMING: f64 = 0.05;
 /// Heat capacity of a joint's bearing, J/K.
 const HEAT_CAPACITY: f64 = 900.0;
@@ -47,7 +47,7 @@ const HEAT_FLOW: f64 = 1.2;
 pub struct SimArm {
     /// Kinematics and masses.
     pub model: ArmModel,
-    /// Load at its flange.
+    /// Load at the flange.
     pub payload: Payload,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
@@ -55,22 +55,22 @@ pub struct SimArm {
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
-    /// Speed up to which friction polynomials hold, rad/s; beyond it they go on in a straight line that does not fall.
+    /// Speed up to which friction polynomials are valid, rad/s. Beyond it they continue in a straight line that does not fall.
     pub polynomial_speed: JointVec,
     /// Friction around standstill.
     pub friction_model: FrictionModel,
     /// End stops per joint, rad.
     pub stops: [(f64, f64); JOINTS],
-    /// Elasticity of the gears; rigid unless set. A gear that yields takes 0.01 kg·m² of the rotor's inertia to its link.
+    /// Elasticity of the gears; rigid by default. An elastic gear moves 0.01 kg·m² of the rotor's inertia to its link.
     pub gears: [Gear; JOINTS],
-    /// Torque that a drive really reaches, N·m: more is clamped silently.
+    /// Largest torque of the drive, N·m; it clamps larger ones without a report.
     pub torque_ceiling: JointVec,
     /// Temperature of the air and of the bearings at the start, °C.
     pub ambient: f64,
 }
 
 impl SimArm {
-    /// The arm that these settings and parameters describe, with end stops 0.04 rad outside the limits.
+    /// Creates the arm that these settings and parameters describe, with end stops 0.04 rad outside the limits.
     pub fn new(config: &Config, parameters: &Parameters) -> Self {
         let friction = match &parameters.friction {
             Friction::Polynomial(c) => core::array::from_fn(|j| SimFriction::Polynomial(c[j])),
@@ -101,11 +101,11 @@ impl Default for SimArm {
     }
 }
 
-/// The arm in motion.
+/// Arm in motion.
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without carried payloads, and these payloads.
+    /// Inertias without carried payloads; the next field has these payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -115,7 +115,7 @@ pub struct Arm {
     friction: FrictionTorques,
     /// Deflection of the bristles between the surfaces, rad.
     bristles: JointVec,
-    /// Heat of friction since the temperatures were brought up to date, J, and how long ago that was, s.
+    /// Friction heat since the last update of the temperatures, J; the next field is the time since then, s.
     heat: JointVec,
     since: f64,
     /// Position, rad.
@@ -135,11 +135,11 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// An arm at rest at `q`; its friction is that of `parts` times `friction_scale`.
+    /// Creates an arm at rest at `q`. Its friction is that of `parts` times `friction_scale`.
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let elastic = parts.gears.iter().any(Gear::is_elastic);
-        // Loaded springs: the links rest.
+        // The springs carry their loads, so that the links rest.
         let load = dynamics.gravity_torque(&q);
         let motor = core::array::from_fn(|j| {
             let gear = &parts.gears[j];
@@ -179,12 +179,12 @@ impl Arm {
         &self.parts
     }
 
-    /// Move on by `dt` seconds under the drives' torques `tau` (N·m).
+    /// Simulates `dt` seconds with the drives' torques `tau` (N·m).
     pub fn step(&mut self, tau: &JointVec, dt: f64) {
         self.step_pushed(tau, &[0.0; JOINTS], dt);
     }
 
-    /// Like [`step`](Self::step), with torques `outside` (N·m) on the links.
+    /// Like [`step`](Self::step), with additional torques `outside` (N·m) on the links.
     pub fn step_pushed(&mut self, tau: &JointVec, outside: &JointVec, dt: f64) {
         let fastest = self.qd.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
         let mut substeps = (fastest * dt / LARGEST_TURN).ceil().clamp(1.0, MOST_SUBSTEPS);
@@ -205,13 +205,14 @@ impl Arm {
         }
     }
 
-    /// Sub-steps that gears and walls within reach need in `dt` seconds, and the share of the walls' damping that these bear.
+    /// Returns the number of sub-steps that gears and walls within reach need in `dt` seconds, and the share of the walls' damping for
+    /// which they suffice.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if gear.is_elastic() {
-                // The lightest that either side can be.
+                // Both sides have their least possible inertia here.
                 let mobility = 1.0 / OUTPUT + 1.0 / (link[j] - OUTPUT);
                 square = f64::max(square, gear.stiffness * mobility);
                 decay = f64::max(decay, gear.damping * mobility);
@@ -272,7 +273,7 @@ impl Arm {
         let of = |payload: &Payload| {
             Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
         };
-        // The inertias are linear in the bodies.
+        // The inertias depend linearly on the bodies.
         let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
         for payload in payloads {
             let with = of(payload);
@@ -286,8 +287,8 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m²: more than their own if steep friction or an end stop would have
-    /// a time constant below `dt` with a light rotor. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m². It is more than their own if a light rotor on steep friction or at an
+    /// end stop would have a time constant below `dt`. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -296,7 +297,7 @@ impl Arm {
         })
     }
 
-    /// Steepness of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
+    /// Returns the steepness of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
     fn stopping(&self, j: usize, dt: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         let reach = 2.0 * self.qd[j].abs() * dt;
@@ -304,7 +305,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction: they change so slowly that an update in every millisecond is not necessary.
+    /// Updates temperatures and friction. They change slowly, so an update in every millisecond is not necessary.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
@@ -315,8 +316,8 @@ impl Arm {
         self.refresh_friction();
     }
 
-    /// Integrates by classical Runge-Kutta of fourth order; the bristles of friction, which are too stiff for it, take its stages'
-    /// velocities by [`FrictionTorques::bend`].
+    /// Integrates with the classical Runge-Kutta method of fourth order. The bristles of friction are too stiff for it:
+    /// [`FrictionTorques::bend`] moves them with the velocities of the stages.
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;
@@ -366,7 +367,7 @@ impl Arm {
         self.dynamics.forward(q, qd, &sum, rotor)
     }
 
-    /// Torque of the end stops: they push, they never pull.
+    /// Returns the torque of the end stops, which never pull.
     fn stop_torque(&self, j: usize, q: f64, qd: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         if q < low {
@@ -378,20 +379,21 @@ impl Arm {
         }
     }
 
-    /// Bring the friction curves to the present temperature.
+    /// Updates the friction curves for the present temperature.
     fn refresh_friction(&mut self) {
         let scale = core::array::from_fn(|j| self.friction_scale[j] * self.friction_fault[j]);
         self.friction.warm(&self.temperature, &scale);
     }
 
-    /// Make a change of `friction_fault` act at once.
+    /// Applies a change of `friction_fault` immediately.
     pub fn friction_changed(&mut self) {
         self.friction.forget_tables();
         self.refresh_friction();
     }
 }
 
-/// Speed of a joint after `dt` seconds of its closed brake, rad/s; a torque of something else (N·m) helps when it is against the motion.
+/// Returns the speed of a joint after its brake was closed for `dt` seconds, rad/s. An external torque (N·m) against the motion adds to the
+/// braking.
 fn braked(speed: f64, torque: f64, inertia: f64, dt: f64) -> f64 {
     let help = if torque * speed < 0.0 { torque.abs() / inertia } else { 0.0 };
     let change = (BRAKE_DECELERATION + help) * dt;

@@ -1,5 +1,4 @@
-//! The controller's board: the controller itself, the host link's receive buffers and the watchdog, glued as
-//! the firmware does it.
+//! The controller's board: the controller, the receive buffers of the host link and the watchdog, connected as in the firmware.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
@@ -12,27 +11,27 @@ use jtc_wire::{
     Receiver, SIMULATOR, STATUS_LEN, StoreState, UrgentWatch,
 };
 
-/// The host's line: the world has one.
+/// Number of the host's line; the simulation has only one line.
 const LINE: usize = 0;
-/// Bytes that wait in front of the parser at most, as in the ring that the board's DMA fills.
+/// Largest number of bytes that wait for the parser, as in the ring that the board's DMA fills.
 const RING: usize = 32 * 1024;
 /// Length of a tick, µs.
 const TICK_US: u32 = 1000;
-/// Bytes given to the parser at once.
+/// Largest number of bytes that the parser receives at once.
 const CHUNK: usize = 4096;
 
-/// Ticks that storing an arm takes: erasing a sector of flash does.
+/// Ticks for storing an arm, equal to the time for erasing a sector of flash.
 const STORE_MS: u32 = 2_000;
 
-/// Polls of the parser between two ticks, as by a processor with time to spare.
+/// Polls of the parser between two ticks, as by a processor with spare time.
 const POLLS: usize = 64;
 
-/// A host frame that the controller executed.
+/// Host frame that the controller executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
-    /// A valid frame, by its type byte.
+    /// Valid frame, with its type byte.
     Frame(u8),
-    /// A valid frame that executes, pauses or stops, by its command byte.
+    /// Valid Execute, Pause or Stop, with its command byte.
     Exec(u8),
     /// Bytes that are not a valid frame.
     Bad(FrameStatus),
@@ -50,7 +49,7 @@ impl From<&LinkEvent<'_>> for Worked {
     }
 }
 
-/// Inputs of a tick apart from the host link.
+/// Inputs of a tick, except those of the host link.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins<'a> {
     /// Answers of the nodes.
@@ -59,20 +58,20 @@ pub struct Pins<'a> {
     pub bus_state: BusState,
     /// Level of the safety input.
     pub safety_input: bool,
-    /// The serial transmitter is idle.
+    /// `true` if the serial transmitter is idle.
     pub status_free: bool,
 }
 
-/// The memory that keeps an arm over a reset (J-54).
+/// Memory that keeps an arm during a reset (J-54).
 #[derive(Clone, Debug, Default)]
 struct Memory {
     arm: Option<Vec<u8>>,
     sequence: u32,
-    /// Image that is being written, and ticks until it is stored.
+    /// Image that is being written, and the ticks until it is stored.
     writing: Option<(Vec<u8>, u32)>,
 }
 
-/// The board.
+/// Board of the controller.
 pub struct Board {
     controller: Controller<Vec<RawPoint>>,
     ring: VecDeque<u8>,
@@ -83,11 +82,11 @@ pub struct Board {
     memory: Memory,
     inter_byte_timeout_us: u32,
     watchdog_ms: u32,
-    /// Ticks that did not come.
+    /// Number of missed ticks.
     missed: u32,
-    /// Frames that the tick executed.
+    /// Frames that the tick has executed.
     pub worked: Vec<Worked>,
-    /// Bytes from the host that found no room.
+    /// Number of bytes from the host that were lost because the ring was full.
     pub lost_bytes: u64,
     /// Resets by the watchdog.
     pub watchdog_resets: u32,
@@ -99,7 +98,7 @@ pub struct Board {
 /// Flight recorder with as much memory as on the board.
 pub type SimRecorder = Recorder<Vec<Block>, 3>;
 
-/// Blocks in the pieces of the flight recorder's memory: 157 KiB together.
+/// Blocks in each piece of the flight recorder's memory, 157 KiB in total.
 pub const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
 fn recorder_memory() -> [Vec<Block>; 3] {
@@ -107,7 +106,7 @@ fn recorder_memory() -> [Vec<Block>; 3] {
 }
 
 impl Board {
-    /// A board with power just switched on, in whose memory this arm is.
+    /// Creates a board that was just switched on. Its memory contains this arm.
     pub fn new(config: Config, arm: Option<Vec<u8>>, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
         let mut board = Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
@@ -149,10 +148,10 @@ impl Board {
         self.controller.set_store_state(state, self.memory.sequence);
     }
 
-    /// Resets the board: forgets everything except the contents of lasting memory.
+    /// Resets the board, which loses everything except the contents of its non-volatile memory.
     pub fn reset(&mut self) {
         let resets = self.watchdog_resets;
-        // An unfinished write is lost; the arm stored before is kept.
+        // An unfinished write is lost; the previously stored arm is kept.
         let memory = Memory { writing: None, ..core::mem::take(&mut self.memory) };
         let recorder =
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
@@ -163,12 +162,12 @@ impl Board {
         self.boot();
     }
 
-    /// The settings that the controller has.
+    /// Returns the settings of the controller.
     pub fn controller_config(&self) -> &Config {
         self.controller.config()
     }
 
-    /// The arm in the memory that lasts, and its number.
+    /// Returns the arm in the non-volatile memory, and its number.
     pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
     }
@@ -178,7 +177,7 @@ impl Board {
         self.controller.answer_frame()
     }
 
-    /// The memory works while the controller does.
+    /// Writes the arm to the memory, which works while the controller continues.
     fn store(&mut self, requested: bool) {
         let memory = &mut self.memory;
         if requested {
@@ -195,7 +194,7 @@ impl Board {
         }
     }
 
-    /// The flight recorder (J-56).
+    /// Returns the flight recorder (J-56).
     pub fn recorder(&self) -> &SimRecorder {
         &self.recorder
     }
@@ -210,7 +209,7 @@ impl Board {
         &self.controller
     }
 
-    /// The status of the last tick, when its outputs had `status` set.
+    /// Returns the status of the last tick, if its outputs had `status` set.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         self.controller.status_frame()
     }
@@ -225,12 +224,12 @@ impl Board {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // More bytes than the controller can execute for too long: the waiting bytes are lost, but no Stop.
+            // The host has sent more bytes than the controller can execute for too long. The waiting bytes are lost, but no Stop.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // Bytes are taken also while a frame is executed, as an interrupt does: held back, they would make a gap.
+        // Bytes are taken also while a frame is executed, as an interrupt does. If they had to wait, the parser would see a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
             let waiting = self.ring.as_slices().0;
@@ -245,7 +244,7 @@ impl Board {
         }
     }
 
-    /// Gives the event of the parser to the controller; returns `false` if there is no room for it.
+    /// Passes the event of the parser to the controller; returns `false` if the controller cannot accept it.
     fn hand_over(&mut self) -> bool {
         let moved = self.receiver.received(LINE).is_some_and(|received| self.batch.push(&received));
         if moved {
@@ -254,7 +253,7 @@ impl Board {
         moved
     }
 
-    /// The tick does not come; true when the watchdog resets the board because of it.
+    /// Misses a tick. Returns true if the watchdog resets the board because of it.
     pub fn miss(&mut self) -> bool {
         self.worked.clear();
         self.missed += 1;

@@ -1,5 +1,4 @@
-//! The joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors
-//! and bus-off.
+//! Joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors and bus-off.
 
 mod nodes;
 
@@ -13,9 +12,9 @@ pub use nodes::Nodes;
 use crate::jitter::Jitter;
 use crate::request::NodeRequest;
 
-/// A tick, µs.
+/// Duration of a tick, µs.
 const TICK_US: u32 = 1000;
-/// An error frame and the pause before the repetition, µs.
+/// Duration of an error frame and the pause before the repetition, µs.
 const ERROR_FRAME_US: u32 = 23;
 /// Transmit error counter above which a controller leaves the bus (ISO 11898-1).
 const BUS_OFF: u16 = 255;
@@ -24,20 +23,20 @@ const RECOVERY_US: u32 = 1408;
 
 /// Bit of an answer's id.
 const RESPONSE: u16 = 0x200;
-/// Frames of others that may wait.
+/// Largest number of waiting frames of other members.
 const FOREIGN_MAX: usize = 64;
 
-/// Most bytes of a frame on this bus.
+/// Largest number of bytes of a frame on this bus.
 const LEN_MAX: usize = 24;
 
-/// Time of a CAN FD frame with `len` bytes (up to 24) at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
+/// Returns the duration of a CAN FD frame with `len` bytes (up to 24) at 1 and 5 Mbit/s, with the usual share of stuff bits, µs.
 pub const fn frame_us(len: usize) -> u32 {
     const TIMES: [u32; LEN_MAX + 1] = {
         let mut times = [0; LEN_MAX + 1];
         let mut len = 0;
         while len <= LEN_MAX {
-            // 31 bits at the nominal rate; at five times this rate ESI, DLC and data, of which every tenth bit makes a stuff
-            // bit, then stuff count and CRC.
+            // 31 bits at the nominal rate. ESI, DLC and data at five times this rate: every tenth of these bits causes a stuff bit. Then
+            // stuff count and CRC.
             let crc = if len > 16 { 31 } else { 27 };
             let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
             times[len] = 31 + (tenths + 25) / 50;
@@ -48,46 +47,46 @@ pub const fn frame_us(len: usize) -> u32 {
     TIMES[if len < LEN_MAX { len } else { LEN_MAX }]
 }
 
-/// Faults of the bus at the moment.
+/// Present faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusFault {
-    /// Share of receptions that fail, each receiver on its own, 0..1.
+    /// Share of receptions that fail, drawn separately for each receiver, 0..1.
     pub lost: f64,
     /// Share of frames that are destroyed on the wire and repeated, 0..1.
     pub corrupted: f64,
-    /// Share of answers that reach the controller with other contents than were sent, 0..1.
+    /// Share of answers that reach the controller with changed contents, 0..1.
     pub garbled: f64,
     /// The controller's line is cut: it receives no frame, and none of its frames is received.
     pub cut: bool,
-    /// The controller is kept off the bus.
+    /// `true` if the controller is kept off the bus.
     pub bus_off: bool,
 }
 
 /// Counters of the bus since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusStatistics {
-    /// Frames carried.
+    /// Number of carried frames.
     pub frames: u64,
     /// Time in which the bus was busy, µs.
     pub busy_us: u64,
-    /// Frames that a receiver lost.
+    /// Number of receptions that failed.
     pub lost: u64,
-    /// Frames that were repeated after an error.
+    /// Number of frames that were repeated after an error.
     pub repeated: u64,
-    /// Answers garbled by a fault.
+    /// Number of answers garbled by a fault.
     pub garbled: u64,
-    /// Requests that no node acknowledged.
+    /// Number of requests that no node acknowledged.
     pub unacknowledged: u64,
-    /// Times that the controller went bus-off.
+    /// Number of times that the controller went bus-off.
     pub bus_offs: u64,
 }
 
-/// A frame and when it ended, µs after the start of the tick.
+/// Frame with the time of its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedFrame {
-    /// µs after the start of the tick.
+    /// Time of the end after the start of the tick, µs.
     pub end_us: u32,
-    /// The frame.
+    /// Frame.
     pub frame: Frame,
 }
 
@@ -97,7 +96,7 @@ struct Pending {
     frame: Frame,
 }
 
-/// The bus and the controller's part of it.
+/// Bus, with the controller's transceiver.
 #[derive(Clone, Debug)]
 pub struct Bus {
     scales: [Scale; JOINTS],
@@ -107,20 +106,20 @@ pub struct Bus {
     off_us: Option<u32>,
     rng: fastrand::Rng,
     log: Vec<TimedFrame>,
-    /// Frames of members that are not of this world, oldest first.
+    /// Frames of members outside this simulation, oldest first.
     foreign: VecDeque<Frame>,
     /// Delay of answers to the controller.
     pub jitter: Jitter,
     /// `true` if another device on the bus, such as an analyser, acknowledges frames, too.
     pub monitored: bool,
-    /// Faults.
+    /// Present faults.
     pub fault: BusFault,
-    /// Counted since the start.
+    /// Counters since the start.
     pub statistics: BusStatistics,
 }
 
 impl Bus {
-    /// A bus whose drives have these scales.
+    /// Creates a bus whose drives have these scales.
     pub fn new(scales: [Scale; JOINTS], seed: u64) -> Self {
         Self {
             scales,
@@ -137,13 +136,13 @@ impl Bus {
         }
     }
 
-    /// Frames of the last tick with their times.
+    /// Returns the frames of the last tick with their times.
     pub fn frames(&self) -> &[TimedFrame] {
         &self.log
     }
 
-    /// Simulates a millisecond: sends `out` to the nodes and adds answers that are complete by its end to `received`.
-    /// There they wait until the controller takes them, even if its tick is late.
+    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to `received`. They wait there
+    /// until the controller takes them, even if its tick is late.
     pub fn tick(
         &mut self,
         now_us: u64,
@@ -183,7 +182,7 @@ impl Bus {
         BusState { acknowledged, bus_off: self.off_us.is_some() }
     }
 
-    /// Count the time off the bus down; true while it lasts.
+    /// Counts down the time off the bus; returns true while it lasts.
     fn recovering(&mut self) -> bool {
         if self.fault.bus_off {
             if self.off_us.is_none() {
@@ -205,7 +204,7 @@ impl Bus {
     /// Sends the controller's request; returns `true` if a node acknowledged it.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
         if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
-            // Repeated until the next tick replaces it; such errors alone make no bus-off.
+            // The request is repeated until the next tick replaces it. Such errors alone do not lead to bus-off.
             self.statistics.unacknowledged += 1;
             self.statistics.busy_us += u64::from(TICK_US);
             self.pending.clear();
@@ -221,7 +220,7 @@ impl Bus {
         true
     }
 
-    /// Every node gets a request, and may answer.
+    /// Passes a request to every node, and queues the answers.
     fn reach_nodes(&mut self, now_us: u64, request: &NodeRequest, nodes: &mut Nodes, time: u32) {
         for node in 0..NODES {
             if self.fault.lost > 0.0 && self.rng.f64() < self.fault.lost {
@@ -235,7 +234,7 @@ impl Bus {
         }
     }
 
-    /// Puts a frame on the wire, again after each error; returns `false` if no time was left for it.
+    /// Puts a frame on the wire, and repeats it after each error. Returns `false` if the time was too short for it.
     fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
         let length = frame_us(frame.data().len());
         while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
@@ -268,7 +267,7 @@ impl Bus {
         true
     }
 
-    /// Answers in the order of arbitration: of those that are ready when the bus is free, the lowest id.
+    /// Carries the answers in the order of arbitration: the lowest id among those that are ready when the bus is free.
     fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
         while !self.pending.is_empty() && *time < TICK_US {
             let ready = |p: &Pending| p.ready_us <= *time;
@@ -290,14 +289,13 @@ impl Bus {
                 received.push(self.garble(frame));
             }
         }
-        // Frames that did not get through compete again in the next tick.
+        // Answers that were not sent compete again in the next tick.
         for p in &mut self.pending {
             p.ready_us = 0;
         }
     }
 
-    /// Frames of others, as many as still fit: answers are for the controller, everything else is for the
-    /// nodes.
+    /// Carries as many frames of other members as still fit: answers for the controller, all other frames for the nodes.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {
@@ -312,7 +310,7 @@ impl Bus {
         }
     }
 
-    /// Queues a frame of a member outside this world; returns `false` if too many frames wait already.
+    /// Queues a frame of a member outside this simulation; returns `false` if too many frames wait already.
     pub fn put(&mut self, frame: Frame) -> bool {
         let room = self.foreign.len() < FOREIGN_MAX;
         if room {
@@ -321,7 +319,7 @@ impl Bus {
         room
     }
 
-    /// A frame as a receiver with broken memory sees it.
+    /// Returns the frame that a receiver with faulty memory would read.
     fn garble(&mut self, frame: Frame) -> Frame {
         if self.fault.garbled == 0.0 || self.rng.f64() >= self.fault.garbled {
             return frame;
@@ -340,7 +338,7 @@ impl Bus {
         Frame::new(id, &data).unwrap_or(frame)
     }
 
-    /// Drops waiting frames: the controller was reset.
+    /// Drops all waiting frames after a reset of the controller.
     pub fn clear(&mut self) {
         self.errors = 0;
         self.off_us = None;

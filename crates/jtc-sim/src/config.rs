@@ -1,4 +1,4 @@
-//! Settings of the simulated world.
+//! Settings of the simulation.
 use jtc_core::{Config, JointConfig, Parameters};
 use jtc_dynamics::{JOINTS, JointVec};
 
@@ -6,27 +6,27 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
-/// Over-speed trip of a drive over the velocity limit of its joint: with the default arm that of known drives.
+/// Over-speed limit of a drive divided by the velocity limit of its joint. With the default arm this gives the limit of known drives.
 const OVER_SPEED: f64 = 1.2;
 
-/// Distance from its limit at which a joint starts that cannot reach 0, rad.
+/// Distance of the start position from the limit, for a joint that cannot reach 0, rad.
 const END_DISTANCE: f64 = 0.2;
 
 /// Deviation of the true arm from its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelError {
-    /// Each link's mass (and inertia with it) times 1 ± up to this, drawn from the seed.
+    /// Random error of each link's mass, and of the inertia with it: the factor is between 1 − `mass` and 1 + `mass`, drawn from the seed.
     pub mass: f64,
-    /// Each joint's friction times 1 ± up to this, drawn from the seed.
+    /// Random error of each joint's friction: the factor is between 1 − `friction` and 1 + `friction`, drawn from the seed.
     pub friction: f64,
-    /// Factors of the link masses, instead of drawn ones.
+    /// Factors of the link masses, instead of random ones.
     pub mass_factors: Option<[f64; 7]>,
-    /// Factors of the joint frictions, instead of drawn ones.
+    /// Factors of the joint frictions, instead of random ones.
     pub friction_factors: Option<JointVec>,
 }
 
 impl ModelError {
-    /// The controller's model is the truth.
+    /// No error: the controller's model is exact.
     pub const NONE: Self = Self { mass: 0.0, friction: 0.0, mass_factors: None, friction_factors: None };
 }
 
@@ -37,7 +37,7 @@ impl Default for ModelError {
 }
 
 impl ModelError {
-    /// The true arm and the factor of each joint's friction.
+    /// Returns the true arm, and the factor of each joint's friction.
     pub(crate) fn apply(&self, arm: &SimArm, seed: u64) -> (SimArm, JointVec) {
         let mut rng = fastrand::Rng::with_seed(seed ^ 0x6D6F_6465_6C00);
         let mut factor = |size: f64| 1.0 + size * (2.0 * rng.f64() - 1.0);
@@ -58,21 +58,21 @@ impl ModelError {
 pub enum Support {
     /// No support: a joint without torque falls.
     None,
-    /// A stand, until every joint has been enabled once; afterwards nothing.
+    /// A stand until every joint was enabled once, then no support.
     Stand,
-    /// Holding brakes, open only while their drive is enabled. The known drives have none; with brakes the simulated arm
-    /// keeps a usable pose after an error.
+    /// Holding brakes, which are open only while their drive is enabled. The known drives have none. With brakes the simulated arm keeps a
+    /// usable pose after an error.
     Brakes,
 }
 
-/// The world to simulate.
+/// Configuration of a simulation.
 #[derive(Clone, Debug)]
 pub struct SimConfig {
-    /// The arm before model errors.
+    /// Arm before model errors.
     pub arm: SimArm,
     /// Settings of the controller.
     pub controller: Config,
-    /// Image of the arm that its board has stored (J-54).
+    /// Image of the arm that the board has stored (J-54).
     pub stored_arm: Option<Vec<u8>>,
     /// Deviation of the true arm from `arm`.
     pub model_error: ModelError,
@@ -80,31 +80,30 @@ pub struct SimConfig {
     pub start: JointVec,
     /// Support of the arm while drives are not enabled.
     pub support: Support,
-    /// Habits of the drives.
+    /// Properties of the drives.
     pub drives: [DriveConfig; JOINTS],
-    /// A gripper is on the bus.
+    /// `true` if a gripper is on the bus.
     pub gripper: bool,
-    /// Joints (bit n = joint n) whose drive is not simulated: it is somewhere else, see
-    /// [`BusTap`](crate::BusTap).
+    /// Joints (bit n = joint n) whose drive is not simulated, because it is on another bus: see [`BusTap`](crate::BusTap).
     pub absent_drives: u8,
-    /// Something else on the joint bus, such as an analyser, acknowledges frames even while no node does.
+    /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does.
     pub bus_monitored: bool,
-    /// Largest delay of answers to the controller after they ended on the bus, ticks; drawn from the seed for each millisecond.
-    /// Answers stay in order. 0: in the tick that follows.
+    /// Largest delay of answers to the controller after their end on the bus, ticks. It is drawn from the seed for each millisecond.
+    /// Answers stay in order. 0: they arrive in the next tick.
     pub answer_jitter_ms: u8,
-    /// Rate of the serial line, bit/s; `None`: bytes take no time.
+    /// Rate of the serial line, bit/s; `None`: no transmission time.
     pub baud: Option<u32>,
-    /// Inter-byte timeout: silence that ends a frame, µs (J-03).
+    /// Inter-byte timeout: silence on the line that ends a frame, µs (J-03).
     pub inter_byte_timeout_us: u32,
-    /// Ticks that may fail to come before the controller's watchdog resets it (J-12).
+    /// Number of missed ticks after which the controller's watchdog resets it (J-12).
     pub watchdog_ms: u32,
-    /// The controller's safety output is wired to the drives' safety line.
+    /// `true` if the controller's safety output is connected to the drives' safety line.
     pub safety_wired: bool,
-    /// Seed of everything that is drawn by chance.
+    /// Seed of all random values.
     pub seed: u64,
-    /// Faults, and their times.
+    /// Faults with their times.
     pub faults: FaultPlan,
-    /// Entries that the event log holds: the last ones; those before them are counted only.
+    /// Capacity of the event log. Only the last entries are kept; earlier ones are counted.
     pub log_entries: usize,
 }
 
@@ -115,7 +114,7 @@ impl Default for SimConfig {
 }
 
 impl SimConfig {
-    /// A world around a controller with these settings, whose arm is made from these parameters.
+    /// Creates the configuration of a controller with these settings, whose arm has these parameters.
     pub fn new(controller: Config, parameters: &Parameters) -> Self {
         let drives = core::array::from_fn(|j| DriveConfig {
             velocity_full_scale: controller.velocity_full_scale,
@@ -145,7 +144,7 @@ impl SimConfig {
     }
 }
 
-/// The angle nearest to 0 that keeps some distance from the ends of a joint, rad. Many arms do not get to 0 with each joint.
+/// Returns the angle nearest to 0 that keeps a distance from the limits of a joint, rad. Many arms cannot reach 0 with each joint.
 fn near_zero(joint: &JointConfig) -> f64 {
     let (low, high) = (joint.position_min, joint.position_max);
     let distance = END_DISTANCE.min(0.5 * (high - low));

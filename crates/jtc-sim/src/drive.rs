@@ -1,5 +1,4 @@
-//! A joint's drive with the habits of the real ones: slow first enable, coarse encoder, late speed, torques
-//! that never time out.
+//! A joint's drive with the properties of real ones: slow first enable, coarse encoder, delayed speed, and torques without a timeout.
 use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;
@@ -13,18 +12,18 @@ pub use config::{DriveConfig, DriveFault, EncoderPlace};
 use encoders::Encoders;
 use states::States;
 
-/// A drive.
+/// Drive of a joint.
 #[derive(Clone, Debug)]
 pub struct Drive {
     node: u8,
     config: DriveConfig,
-    /// Torque that it reaches, N·m.
+    /// Largest torque of the drive, N·m.
     ceiling: f64,
     states: States,
     encoders: Encoders,
-    /// Ticks until it has booted.
+    /// Ticks until the drive has booted.
     booting: u32,
-    /// A configuration was accepted since the last reset.
+    /// `true` if a configuration was accepted since the last reset.
     configured: bool,
     mode: u8,
     bits: u8,
@@ -32,7 +31,7 @@ pub struct Drive {
     errors: u8,
     mc_current: u8,
     mc_occurred: u8,
-    /// Position and speed as the last tick read them, rad, rad/s.
+    /// Position and speed as read in the last tick, rad, rad/s.
     position: f64,
     velocity: f64,
     temperature: f64,
@@ -45,7 +44,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Node `node` with power just switched on.
+    /// Creates the drive of node `node`, just switched on.
     pub fn new(node: u8, config: DriveConfig, ceiling: f64) -> Self {
         let mut drive = Self {
             node,
@@ -73,13 +72,13 @@ impl Drive {
         drive
     }
 
-    /// The processor restarts: configuration and motor alignment are lost.
+    /// Restarts the processor: configuration and motor alignment are lost.
     pub fn reset(&mut self) {
         self.states = States::new();
         self.booting = self.config.boot_ms;
         self.configured = false;
         self.mode = 1;
-        // Over-speed trip is on by default.
+        // The over-speed trip is on by default.
         self.bits = config_bit::OVER_SPEED_TRIP;
         self.goal = 0.0;
         self.errors = 0;
@@ -89,19 +88,19 @@ impl Drive {
         self.inbox = Inbox::new(self.config.one_message_per_interrupt);
     }
 
-    /// Go to the fault state with no error bit set, as a request of 254 makes it.
+    /// Enters the fault state without an error bit, like a request of 254.
     pub fn force_fault(&mut self) {
         if self.state() != NodeState::START {
             self.states.enter(NodeState::FAULT, &self.config);
         }
     }
 
-    /// State byte.
+    /// Returns the state byte.
     pub fn state(&self) -> NodeState {
         self.states.state()
     }
 
-    /// Torque on the joint, N·m.
+    /// Returns the torque on the joint, N·m.
     pub fn torque(&self) -> f64 {
         self.config.delivers * self.torque
     }
@@ -119,8 +118,8 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// Simulates a millisecond of the drive: reads sensors, checks, accepts a request, acts. `motor` and `link`: true positions of both
-    /// sides of the gear as seen at the joint, rad.
+    /// Simulates a millisecond of the drive: reads sensors, checks, accepts a request, acts. `motor` and `link` are the true positions of
+    /// both sides of the gear, at the joint, rad.
     pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
         self.read_encoders(motor, link);
         if self.booting > 0 {
@@ -168,7 +167,7 @@ impl Drive {
             self.errors |= error_bit::HARDWARE;
         }
         if self.errors != 0 && !self.states.reacting() {
-            // The rest of the reaction takes the following ticks.
+            // The remaining reaction follows in the next ticks.
             self.states.enter(NodeState::FAULT_REACTION, &self.config);
         }
     }

@@ -1,4 +1,4 @@
-//! The habits of drives, one test each.
+//! Properties of the drives, with one test for each.
 use jtc_bus::{Answer, JointReport, Request, warning};
 
 use super::*;
@@ -168,7 +168,7 @@ fn outside_the_working_area_only_inward_torque_acts() {
 fn j16_safety_line_drops_to_ready_without_an_error() {
     let mut drive = enabled();
     drive.fault.safety_line = true;
-    // In one tick, without a transition.
+    // The state changes in one tick, without a transition.
     run(&mut drive, 1, 0.5);
     assert_eq!(drive.state(), NodeState::READY);
     let report = command(&mut drive, 0.0);

@@ -1,4 +1,4 @@
-//! Events of the world, for reports and for live output.
+//! Events of the simulation, for reports and for live output.
 use core::fmt;
 use std::collections::VecDeque;
 
@@ -8,7 +8,7 @@ use jtc_wire::FrameStatus;
 
 use crate::faults::FaultKind;
 
-/// Something that happened.
+/// Event of the simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// The controller changed its state.
@@ -78,10 +78,10 @@ impl fmt::Display for Event {
     }
 }
 
-/// An event and its time.
+/// Event with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogEntry {
-    /// µs since the start.
+    /// Time since the start, µs.
     pub time_us: u64,
     /// Event.
     pub event: Event,
@@ -93,7 +93,7 @@ impl fmt::Display for LogEntry {
     }
 }
 
-/// The latest events.
+/// Log of the latest events.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     entries: VecDeque<LogEntry>,
@@ -102,7 +102,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// A log that keeps the last `most` entries and counts those before them.
+    /// Creates a log that keeps the last `most` entries and counts the earlier ones.
     pub fn new(most: usize) -> Self {
         Self { entries: VecDeque::new(), most, dropped: 0 }
     }
@@ -115,12 +115,12 @@ impl Log {
         }
     }
 
-    /// Oldest first.
+    /// Returns the entries, oldest first.
     pub fn entries(&self) -> impl DoubleEndedIterator<Item = &LogEntry> + ExactSizeIterator {
         self.entries.iter()
     }
 
-    /// Entries that made room for later ones.
+    /// Returns the number of entries that were removed for later ones.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

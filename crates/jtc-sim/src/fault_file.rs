@@ -23,7 +23,7 @@ const STATES: [(&str, ControllerState); 6] = [
     ("error", ControllerState::Error),
 ];
 
-/// The key that every format has.
+/// Key that every format has.
 #[derive(Deserialize)]
 struct Head {
     format: Option<f64>,
@@ -71,14 +71,14 @@ struct Entry {
 /// Description of fault files, for people (Markdown).
 pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 
-/// Format of the files that are read: joints count from 1 since format 2.
+/// Format of the accepted files; joints count from 1 since format 2.
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
-/// Furthest place in the base frame, m, and furthest centre of a load from the flange, m.
+/// Largest distance of a place in the base frame, m, and of the centre of a load from the flange, m.
 const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
-/// Heaviest load, kg.
+/// Largest mass of a load, kg.
 const MASS_MAX: f64 = 100.0;
 /// Stiffness and damping of walls: N/m and N·s/m at the flange, N·m/rad and N·m·s/rad at a joint.
 const STIFFNESS: (f64, f64) = (1.0, 1e6);
@@ -87,18 +87,18 @@ const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
 const JOINT_DAMPING_MAX: f64 = 1e3;
 
 impl FaultPlan {
-    /// Read a fault file without hands; [`FAULT_FILE_HELP`] describes them.
+    /// Reads a fault file without hands; [`FAULT_FILE_HELP`] describes the format.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
         Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
     }
 
-    /// Read a fault file; `load` reads the trajectory files of hands; its error is the reason why it cannot.
+    /// Reads a fault file. `load` reads the trajectory files of hands and returns the reason if it cannot.
     pub fn from_toml_with(
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
         let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
-        // Before anything else: another format may well have other keys.
+        // Checked first, because another format may have other keys.
         let Head { format } = toml::from_str(text).map_err(syntax)?;
         if format != Some(FORMAT) {
             return Err(FaultFileError::Format { found: format });
@@ -129,7 +129,7 @@ impl Reader<'_> {
         let trigger = self.trigger()?;
         let duration_ms = match self.entry.for_s.take() {
             Some(s) => Some(ms(self.in_range("for_s", s, 0.0, YEAR_S)?)),
-            // A push for good is a mistake.
+            // A push without an end is a mistake.
             None if matches!(kind, FaultKind::Push { .. }) => return Err(self.missing("for_s")),
             None => None,
         };
@@ -173,7 +173,7 @@ impl Reader<'_> {
         Ok(FaultKind::JointWall { joint, rad, side, stiffness, damping })
     }
 
-    /// Three numbers, each at most `most` either way.
+    /// Checks that there are three numbers, each between −`most` and `most`.
     fn vector(&self, key: &'static str, numbers: Vec<f64>, most: f64) -> Result<[f64; 3], FaultFileError> {
         for &number in &numbers {
             self.in_range(key, number, -most, most)?;
@@ -253,7 +253,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The node of a joint or of the gripper.
+    /// Returns the node of a joint or of the gripper.
     fn node(&mut self) -> Result<u8, FaultFileError> {
         match (self.entry.joint, self.entry.gripper.take()) {
             (Some(_), None | Some(false)) => Ok(self.joint()?.index() as u8),
@@ -303,7 +303,7 @@ impl Reader<'_> {
     }
 
     fn in_range(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<f64, FaultFileError> {
-        // Also refuses NaN.
+        // This also refuses NaN.
         if value >= low && value <= high {
             Ok(value)
         } else {

@@ -1,4 +1,4 @@
-//! Faults of the simulated world, and their times.
+//! Faults of the simulation, and their times.
 use core::fmt;
 
 use jtc_bus::Joint;
@@ -10,17 +10,17 @@ use crate::hand::HandPath;
 /// Declares the kinds of faults: meaning, name, the name in fault files and tables, and the fields.
 macro_rules! fault_kinds {
     ($($(#[$doc:meta])* $kind:ident $name:literal $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ })?;)+) => {
-        /// A kind of fault.
+        /// Kind of fault.
         #[derive(Clone, Copy, Debug, PartialEq)]
         pub enum FaultKind {
             $($(#[$doc])* $kind $({ $($(#[$field_doc])* $field: $type,)+ })?,)+
         }
 
         impl FaultKind {
-            /// The names of all kinds.
+            /// Names of all kinds.
             pub const NAMES: [&str; [$($name),+].len()] = [$($name),+];
 
-            /// Name in fault files and tables.
+            /// Returns the name in fault files and tables.
             pub fn name(&self) -> &'static str {
                 match self {
                     $(Self::$kind { .. } => $name,)+
@@ -31,7 +31,7 @@ macro_rules! fault_kinds {
 }
 
 fault_kinds! {
-    /// A node is off the bus; a joint's motor goes on with its last torque.
+    /// A node is off the bus; the motor of a joint continues with its last torque.
     NodeSilent "node-silent" {
         /// 0..5 joints, 6 gripper.
         node: u8,
@@ -53,21 +53,21 @@ fault_kinds! {
         /// Joint.
         joint: Joint,
     };
-    /// A drive goes to its fault state with no error bit set, once.
+    /// A drive enters its fault state without an error bit, once.
     FaultState "fault-state" {
         /// Joint.
         joint: Joint,
     };
-    /// A drive answers requests for another state, and stays in the one that it is in.
+    /// A drive answers requests for another state, and stays in its present state.
     IgnoresState "ignores-state" {
         /// Joint.
         joint: Joint,
     };
-    /// The encoder reads something else.
+    /// The encoder reading has an offset.
     EncoderJump "encoder-jump" {
         /// Joint.
         joint: Joint,
-        /// Added to the position, rad.
+        /// Offset of the position, rad.
         rad: f64,
     };
     /// A drive reports that its position is not accurate.
@@ -75,14 +75,14 @@ fault_kinds! {
         /// Joint.
         joint: Joint,
     };
-    /// Friction is multiplied.
+    /// The friction of a joint is multiplied.
     Friction "friction" {
         /// Joint.
         joint: Joint,
-        /// Times the true one.
+        /// Factor of the true friction.
         factor: f64,
     };
-    /// A bearing is at this temperature.
+    /// A bearing has this temperature.
     Temperature "temperature" {
         /// Joint.
         joint: Joint,
@@ -99,7 +99,7 @@ fault_kinds! {
         /// 0..1.
         probability: f64,
     };
-    /// Answers reach the controller with other contents.
+    /// Answers reach the controller with changed contents.
     FramesGarbled "frames-garbled" {
         /// 0..1.
         probability: f64,
@@ -115,30 +115,30 @@ fault_kinds! {
         /// 0..5 joints, 6 gripper.
         node: u8,
     };
-    /// Bytes from the host vanish.
+    /// Bytes from the host are lost.
     SerialLost "serial-lost" {
         /// 0..1.
         probability: f64,
     };
     /// Bits of bytes from the host are flipped.
     SerialFlipped "serial-flipped" {
-        /// 0..1, of the bytes.
+        /// Share of the bytes, 0..1.
         probability: f64,
     };
-    /// Bytes from the host are held back until the fault is over.
+    /// Bytes from the host are delayed until the fault ends.
     SerialDelayed "serial-delayed";
-    /// The controller's tick does not come.
+    /// The controller misses its tick.
     TickOverrun "tick-overrun";
-    /// Someone pushes a joint.
+    /// A person pushes a joint.
     Push "push" {
         /// Joint.
         joint: Joint,
         /// N·m.
         torque: f64,
     };
-    /// The flange meets a wall; see [`Wall::Plane`].
+    /// The flange touches a wall; see [`Wall::Plane`].
     Wall "wall" {
-        /// A point of the surface in the base frame, m.
+        /// Point of the surface in the base frame, m.
         position: [f64; 3],
         /// Direction out of the wall in the base frame, of any length but 0.
         normal: [f64; 3],
@@ -147,7 +147,7 @@ fault_kinds! {
         /// N·s/m.
         damping: f64,
     };
-    /// A joint meets a wall; see [`Wall::Joint`].
+    /// A joint touches a wall; see [`Wall::Joint`].
     JointWall "joint-wall" {
         /// Joint.
         joint: Joint,
@@ -160,7 +160,7 @@ fault_kinds! {
         /// N·m·s/rad.
         damping: f64,
     };
-    /// The arm has taken up a point mass.
+    /// The arm has picked up a point mass.
     Payload "payload" {
         /// kg.
         mass: f64,
@@ -174,7 +174,7 @@ fault_kinds! {
     };
     /// A hand leads the arm while it is taught.
     Hand "hand" {
-        /// Place in [`FaultPlan::hands`].
+        /// Index in [`FaultPlan::hands`].
         path: usize,
     };
 }
@@ -224,7 +224,7 @@ impl fmt::Display for FaultKind {
 }
 
 impl FaultKind {
-    /// The wall that it is.
+    /// Returns the wall of this fault.
     pub(crate) fn wall(&self) -> Option<Wall> {
         match *self {
             Self::Wall { position, normal, stiffness, damping } => {
@@ -241,9 +241,9 @@ impl FaultKind {
 /// Trigger of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
-    /// At this time, ms after the start.
+    /// At this time after the start, ms.
     At(u64),
-    /// This long (ms) after the controller has first entered a state.
+    /// This time after the controller has first entered a state, ms.
     InState(ControllerState, u64),
     /// When the trajectory's point index first reaches this value in Operate.
     AtPoint(u32),
@@ -256,16 +256,16 @@ pub struct Fault {
     pub kind: FaultKind,
     /// Trigger.
     pub trigger: Trigger,
-    /// Duration, ms, at least 1: no fault ends between two milliseconds; `None`: for good.
+    /// Duration, ms, at least 1, because no fault ends between two milliseconds; `None`: without end.
     pub duration_ms: Option<u64>,
 }
 
-/// All that goes wrong.
+/// All faults of a simulation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FaultPlan {
-    /// In any order.
+    /// Faults in any order.
     pub faults: Vec<Fault>,
-    /// Paths along which [`FaultKind::Hand`] leads.
+    /// Paths of the hands of [`FaultKind::Hand`].
     pub hands: Vec<HandPath>,
 }
 
@@ -273,25 +273,25 @@ pub struct FaultPlan {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Waiting,
-    /// Its state was entered: the fault begins at this ms.
+    /// The state was entered: the fault begins at this time, ms.
     Armed(u64),
-    /// Ends at this ms.
+    /// The fault is present, and ends at this time, ms.
     Active(u64),
     Over,
 }
 
-/// A change that a fault makes.
+/// Change by a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Change {
     Begin(FaultKind),
     End(FaultKind),
 }
 
-/// The plan while it runs.
+/// Faults of a running simulation.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Running {
     faults: Vec<(Fault, Phase)>,
-    /// Faults that are not over.
+    /// Number of faults that have not ended.
     open: usize,
 }
 
@@ -303,18 +303,18 @@ impl Running {
 
     /// Adds a fault.
     pub fn add(&mut self, fault: Fault) {
-        // A soak run adds faults without end: finished faults are removed.
+        // A soak run adds faults without end, so ended faults are removed.
         self.faults.retain(|(_, phase)| *phase != Phase::Over);
         self.faults.push((fault, Phase::Waiting));
         self.open += 1;
     }
 
-    /// Kinds that are at work.
+    /// Returns the kinds of the present faults.
     pub fn active(&self) -> impl Iterator<Item = FaultKind> + '_ {
         self.faults.iter().filter(|(_, phase)| matches!(phase, Phase::Active(_))).map(|(fault, _)| fault.kind)
     }
 
-    /// Let faults begin and end at `now` (ms), given the controller's state and point index.
+    /// Begins and ends faults at `now` (ms), depending on the controller's state and point index.
     pub fn step(&mut self, now: u64, state: ControllerState, point: u32, mut change: impl FnMut(Change)) {
         if self.open == 0 {
             return;

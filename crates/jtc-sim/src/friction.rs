@@ -4,34 +4,34 @@
 //! [`FrictionModel::LuGre`] sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its
 //! sign over a small speed and can neither stick nor hunt.
 //!
-//! Beyond its range of speeds a curve continues in a straight line that does not fall: an extrapolated cubic ends as a
-//! motor (c3 < 0) or is too steep for any step.
+//! Beyond its range of speeds a curve continues in a straight line that does not fall. An extrapolated cubic would drive the joint (c3 <
+//! 0), or become too steep for any step.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
 /// Largest natural frequency of a rotor on its bristles, rad/s, that a step of 1 ms still integrates well.
 const STIFFEST: f64 = 800.0;
-/// Smallest level that bristles are divided by, N·m.
+/// Smallest friction level by which bristles are divided, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
 /// True friction of a joint as a function of speed, without the effects around standstill.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum SimFriction {
-    /// None.
+    /// No friction.
     Frictionless,
     /// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³) with s = sign(v), up to [`SimArm::polynomial_speed`](crate::SimArm).
     Polynomial([f64; 6]),
-    /// A measured table.
+    /// Measured table.
     Table(TableOf<f32>),
 }
 
 /// Friction around standstill.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrictionModel {
-    /// The sign of the velocity is v/√(v² + width²): no stiction. Below a width of 0.005 rad/s Runge-Kutta at 1 ms becomes unstable.
+    /// The sign of the velocity is v/√(v² + width²): no stiction. With a width below 0.005 rad/s, Runge-Kutta at 1 ms becomes unstable.
     Smooth {
-        /// Speed around zero in which friction changes its sign, rad/s.
+        /// Speed around zero within which friction changes its sign, rad/s.
         width: f64,
     },
     /// Bristles: stiction, presliding, Stribeck curve.
@@ -50,16 +50,16 @@ impl Default for FrictionModel {
 /// - friction torque = σ0·z + σ1(v)·dz/dt + viscous part,
 /// - g(v) = Coulomb level·(1 + (`stiction_ratio` − 1)/(1 + (v/`stribeck_speed`)²)).
 ///
-/// Coulomb level (c0) and viscous part (c1..c3) are those of the joint's curve. The Stribeck curve has the rational form of Hess
-/// and Soom (1990), and σ1 falls off with speed alike, which keeps the model dissipative (Olsson 1996, section 3).
+/// Coulomb level (c0) and viscous part (c1..c3) are those of the joint's curve. The Stribeck curve has the rational form of Hess and Soom
+/// (1990). σ1 decreases with speed in the same way, which keeps the model dissipative (Olsson 1996, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LuGre {
-    /// Break-away torque over Coulomb torque. The paper's example has 1.5; harmonic drives are reported between 1.1 and 1.6.
+    /// Break-away torque divided by Coulomb torque. The paper's example has 1.5; values for harmonic drives are between 1.1 and 1.6.
     pub stiction_ratio: f64,
     /// Speed at which half of the excess of stiction remains, rad/s.
     pub stribeck_speed: f64,
-    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one
-    /// step of the joint's encoder. Stiffer ones are softened until a rotor on its bristles swings below 800 rad/s.
+    /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one step of the
+    /// joint's encoder. Stiffer bristles are softened until the natural frequency of a rotor on them is below 800 rad/s.
     pub presliding: f64,
     /// Damping ratio of the rotor on its bristles: σ1 = 2·ratio·√(σ0·rotor inertia).
     pub damping_ratio: f64,
@@ -71,20 +71,20 @@ impl Default for LuGre {
     }
 }
 
-/// Friction of all joints at their present temperatures; a joint's arrays are columns, so that the compiler can do six at once.
+/// Friction of all joints at their present temperatures. Each array has one entry per joint, so that the compiler can process six at once.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionTorques {
     model: FrictionModel,
     curves: [SimFriction; JOINTS],
-    /// Polynomial coefficients, a row per power; zero for joints with a table.
+    /// Polynomial coefficients, a row for each power; zero for joints with a table.
     k: [JointVec; 4],
-    /// Speed at which the straight line begins, rad/s, and its slope, N·m·s/rad; zero for joints with a table.
+    /// Speed at which the straight line begins, rad/s; the next field is its slope, N·m·s/rad. Both are zero for joints with a table.
     reach: JointVec,
     slope: JointVec,
     /// Velocities and torques of joints with a table.
     tables: [Option<Box<Points>>; JOINTS],
     any_table: bool,
-    /// Temperature that the tables hold for, °C.
+    /// Temperature of the tables, °C.
     table_temperature: JointVec,
     /// σ0, N·m/rad.
     stiffness: JointVec,
@@ -93,7 +93,8 @@ pub(crate) struct FrictionTorques {
 }
 
 impl FrictionTorques {
-    /// `rotor`: inertia of the rotors at the joints, kg·m²; `reach`: speed up to which polynomials hold, rad/s.
+    /// Creates the friction of all joints. `rotor`: inertia of the rotors at the joints, kg·m². `reach`: speed up to which polynomials are
+    /// valid, rad/s.
     pub fn new(
         model: FrictionModel,
         curves: [SimFriction; JOINTS],
@@ -129,7 +130,7 @@ impl FrictionTorques {
         new
     }
 
-    /// Make the curves those of these bearing temperatures (°C), times `scale`.
+    /// Updates the curves for these bearing temperatures (°C), times `scale`.
     pub fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
@@ -143,7 +144,7 @@ impl FrictionTorques {
                     self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
-                    // Also from NaN at the start.
+                    // Also true for NaN, the value at the start.
                     if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
@@ -159,12 +160,12 @@ impl FrictionTorques {
         }
     }
 
-    /// Makes the next [`warm`](Self::warm) update tables, too: a scale has changed.
+    /// Makes the next [`warm`](Self::warm) update the tables as well, because a scale has changed.
     pub fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
 
-    /// Torque against the motion at velocities `v` (rad/s) and bristle deflections `z` (rad), N·m.
+    /// Returns the torque against the motion at velocities `v` (rad/s) and bristle deflections `z` (rad), N·m.
     #[inline]
     pub fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
         let [k0, k1, k2, k3] = &self.k;
@@ -198,8 +199,8 @@ impl FrictionTorques {
         out
     }
 
-    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, no less than 0; without the effects around
-    /// standstill, whose slope is bounded by itself.
+    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. It excludes the effects around standstill, whose
+    /// slope has its own bound.
     pub fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
@@ -215,9 +216,9 @@ impl FrictionTorques {
 
     /// Returns the bristle deflections `dt` seconds after `z` at velocities `v`.
     ///
-    /// dz/dt = v − rate·z with rate up to 10⁴/s at speed: far too stiff for Runge-Kutta at 1 ms. For a constant velocity the exact
+    /// dz/dt = v − rate·z with a rate up to 10⁴/s at speed is far too stiff for Runge-Kutta at 1 ms. For a constant velocity the exact
     /// solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). With 1/(1 + x + x²/2) for e it is of second order, needs no
-    /// exponential, and goes to the exact end g/σ0 for any x.
+    /// exponential, and converges to the exact end g/σ0 for any x.
     #[inline]
     pub fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
         let FrictionModel::LuGre(lugre) = self.model else { return *z };
@@ -243,17 +244,17 @@ impl LuGre {
     }
 }
 
-/// A friction table at one temperature.
+/// Friction table at one temperature.
 #[derive(Clone, Debug)]
 struct Points {
-    /// rad/s.
+    /// Velocities, rad/s.
     velocity: [f64; 20],
-    /// N·m.
+    /// Torques, N·m.
     torque: [f64; 20],
 }
 
 impl Points {
-    /// Velocities and torques of the table at one temperature (°C), which is kept within its axis.
+    /// Returns the velocities and torques of the table at one temperature (°C), which is limited to the range of the table.
     fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> Self {
         let axis = table.temperature.map(f64::from);
         let t = temperature.clamp(axis[0], axis[19]);
@@ -266,10 +267,10 @@ impl Points {
         Self { velocity: table.velocity.map(f64::from), torque }
     }
 
-    /// Straight lines between the points, and on beyond the ends.
+    /// Interpolates linearly between the points, and continues the lines beyond the ends.
     fn at(&self, v: f64) -> f64 {
         let i = self.segment(v);
-        // The line beyond an end begins there.
+        // A line beyond an end begins at that end.
         let from = i + usize::from(v > self.velocity[19]);
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }
@@ -281,18 +282,18 @@ impl Points {
         if v < x[0] || v > x[19] { slope.max(0.0) } else { slope }
     }
 
-    /// Point at which the line at `v` begins.
+    /// Returns the index of the point at which the line at `v` begins.
     fn segment(&self, v: f64) -> usize {
         self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
-    /// Returns the Coulomb torque, N·m: the torque at standstill of the lines through the two slowest points of each direction,
-    /// the mean of both.
+    /// Returns the Coulomb torque, N·m. The line through the two slowest points of each direction gives a torque at standstill; the result
+    /// is the mean of both.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
             let slope = (y[far] - y[near]) / (x[far] - x[near]);
-            // No more than the slowest point itself: a curve that falls at first has its Coulomb torque there.
+            // At most the torque of the slowest point: if the curve falls at first, its Coulomb torque is at that point.
             (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
         };
         let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());
@@ -303,7 +304,7 @@ impl Points {
         }
     }
 
-    /// Takes the Coulomb torque out of the points: the remainder is the viscous part.
+    /// Removes the Coulomb torque from the points, so that they contain only the viscous part, and returns it.
     fn take_coulomb(&mut self) -> f64 {
         let coulomb = self.coulomb();
         for (v, torque) in self.velocity.iter().zip(&mut self.torque) {

@@ -1,4 +1,4 @@
-//! The LuGre model sticks, breaks away, slips and meets the measured curve at speed.
+//! The LuGre model sticks, breaks away, slips, and follows the measured curve at speed.
 use super::*;
 
 const RIGID: f64 = 0.7;
@@ -14,7 +14,7 @@ fn with(model: FrictionModel, curve: SimFriction) -> FrictionTorques {
     torques
 }
 
-/// Coulomb 6 N·m, no dependence on temperature.
+/// Returns a polynomial with 6 N·m Coulomb torque that does not depend on the temperature.
 fn polynomial() -> SimFriction {
     SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0])
 }
@@ -25,7 +25,7 @@ fn table() -> SimFriction {
     SimFriction::Table(TableOf { velocity, temperature: core::array::from_fn(|i| 4.0 * i as f32), torque })
 }
 
-/// A rotor alone on its bristles, in steps of `dt`, under `torque(t, v)`; position, velocity and friction of every step.
+/// Returns position, velocity and friction in every step of `dt`, for a rotor on its bristles under `torque(t, v)`.
 fn rotor(
     torques: &FrictionTorques,
     dt: f64,
@@ -62,12 +62,13 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // Up to 1.2 times 6 N·m within a second, then no torque: some 1e-4 rad; the elastic part comes back.
+        // The torque rises to 1.2 times 6 N·m within a second, and is zero afterwards. The deflection is about 1e-4 rad; its elastic part
+        // returns.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
         assert!(released < loaded - 0.8e-4 && held[1999][1].abs() < 1e-6, "{released} rad");
-        // Three times 6 N·m in three seconds: it leaves at stiction, 1.4 times 6 N·m.
+        // The torque rises to three times 6 N·m in three seconds. The rotor breaks away at stiction, 1.4 times 6 N·m.
         let away = rotor(&torques, 1e-3, 3.0, |t, _| t * 6.0);
         let left = away.iter().position(|x| x[0] > 1e-3).unwrap_or(0) as f64 * 1e-3;
         assert!((1.35..1.5).contains(&left), "it left at {left} of 6 N·m");
@@ -76,7 +77,7 @@ fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
 
 #[test]
 fn a_soft_drive_sticks_and_slips_and_smooth_friction_does_not() {
-    // A spring of 20 N·m/rad whose end moves at 5 mrad/s.
+    // The end of a spring of 20 N·m/rad moves at 5 mrad/s.
     let pull = |model| {
         let torques = with(model, SimFriction::Polynomial([6.0, 2.0, 0.0, 0.0, 0.0, 20.0]));
         let (mut q, mut v, mut z) = (0.0, 0.0, [0.0; JOINTS]);
@@ -108,7 +109,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
         for speed in [1e-6, 1e-4, 1e-2, 1.0, 30.0] {
             let mut z = [0.0; JOINTS];
             for k in 0..500 {
-                // Forth and back.
+                // The rotor moves forth and back.
                 let v = if k / 100 % 2 == 0 { speed } else { -speed };
                 z = torques.bend(&z, &[v; JOINTS], dt);
                 assert!(z[0].abs() <= longest * (1.0 + 1e-9), "{} rad at {speed} rad/s, {dt} s", z[0]);
@@ -119,7 +120,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
 
 #[test]
 fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
-    // Cubics that end as a motor, and as a wall; a table whose last line falls.
+    // Cubics that end with a driving torque and with a wall; a table whose last line falls.
     let motor = SimFriction::Polynomial([2.7, 12.6, -3.7, -0.65, 0.0, 20.0]);
     let wall = SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0]);
     let SimFriction::Table(mut falling) = table() else { unreachable!("a table") };
@@ -137,14 +138,14 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // Tolerance for the remainder of the Stribeck curve.
+                // Tolerance for the remaining part of the Stribeck curve.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;
             }
         }
     }
-    // 40 − 2·30·1.5 + 3·12·1.5² N·m·s/rad, and no more.
+    // The slope is at most 40 − 2·30·1.5 + 3·12·1.5² N·m·s/rad.
     let torques = with(FrictionModel::Smooth { width: 0.01 }, wall);
     let rise =
         torques.at(&[101.5; JOINTS], &[0.0; JOINTS])[0] - torques.at(&[1.5; JOINTS], &[0.0; JOINTS])[0];

@@ -1,4 +1,4 @@
-//! The vacuum gripper, node 6: a pump, two vacuum switches and the habits of its firmware.
+//! The vacuum gripper, node 6: a pump, two vacuum switches and the properties of its firmware.
 use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request, config};
 
 use crate::inbox::Inbox;
@@ -8,13 +8,13 @@ use crate::request::NodeRequest;
 const PUMP_LAG: u32 = 100;
 /// Ticks of pumping until the first and second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
-/// Transition to Init, with the gripper's own number.
+/// Transition to Init; its number differs from that of the drives.
 const TO_INIT: NodeState = NodeState::new(14);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
-/// Ticks after power-up in which it is silent.
+/// Ticks after power-up without an answer.
 const BOOT: u32 = 250;
 
-/// The gripper.
+/// Vacuum gripper.
 #[derive(Clone, Debug)]
 pub struct Gripper {
     state: NodeState,
@@ -22,23 +22,23 @@ pub struct Gripper {
     booting: u32,
     command: bool,
     pin: bool,
-    /// 0..PUMP_LAG: how far the motor has run up.
+    /// Speed of the motor, 0..PUMP_LAG.
     speed: u32,
-    /// Ticks of vacuum, up to the second level.
+    /// Ticks with vacuum, up to those of the second level.
     vacuum: u32,
     reacts_to_safety: bool,
     line_before: bool,
     inbox: Inbox,
-    /// Off the bus.
+    /// `true` if the node is off the bus.
     pub silent: bool,
-    /// The safety line is at the level that means danger.
+    /// `true` if the safety line is at the level that means danger.
     pub safety_line: bool,
-    /// Something is held, so that vacuum can build up.
+    /// `true` if a part covers the cup, so that the vacuum can build up.
     pub part_present: bool,
 }
 
 impl Gripper {
-    /// A gripper with power just switched on.
+    /// Creates a gripper that was just switched on.
     pub fn new(one_message_per_interrupt: bool) -> Self {
         Self {
             state: NodeState::START,
@@ -57,7 +57,7 @@ impl Gripper {
         }
     }
 
-    /// The processor restarts.
+    /// Restarts the processor.
     pub fn reset(&mut self) {
         self.state = NodeState::START;
         self.age = 0;
@@ -67,7 +67,7 @@ impl Gripper {
         self.reacts_to_safety = false;
     }
 
-    /// State byte.
+    /// Returns the state byte.
     pub fn state(&self) -> NodeState {
         self.state
     }
@@ -77,7 +77,7 @@ impl Gripper {
         self.booting == 0 && !self.silent
     }
 
-    /// A request arrives at `now_us`; the answer, if it gives one.
+    /// Takes a request that arrives at `now_us`, and returns the answer, if the gripper answers.
     pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         if !self.on_bus() {
             return None;
@@ -95,7 +95,7 @@ impl Gripper {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            // A `NodeRequest` carries it apart.
+            // A `NodeRequest` has a separate variant for it.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
@@ -117,7 +117,7 @@ impl Gripper {
         }
     }
 
-    /// Executes a request in the interrupt: the answer is already the transition's code.
+    /// Executes a request in the interrupt: the answer already has the code of the transition.
     fn change(&mut self, request: NodeState) {
         self.state = match (request, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -150,7 +150,7 @@ impl Gripper {
             return;
         }
         self.age = self.age.saturating_add(1);
-        // Only the edge counts: enabled while the line is unsafe already, it stays enabled.
+        // Only the edge counts: if the gripper is enabled while the line is already unsafe, it stays enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {
@@ -169,7 +169,7 @@ impl Gripper {
                 self.command = false;
                 self.pin = false;
             }
-            // The pin keeps its level in other states.
+            // In other states the pin keeps its level.
             _ => {}
         }
         self.speed = if self.pin { (self.speed + 1).min(PUMP_LAG) } else { self.speed.saturating_sub(1) };
@@ -221,7 +221,7 @@ mod tests {
         assert!(!pump(&mut gripper, true).pressure1);
         run(&mut gripper, 250);
         assert!(pump(&mut gripper, true).pressure1);
-        // Back to INIT straight from ENABLED: the pump runs on until READY.
+        // From ENABLED directly to INIT: the pump runs until READY.
         assert_eq!(request(&mut gripper, NodeState::INIT), TO_INIT);
         run(&mut gripper, 500);
         assert!(pump(&mut gripper, false).pressure2);

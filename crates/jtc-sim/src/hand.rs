@@ -1,20 +1,20 @@
-//! A hand that leads the arm along a path while it is taught: a compliant pull of bounded force on every joint.
+//! A hand that leads the arm along a path in Teaching, with a compliant pull of limited force on every joint.
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Torque per distance between a joint and its target by the hand, N·m/rad.
+/// Torque per distance between a joint and the hand's target, N·m/rad.
 const STIFFNESS: f64 = 1500.0;
-/// Torque per difference of speed, N·m·s/rad.
+/// Torque per speed difference, N·m·s/rad.
 const DAMPING: f64 = 80.0;
-/// Largest torque of a hand on a joint, N·m.
+/// Largest torque of the hand on a joint, N·m.
 const STRONGEST: f64 = 60.0;
-/// Mean speed of the way to the path's first point, rad/s.
+/// Mean speed of the move to the path's first point, rad/s.
 const APPROACH: f64 = 0.2;
-/// Time for which the last point is held, s.
+/// Time for which the hand holds the last point, s.
 const HELD: f64 = 0.5;
 /// A millisecond, s.
 const TICK: f64 = 1e-3;
 
-/// Joint positions in equal steps of time.
+/// Path of joint positions with a fixed time step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandPath {
     points: Vec<JointVec>,
@@ -29,12 +29,12 @@ impl HandPath {
         good.then_some(Self { points, step_s })
     }
 
-    /// Time from the first point to the last, s.
+    /// Returns the time from the first point to the last, s.
     pub fn duration_s(&self) -> f64 {
         self.step_s * (self.points.len() - 1) as f64
     }
 
-    /// Position `t` seconds after the first point, along straight lines.
+    /// Returns the position `t` seconds after the first point, with linear interpolation.
     fn at(&self, t: f64) -> JointVec {
         let place = (t / self.step_s).clamp(0.0, (self.points.len() - 1) as f64);
         let i = place as usize;
@@ -43,14 +43,14 @@ impl HandPath {
     }
 }
 
-/// The hand at work.
+/// Hand that leads along a path.
 #[derive(Clone, Debug)]
 pub(crate) struct Hand {
     path: HandPath,
     led: Option<Led>,
 }
 
-/// State since Teaching began: the pose of the arm then, the duration of the move to the first point, and the time so far, s.
+/// State since Teaching began: the pose of the arm at that time, the duration of the move to the first point, and the elapsed time, s.
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -63,7 +63,7 @@ impl Hand {
         Self { path, led: None }
     }
 
-    /// Returns the torque of a millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching and lets go (`None`) at the
+    /// Returns the torque of a millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching, and releases the arm (`None`) at the
     /// end of the path or of Teaching.
     pub fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
@@ -86,7 +86,7 @@ impl Hand {
         }))
     }
 
-    /// Returns the hand's target for the arm: smoothly to the first point, then along the path.
+    /// Returns the hand's target: first a smooth move to the first point, then the path.
     fn wanted(&self, led: &Led, t: f64) -> JointVec {
         if t >= led.approach_s {
             return self.path.at(t - led.approach_s);
@@ -114,7 +114,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // The arm does not move: the pull grows to its bound and no further.
+        // The arm does not move: the pull grows only to its limit.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {
@@ -122,7 +122,7 @@ mod tests {
             ms += 1;
         }
         assert_eq!(strongest, STRONGEST);
-        // 3 rad at 0.2 rad/s, the path, the wait at its end.
+        // 3 rad at 0.2 rad/s, the path, and the wait at its end.
         assert!((15_590..15_610).contains(&ms), "{ms} ms");
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]], 0.01).unwrap());
         hand.torque(true, &[0.0; 6], &[0.0; 6]);

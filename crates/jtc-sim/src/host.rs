@@ -1,7 +1,6 @@
-//! A small host for tests, soak runs and the fault matrix: it makes frames, receives statuses, and plans simple
-//! motions.
+//! A small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple motions.
 //!
-//! The real client library is `jtc-host`; this one exists so that the world can be exercised without it.
+//! The client library is `jtc-host`. This host allows tests of the simulation without it.
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
 use jtc_wire::{
     ACCELERATION_SCALE, ExecCommand, FrameType, HEADER, POSITION_SCALE, RawPoint, STATUS_LEN, Status,
@@ -10,18 +9,18 @@ use jtc_wire::{
 
 use crate::world::World;
 
-/// A frame with header, length and CRC around `body`.
+/// Returns a frame with header, length and CRC around `body`.
 pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(body.len() + 6);
     bytes.extend([HEADER, frame_type as u8]);
-    // No body of this protocol is longer than a frame may be.
+    // No body of this protocol is longer than the limit of a frame.
     bytes.extend(u16::try_from(body.len() + 6).unwrap_or(u16::MAX).to_be_bytes());
     bytes.extend(body);
     bytes.extend(crc16(&bytes).to_be_bytes());
     bytes
 }
 
-/// The three frames that make the controller use its default friction polynomial, gains and arm model.
+/// Returns the three frames that make the controller use its default friction polynomial, gains and arm model.
 pub fn use_defaults() -> Vec<u8> {
     [FrameType::FrictionPolynomialUseDefault, FrameType::PidParamUseDefault, FrameType::ArmModelUseDefault]
         .into_iter()
@@ -29,7 +28,7 @@ pub fn use_defaults() -> Vec<u8> {
         .collect()
 }
 
-/// The arm model that the controller receives, rounded to 32 bit floats.
+/// Returns the frame of an arm model, which the controller receives rounded to 32-bit floats.
 pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
     let joints = model.joints.iter().flat_map(origin);
@@ -38,17 +37,17 @@ pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     frame(FrameType::ArmModel, &body)
 }
 
-/// Execute, pause or stop.
+/// Returns the frame of Execute, Pause or Stop.
 pub fn exec(command: ExecCommand) -> Vec<u8> {
     frame(FrameType::TrajSetExecStatus, &[command as u8])
 }
 
-/// Clear all errors, current and occurred ones: the controller's and every node's.
+/// Returns the frames that clear all current and occurred errors, those of the controller and of every node.
 pub fn clear_all() -> Vec<u8> {
     frame(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0])
 }
 
-/// The trajectory in segments of `per_segment` points, `step_ms` between two points.
+/// Returns the trajectory in segments of `per_segment` points, with `step_ms` between two points.
 pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<Vec<u8>> {
     let segments: Vec<_> = points.chunks(per_segment.max(1)).collect();
     let number = |n: usize| u16::try_from(n).unwrap_or(u16::MAX).to_be_bytes();
@@ -64,8 +63,8 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// A motion from standstill to standstill along the quintic with zero accelerations at its ends, which leads
-/// from `from` to `to` (rad) in `seconds` and back again, `times` times; points every `step_ms`.
+/// Returns a motion from standstill to standstill with points every `step_ms`. It leads from `from` to `to` (rad) in `seconds` and back,
+/// `times` times, along the quintic with zero accelerations at its ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,
@@ -100,16 +99,16 @@ fn quintic(a: &JointVec, b: &JointVec, u: f64, seconds: f64) -> RawPoint {
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     bytes: Vec<u8>,
-    /// The newest status.
+    /// Latest status.
     pub last: Option<Status>,
-    /// Statuses that carried a response record, oldest first; take them out.
+    /// Responses in the received statuses, oldest first, until the caller removes them.
     pub responses: Vec<jtc_wire::Response>,
-    /// Bytes received.
+    /// Number of received bytes.
     pub received: u64,
 }
 
 impl Listener {
-    /// Takes the bytes that the world has for the host.
+    /// Takes the bytes for the host from the simulation.
     pub fn listen(&mut self, world: &mut World) {
         let mut buffer = [0; 1024];
         loop {
@@ -122,7 +121,7 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // After a reset of the controller a status may be torn: look for the next beginning.
+                // After a reset of the controller a status may be incomplete: search for the next beginning.
                 self.bytes.remove(0);
                 continue;
             };

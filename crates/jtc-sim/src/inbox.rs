@@ -1,14 +1,14 @@
-//! Receive buffer of a node: emptied at once, or as in older firmware, by one frame per interrupt.
+//! Receive buffer of a node. It is emptied at once, or by one frame per interrupt as in older firmware.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;
 
-/// Requests closer together than this make one interrupt, µs.
+/// Time between two requests below which they cause a single interrupt, µs.
 const BACK_TO_BACK_US: u64 = 250;
 /// Depth of the receive buffer.
 const DEPTH: usize = 3;
 
-/// The receive buffer of a node.
+/// Receive buffer of a node.
 #[derive(Clone, Debug)]
 pub struct Inbox {
     one_per_interrupt: bool,
@@ -17,12 +17,12 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// `one_per_interrupt`: two requests back to back leave the second in the buffer until another one comes.
+    /// Creates a buffer. With `one_per_interrupt`, the second of two consecutive requests stays in the buffer until another one arrives.
     pub fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
     }
 
-    /// A request arrives at `now_us`; the one that the node looks at because of it.
+    /// Takes a request that arrives at `now_us`, and returns the request that the node reads then.
     pub fn take(&mut self, now_us: u64, request: &NodeRequest) -> Option<NodeRequest> {
         if !self.one_per_interrupt {
             return Some(*request);

@@ -1,4 +1,4 @@
-//! Invariants that must hold in every millisecond: the checker to run together with a world.
+//! Invariants of every millisecond, and a checker that runs together with a simulation.
 use jtc_bus::{Joint, Request, Target};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
@@ -14,10 +14,10 @@ use motion::{MotionWatch, powered};
 use crate::board::Worked;
 use crate::world::World;
 
-/// Ticks between two frames that take the place of Move.
+/// Ticks between two frames that replace Move.
 const MOVES_BETWEEN: u32 = 3;
 
-/// Checker with the state that it keeps from one millisecond to the next.
+/// Checker with its state from one millisecond to the next.
 #[derive(Clone, Debug)]
 pub struct Invariants {
     state: ControllerState,
@@ -48,7 +48,7 @@ impl Default for Invariants {
 }
 
 impl Invariants {
-    /// Creates a checker for a world that has been running for a while; earlier permissions count.
+    /// Creates a checker for a simulation that has already been running. Commands before that count as permissions for what it does.
     pub fn joining(world: &World) -> Self {
         let t = world.telemetry();
         Self {
@@ -60,12 +60,12 @@ impl Invariants {
         }
     }
 
-    /// Look at the millisecond that has just passed.
+    /// Checks the last millisecond of the simulation.
     pub fn check(&mut self, world: &World) -> Result<(), Violation> {
         self.check_moment(&world.moment())
     }
 
-    /// Look at a millisecond.
+    /// Checks a millisecond.
     pub fn check_moment(&mut self, moment: &Moment<'_>) -> Result<(), Violation> {
         self.look(moment).map_err(|broken| Violation { time_us: moment.time_us, broken })
     }
@@ -76,7 +76,7 @@ impl Invariants {
         }
         let telemetry = moment.telemetry;
         if telemetry.tick <= self.controller_ticks {
-            // A new controller after a reset.
+            // The controller is new after a reset.
             *self = Self::default();
         }
         self.controller_ticks = telemetry.tick;
@@ -136,7 +136,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// J-24: no motion without a command. J-31: the index goes forward.
+    /// Checks J-24, no motion without a command, and J-31, the index does not decrease.
     fn states(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let telemetry = moment.telemetry;
         let (from, to) = (self.state, telemetry.state);
@@ -165,7 +165,7 @@ impl Invariants {
         {
             return Err(Broken::TaughtAlone);
         }
-        // Stop ends the run and goes back to the first point.
+        // Stop ends the run and returns to the first point.
         let executing =
             (self.trajectory, telemetry.trajectory) == (TrajectoryState::Execute, TrajectoryState::Execute);
         let running = (from, to) == (ControllerState::Operate, ControllerState::Operate) && executing;
@@ -175,7 +175,7 @@ impl Invariants {
         Ok(())
     }
 
-    /// J-12, J-13, J-16, J-21 on the bus.
+    /// Checks J-12, J-13, J-16 and J-21 on the bus.
     fn frame(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let state = moment.telemetry.state;
         let Some(frame) = moment.sent else {
@@ -199,7 +199,7 @@ impl Invariants {
                 return Err(Broken::Torque { state, joint: Joint::ALL[joint], torque: torque[joint] });
             }
             let limit = moment.config.joints[joint].torque_max;
-            // A step of the bus' grid may round up.
+            // The resolution of the bus may round up by one step.
             if torque[joint].abs() > limit + 0.02 {
                 return Err(Broken::TorqueLimit { joint: Joint::ALL[joint], torque: torque[joint], limit });
             }

@@ -1,4 +1,4 @@
-//! Answers that reach the controller late: a receiver that is read at odd times.
+//! Answers that reach the controller late, because it reads its receiver at irregular times.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
@@ -6,7 +6,7 @@ use jtc_bus::Frame;
 /// Delays the answers of each millisecond by a random number of ticks.
 #[derive(Clone, Debug)]
 pub struct Jitter {
-    /// The longest delay, ticks.
+    /// Longest delay, ticks.
     pub most_ms: u8,
     rng: fastrand::Rng,
     now: u64,
@@ -15,20 +15,20 @@ pub struct Jitter {
 }
 
 impl Jitter {
-    /// None at all, until [`most_ms`](Self::most_ms) is set.
+    /// Creates a jitter without delay, until [`most_ms`](Self::most_ms) is set.
     pub fn new(seed: u64) -> Self {
         let rng = fastrand::Rng::with_seed(seed ^ 0x6A69_7474);
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
-    /// Handles a tick: the frames of `received` from `first` on came in this millisecond. The frames that are due replace them.
+    /// Processes a tick: the frames of `received` from `first` on arrived in this millisecond. The frames that are due replace them.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {
             return;
         }
         let late = self.rng.u8(0..=self.most_ms);
-        // No answer overtakes an older one.
+        // An answer does not overtake an older one.
         let last = self.waiting.back().map_or(0, |(due, _)| *due);
         self.waiting.push_back(((self.now + u64::from(late)).max(last), received.split_off(first)));
         while self.waiting.front().is_some_and(|(due, _)| *due <= self.now) {
@@ -41,7 +41,7 @@ impl Jitter {
 mod tests {
     use super::*;
 
-    /// All arrive, in order, none later than it may be, and each delay occurs.
+    /// All answers arrive in order and within the limit, and each delay occurs.
     #[test]
     fn answers_are_late_but_none_is_lost_or_overtaken() {
         for most_ms in 0..=3u8 {

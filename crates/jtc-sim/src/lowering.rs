@@ -1,5 +1,5 @@
-//! An arm that is lowered through a pose in which its shoulder carries much of its torque limit, and is stopped there (J-33):
-//! for tests and for the tables of docs/safety.md.
+//! An arm that is lowered through a pose in which its shoulder carries much of its torque limit, and is stopped in this pose (J-33). For
+//! tests, and for the tables of docs/safety.md.
 use jtc_core::{Config, ControllerState, JOINTS, Parameters, TrajectoryState};
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
 use jtc_wire::ExecCommand;
@@ -8,34 +8,34 @@ use crate::config::{ModelError, SimConfig, Support};
 use crate::host;
 use crate::operator::{Operator, OperatorError};
 
-/// The joint that lowers: the shoulder, which carries most.
+/// Joint that lowers the arm: the shoulder, which carries the largest load.
 pub const LOADED: usize = 1;
 /// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 0.01;
-/// The arm is watched until it has stood for this long, ms, or
+/// The observation ends when the arm has stood for this time, ms, or
 const STOOD_MS: u64 = 1_000;
-/// for this long.
+/// after this time, ms.
 const LONGEST_MS: u64 = 10_000;
 
-/// The arm in front of the shoulder, at angles of the shoulder from upright to nearly horizontal.
+/// Returns a pose with the arm in front of the shoulder; the shoulder may be between upright and nearly horizontal.
 fn pose(shoulder: f64) -> JointVec {
     [0.0, shoulder, 0.3, 0.0, 0.0, 0.0]
 }
 
-/// Torque that holds the shoulder at an angle, N·m.
+/// Returns the torque that holds the shoulder at an angle, N·m.
 pub fn holding_torque(model: &ArmModel, shoulder: f64) -> f64 {
     let dynamics = Dynamics::new(model, Config::avena().gravity);
     dynamics.inverse(&pose(shoulder), &[0.0; JOINTS], &[0.0; JOINTS])[LOADED]
 }
 
-/// The default arm with `mass` kg more at the centre of its last link.
+/// Returns the default arm with `mass` kg more at the centre of its last link.
 pub fn with_payload(mass: f64) -> ArmModel {
     let mut model = Parameters::avena().model;
     model.links[JOINTS].mass += mass;
     model
 }
 
-/// The angle of the shoulder, rad, at which holding it takes `torque` (N·m).
+/// Returns the angle of the shoulder, rad, at which its holding torque is `torque` (N·m).
 pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     let (mut high, mut low) = (0.0, -1.4);
     for _ in 0..60 {
@@ -45,16 +45,16 @@ pub fn angle_of(model: &ArmModel, torque: f64) -> f64 {
     low
 }
 
-/// Lowering of the arm through `shoulder`, at which the command comes.
+/// Lowering of the arm through the angle `shoulder`, at which the command is sent.
 #[derive(Clone, Debug)]
 pub struct Lowering {
-    /// The arm.
+    /// Arm.
     pub model: ArmModel,
-    /// Model that the controller is given.
+    /// Model that the controller receives.
     pub known: ArmModel,
     /// Torque limit of the shoulder, N·m.
     pub torque_max: f64,
-    /// Angle of the shoulder at which the command comes, rad.
+    /// Angle of the shoulder at which the command is sent, rad.
     pub shoulder: f64,
     /// Speed at that angle, rad/s.
     pub speed: f64,
@@ -69,11 +69,11 @@ pub struct Lowering {
 /// Result of a lowering.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Longest way of a joint in the half second after every joint was enabled, and before, rad.
+    /// Largest deviation of a joint from the start pose within half a second after every joint was enabled, rad.
     pub sag: f64,
-    /// Time from the last byte of the command until the trajectory state is no longer Execute, ms.
+    /// Time from the last byte of the command until the trajectory state has left Execute, ms.
     pub commanded_ms: u64,
-    /// Until no joint moves, ms.
+    /// Time until no joint moves, ms.
     pub standing_ms: u64,
     /// State at the end.
     pub state: ControllerState,
@@ -83,11 +83,11 @@ pub struct Outcome {
     pub errors: u16,
     /// Internal errors of all joints at the end.
     pub joints: u16,
-    /// Longest way of a joint since the command, rad.
+    /// Largest distance of a joint from its position at the command, rad.
     pub way: f64,
     /// Highest true speed of a joint after the command, rad/s.
     pub peak: f64,
-    /// Largest position error of any joint until the trajectory state is no longer Execute, rad.
+    /// Largest position error of any joint until the trajectory state has left Execute, rad.
     pub error: f64,
 }
 
@@ -100,7 +100,7 @@ impl Lowering {
         Self { torque_max: holding_torque(&model, shoulder) / share, ..Self::new(model, shoulder, speed) }
     }
 
-    /// An arm that the controller knows, with the limit of the default arm, and a Stop.
+    /// Creates a lowering of an arm that the controller knows, with the limit of the default arm, and a Stop.
     pub fn new(model: ArmModel, shoulder: f64, speed: f64) -> Self {
         Self {
             known: model,
@@ -114,7 +114,7 @@ impl Lowering {
         }
     }
 
-    /// The world with the arm on its stand or brakes, above the place, switched on.
+    /// Returns the operator of a simulation that was just switched on, with the arm above the pose of the stop, on its stand or brakes.
     fn operator(&self, from: JointVec) -> Operator {
         let mut controller = Config::avena();
         controller.joints[LOADED].torque_max = self.torque_max;
@@ -128,9 +128,9 @@ impl Lowering {
         })
     }
 
-    /// Lower the arm and stop it.
+    /// Lowers the arm and stops it.
     pub fn run(&self) -> Result<Outcome, OperatorError> {
-        // The quintic passes its middle at 15/8 of the mean speed.
+        // The speed in the middle of the quintic is 15/8 of the mean speed.
         let reach = 0.3;
         let seconds = 15.0 / 8.0 * 2.0 * reach / self.speed;
         let (from, to) = (pose(self.shoulder + reach), pose(self.shoulder - reach));

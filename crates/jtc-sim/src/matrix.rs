@@ -1,5 +1,5 @@
-//! The fault matrix: the reaction of the controller to each fault in each state, and the number of ticks until then, as a
-//! table for the docs.
+//! Fault matrix: the reaction of the controller to each fault in each state, and the number of ticks until the reaction, as a table for the
+//! docs.
 use core::fmt;
 
 mod contact;
@@ -21,12 +21,12 @@ pub use contact::contact_table;
 pub use standstill::standstill_table;
 pub use stopping::stopping_table;
 
-/// Ticks in which a reaction is looked for.
+/// Time in which a reaction is expected, ms.
 const WATCH_MS: u64 = 600;
 /// Pose in which the arm is held, rad.
 const START: [f64; JOINTS] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 
-/// States in which faults are thrown. Start lasts a single tick.
+/// States in which faults are injected. Start lasts a single tick.
 const STATES: [ControllerState; 5] = [
     ControllerState::Init,
     ControllerState::HoldPos,
@@ -38,24 +38,24 @@ const STATES: [ControllerState; 5] = [
 /// Reaction to a fault in a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
-    /// No reaction within the time watched.
+    /// No reaction within the observed time.
     None,
-    /// Another state, or more errors in the same.
+    /// Another state, or more errors in the same state.
     Change {
-        /// State then.
+        /// New state.
         state: ControllerState,
-        /// Error word then.
+        /// New error word.
         errors: u16,
-        /// Internal errors of all joints then.
+        /// New internal errors of all joints.
         joints: u16,
         /// `true` if the state is unchanged: `errors` and `joints` are then the added ones.
         same: bool,
-        /// In which tick, counted from the fault: 1 is the first that can know of it.
+        /// Tick of the reaction, counted from the fault; the controller can detect the fault in tick 1.
         tick: u64,
     },
     /// The watchdog reset the controller.
     Reset {
-        /// After this many ticks that did not come.
+        /// Number of missed ticks before the reset.
         tick: u64,
     },
 }
@@ -102,24 +102,24 @@ fn words(errors: u16, joints: u16) -> Vec<&'static str> {
     [internal, &of(errors, &jtc), &of(joints, &joint)].concat()
 }
 
-/// Reasons why the matrix cannot be made.
+/// Reason why the matrix cannot be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MatrixError {
     /// The state was not reached.
     Operator(OperatorError),
     /// An invariant was broken.
     Invariant(Violation),
-    /// The arm did not come to rest in the time that a pause or stop may take.
+    /// The arm did not come to rest within the time of a pause or stop.
     NoStop {
-        /// Time that it took, ms; `None`: the stop ended in an error, or the motion was not begun.
+        /// Time until the arm stood, ms; `None`: the stop ended in an error, or the motion did not begin.
         ms: Option<u64>,
     },
-    /// The arm was released by a fault in which it can be held.
+    /// The arm was released after a fault in which it can be held.
     Released {
         /// State before.
         state: ControllerState,
     },
-    /// An expected reaction did not come.
+    /// An expected reaction did not occur.
     NoReaction {
         /// Row of the table.
         row: &'static str,
@@ -151,7 +151,8 @@ impl From<OperatorError> for MatrixError {
     }
 }
 
-/// Cell of the matrix: the reaction, and the recovery of the arm after ClearCurrentErrors and, if they were lost, new parameters.
+/// Cell of the matrix: the reaction, and the recovery of the arm after ClearCurrentErrors. If the parameters were lost, they are sent
+/// again.
 struct Cell {
     reaction: Reaction,
     back: Back,
@@ -165,7 +166,7 @@ enum Back {
     Never,
 }
 
-/// The table, as Markdown.
+/// Returns the table as Markdown.
 pub fn fault_matrix() -> Result<String, MatrixError> {
     let mut out = format!(
         "A cell shows which state the controller goes to, in which tick, and why; tick 1 is the first that begins\n\
@@ -222,12 +223,12 @@ fn worse(back: Back) -> u8 {
     }
 }
 
-/// A frame that changes nothing.
+/// Returns a frame that changes nothing.
 fn harmless() -> Vec<u8> {
     host::frame(FrameType::GripperControl, &[0; 4])
 }
 
-/// A world in which the controller is in `state`. `host_timeout_ms`: its supervision of the host (J-59), 0 for none.
+/// Returns a simulation whose controller is in `state`. `host_timeout_ms`: its host supervision (J-59), 0 for none.
 fn world_in(
     state: ControllerState,
     support: Support,
@@ -236,12 +237,12 @@ fn world_in(
     bring_to(config_for(support, host_timeout_ms), state)
 }
 
-/// Returns the configuration of such a world.
+/// Returns the configuration of this simulation.
 fn config_for(support: Support, host_timeout_ms: u16) -> SimConfig {
     let mut config = SimConfig { start: START, baud: None, support, ..SimConfig::default() };
     config.controller.host_timeout_ms = host_timeout_ms;
     for drive in &mut config.drives {
-        // Alignment takes seconds in which nothing else happens.
+        // The motor alignment would take seconds without any other event.
         drive.first_enable_ms = 60;
     }
     config
@@ -257,7 +258,7 @@ fn bring_to(config: SimConfig, state: ControllerState) -> Result<Operator, Opera
     }
     operator.bring_up()?;
     operator.run(200);
-    // A supervised host is present until the fault.
+    // A supervised host sends frames until the fault.
     let run = |operator: &mut Operator, ms: u64| {
         for _ in 0..ms / 50 {
             operator.run(50);
@@ -295,7 +296,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     let mut reaction = Reaction::None;
     for tick in 1..=WATCH_MS {
         if tick % 50 == 1 {
-            // Something for faults of the line to meet; it changes nothing.
+            // A frame for faults of the line to act on; it changes nothing.
             operator.world.host_write(&harmless());
         }
         row.act.before(&mut operator, tick);
@@ -307,9 +308,9 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     Ok(Cell { reaction, back: recover(&mut operator, &mut watch, state)? })
 }
 
-/// Performs the steps of an operator to get the arm held.
+/// Performs the steps with which an operator gets the arm into position hold.
 fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
-    // Init and Error wait for the host anyway.
+    // In Init and Error the controller waits for the host anyway.
     let host_first = matches!(state, ControllerState::Init | ControllerState::Error);
     let held = |operator: &Operator| {
         matches!(
@@ -335,7 +336,7 @@ fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -
     Ok(Back::Never)
 }
 
-/// Values that are compared from tick to tick.
+/// Values that are compared with those of the next tick.
 struct Watch {
     invariants: Invariants,
     state: ControllerState,
@@ -343,7 +344,7 @@ struct Watch {
     resets: u32,
 }
 
-/// Something changed.
+/// Detected change.
 #[derive(Clone, Copy)]
 struct Seen {
     state: ControllerState,
@@ -369,7 +370,7 @@ impl Watch {
         Ok(Self { invariants, state: telemetry.state, errors: telemetry.errors, resets: 0 })
     }
 
-    /// Simulates a millisecond; returns the change in it. The end of a trajectory is not a reaction.
+    /// Simulates a millisecond and returns the change in it. The end of a trajectory is not a reaction.
     fn step(&mut self, operator: &mut Operator) -> Result<Option<Seen>, MatrixError> {
         operator.step();
         self.invariants.check(&operator.world).map_err(MatrixError::Invariant)?;

@@ -1,4 +1,4 @@
-//! A patient operator at the small host: brings the world up, uploads, executes, and waits in virtual time.
+//! Operator with the small host: brings the controller up, uploads, executes, and waits in virtual time.
 use core::fmt;
 
 use jtc_bus::{JOINTS, NodeState};
@@ -9,18 +9,18 @@ use crate::config::SimConfig;
 use crate::host::{self, Listener};
 use crate::world::World;
 
-/// Failed waits of an operator.
+/// Error of an operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OperatorError {
-    /// The world did not get there in time.
+    /// A condition was not fulfilled in time.
     Late {
-        /// Condition that was waited for.
+        /// Expected condition.
         waited_for: &'static str,
         /// Time waited, ms.
         ms: u64,
-        /// State then.
+        /// State at that time.
         state: ControllerState,
-        /// Error word then.
+        /// Error word at that time.
         errors: u16,
     },
     /// A frame was refused.
@@ -43,21 +43,21 @@ impl fmt::Display for OperatorError {
 
 impl std::error::Error for OperatorError {}
 
-/// The operator and the world.
+/// Operator with a simulation.
 pub struct Operator {
-    /// The world.
+    /// Simulation.
     pub world: World,
     /// Data from the device.
     pub listener: Listener,
 }
 
 impl Operator {
-    /// In front of a world that was just switched on.
+    /// Creates an operator for a simulation that was just switched on.
     pub fn new(config: SimConfig) -> Self {
         Self { world: World::new(config), listener: Listener::default() }
     }
 
-    /// State of the controller.
+    /// Returns the state of the controller.
     pub fn state(&self) -> ControllerState {
         self.world.telemetry().state
     }
@@ -68,12 +68,12 @@ impl Operator {
         self.listener.listen(&mut self.world);
     }
 
-    /// Let `ms` pass.
+    /// Simulates `ms` milliseconds.
     pub fn run(&mut self, ms: u64) {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Let time pass until `done`, at most `ms`; `waited_for` names it in the error.
+    /// Simulates until `done` returns true, at most `ms`; `waited_for` names the condition in the error.
     pub fn wait(
         &mut self,
         waited_for: &'static str,
@@ -93,18 +93,18 @@ impl Operator {
         Err(OperatorError::Late { waited_for, ms, state: telemetry.state, errors: telemetry.errors })
     }
 
-    /// Send a frame and wait for its response, which must be without an error.
+    /// Sends a frame and waits for its response, which must be without an error.
     pub fn ask(&mut self, frame: &[u8]) -> Result<(), OperatorError> {
         let response = self.response(frame)?;
         let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;
         if good { Ok(()) } else { Err(OperatorError::Refused(response)) }
     }
 
-    /// Send a frame and wait for its response.
+    /// Sends a frame and waits for its response.
     pub fn response(&mut self, frame: &[u8]) -> Result<Response, OperatorError> {
         self.listener.responses.clear();
         self.world.host_write(frame);
-        // Long frames need their time on the line.
+        // Long frames need time on the line.
         for _ in 0..8_000 {
             self.step();
             if !self.listener.responses.is_empty() {
@@ -120,13 +120,13 @@ impl Operator {
         })
     }
 
-    /// Give the default parameters and wait until every joint is enabled and held.
+    /// Sends the default parameters and waits until every joint is enabled and held.
     pub fn bring_up(&mut self) -> Result<(), OperatorError> {
         self.world.host_write(&host::use_defaults());
         self.wait_for_hold(12_000)
     }
 
-    /// Wait until every joint is enabled and held.
+    /// Waits until every joint is enabled and held.
     pub fn wait_for_hold(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.wait("HoldPos with all joints enabled", ms, |world| {
             world.telemetry().state == ControllerState::HoldPos
@@ -134,7 +134,7 @@ impl Operator {
         })
     }
 
-    /// Send a trajectory; every segment must be accepted.
+    /// Sends a trajectory; every segment must be accepted.
     pub fn upload(&mut self, points: &[RawPoint], step_ms: u16) -> Result<(), OperatorError> {
         for segment in host::trajectory(points, step_ms, 113) {
             self.ask(&segment)?;
@@ -150,13 +150,13 @@ impl Operator {
         })
     }
 
-    /// Clear every error, and wait until the arm is held again.
+    /// Clears all errors, and waits until the arm is held again.
     pub fn recover(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::clear_all())?;
         self.wait_for_hold(15_000)
     }
 
-    /// Teaching on.
+    /// Switches Teaching on.
     pub fn teach(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::frame(FrameType::TeachingModeEnable, &[]))?;
         self.wait("Teaching", 600, |world| world.telemetry().state == ControllerState::Teaching)

@@ -1,5 +1,5 @@
-//! The devices on the joint bus: drives, gripper and the arm that they move. The plant is independent of the controller, which
-//! may be the simulated one of [`World`](crate::World) or any other that sends frames.
+//! Devices on the joint bus: drives, gripper, and the arm that they move. The plant is independent of the controller, which may be the
+//! simulated one of [`World`](crate::World) or any other one that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec, Payload};
@@ -12,10 +12,10 @@ use crate::faults::FaultKind;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
 
-/// Length of a drive's tick and of a step of the arm, s.
+/// Duration of a drive's tick and of a step of the arm, s.
 const TICK: f64 = 1e-3;
 
-/// An answer of a node and how long after the end of the request it is ready, µs.
+/// Answer of a node, with the time from the end of the request until it is ready, µs.
 pub type ReadyAnswer = (u32, Frame);
 
 /// True state of the arm.
@@ -29,7 +29,7 @@ pub struct Truth {
     pub motor: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
-    /// Torque of pushes, of a hand and of walls, N·m.
+    /// Torque of pushes, a hand and walls, N·m.
     pub outside: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
@@ -54,7 +54,7 @@ pub struct Plant {
     pub(crate) nodes: Nodes,
     pub(crate) arm: Arm,
     truth: Truth,
-    /// Torque of pushes and of a hand on the joints, N·m.
+    /// Torque of pushes and a hand on the joints, N·m.
     push: JointVec,
     pub(crate) hand: JointVec,
     model: ArmModel,
@@ -67,7 +67,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// A plant whose power was just switched on.
+    /// Creates a plant that was just switched on.
     pub fn new(config: &SimConfig) -> Self {
         let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
         let ceiling = parts.torque_ceiling;
@@ -95,8 +95,8 @@ impl Plant {
         plant
     }
 
-    /// Handles a frame that has ended on the bus at `now_us`; adds the nodes' answers to `answers`. Ignores answers of nodes
-    /// and frames that are not requests.
+    /// Passes a frame that has ended on the bus at `now_us` to the nodes, and adds their answers to `answers`. Ignores answers of nodes and
+    /// frames that are not requests.
     pub fn receive(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
         let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
@@ -116,20 +116,20 @@ impl Plant {
         bus.tick(now_us, out, &mut self.nodes, received)
     }
 
-    /// Any node is on the bus and acknowledges frames.
+    /// Returns true if any node is on the bus and acknowledges frames.
     pub fn acknowledges(&self) -> bool {
         self.nodes.any_on_bus()
     }
 
-    /// Simulates a millisecond: drives and gripper do their tick, the arm moves. `safety_output`: the controller's safety
-    /// output is at the level that means no error.
+    /// Simulates a millisecond: drives and gripper execute their tick, and the arm moves. `safety_output`: true if the controller's safety
+    /// output has the level for no error.
     pub fn step(&mut self, safety_output: bool) {
         self.step_nodes(safety_output);
         self.step_arm();
     }
 
-    /// Simulates a millisecond of the arm alone: these torques (N·m) act on its joints, within what the drives reach, brakes are open,
-    /// and drives and gripper do nothing. For a controller without a joint bus; NaN counts as no torque.
+    /// Simulates a millisecond of the arm alone, for a controller without a joint bus. These torques (N·m) act on its joints, limited to
+    /// those of the drives. Brakes are open; drives and gripper do nothing. NaN counts as no torque.
     pub fn step_free(&mut self, torque: &JointVec) {
         let ceiling = self.arm.parts().torque_ceiling;
         self.truth.torque = core::array::from_fn(|j| {
@@ -189,7 +189,7 @@ impl Plant {
         self.truth.temperature = self.arm.temperature;
     }
 
-    /// Applies the immediate effect of a fault of a node when it begins; ignores other faults.
+    /// Applies the immediate effect of a fault of a node at its begin; ignores other faults.
     pub fn begin(&mut self, kind: FaultKind) {
         match kind {
             FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
@@ -205,7 +205,7 @@ impl Plant {
         }
     }
 
-    /// Make these faults, as far as they are faults of nodes or of the arm, and no others act.
+    /// Sets the present faults to those of `kinds` that are faults of nodes or of the arm.
     pub fn set_faults(&mut self, kinds: impl Iterator<Item = FaultKind>) {
         let mut drives = [DriveFault::default(); JOINTS];
         let (mut gripper_silent, mut gripper_line) = (false, false);
@@ -259,17 +259,17 @@ impl Plant {
         &self.truth
     }
 
-    /// The arm as it is after model errors.
+    /// Returns the arm after model errors.
     pub fn true_model(&self) -> &ArmModel {
         &self.model
     }
 
-    /// State bytes of joints and gripper (255: no gripper).
+    /// Returns the state bytes of joints and gripper (255: no gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.nodes.states()
     }
 
-    /// Places a part where the gripper can hold it, or removes it (present from the start).
+    /// Places a part under the gripper, or removes it. A part is present from the start.
     pub fn set_part_present(&mut self, present: bool) {
         if let Some(gripper) = &mut self.nodes.gripper {
             gripper.part_present = present;

@@ -1,17 +1,17 @@
-//! Requests as nodes take them off the bus: with any state byte; the controller sends only four of them.
+//! Requests as nodes receive them: with any state byte, although the controller sends only four of them.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
-/// A request that has reached a node.
+/// Request that has reached a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeRequest {
-    /// ChangeFsm: the state byte of each node as it is on the wire.
+    /// ChangeFsm, with the state byte of each node as on the wire.
     ChangeFsm([NodeState; NODES]),
-    /// Every other request.
+    /// Another request.
     Other(Request),
 }
 
 impl NodeRequest {
-    /// The request in a frame; `None` for answers and for frames that mean nothing to nodes.
+    /// Returns the request in a frame; `None` for answers and for frames without a meaning for nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
             // Bytes beyond a short frame read as 0, which requests no change.

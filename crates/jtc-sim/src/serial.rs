@@ -1,39 +1,38 @@
-//! The serial line to the host: two directions, each as slow as its baud rate, with faults on the way to the
-//! device.
+//! Serial line to the host: two directions at the baud rate, with faults in the direction to the device.
 use std::collections::VecDeque;
 
-/// Picoseconds in a microsecond: at that resolution a byte's time at any usual rate is exact enough for days.
+/// Picoseconds in a microsecond. With this resolution the time of a byte at any usual rate is exact enough for days.
 const PS_PER_US: u64 = 1_000_000;
 
-/// A direction of the line.
+/// Direction of the line.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Time of a byte (10 bits), ps; 0: no throttling.
+    /// Duration of a byte (10 bits), ps; 0: no delay.
     byte_ps: u64,
     queue: VecDeque<u8>,
     /// Time at which the first byte of the queue has arrived, ps.
     front_ps: u64,
-    /// Bytes that have arrived.
+    /// Number of bytes that have arrived.
     pub carried: u64,
 }
 
 impl Line {
-    /// `baud`: bit/s, 8N1; `None`: a byte takes no time.
+    /// Creates a direction. `baud`: bit/s, 8N1; `None`: bytes arrive without delay.
     pub fn new(baud: Option<u32>) -> Self {
         let byte_ps = baud.map_or(0, |rate| 10_000_000_000_000 / u64::from(rate.max(1)));
         Self { byte_ps, queue: VecDeque::new(), front_ps: 0, carried: 0 }
     }
 
-    /// Puts bytes on the line at `now_us`, after those that wait already.
+    /// Puts bytes on the line at `now_us`, after the waiting ones.
     pub fn write(&mut self, now_us: u64, bytes: &[u8]) {
         if self.queue.is_empty() {
-            // The last byte may have ended within the millisecond: the transmitter was idle since.
+            // The last byte may have ended within the millisecond, and the transmitter has been idle since.
             self.front_ps = now_us * PS_PER_US + self.byte_ps;
         }
         self.queue.extend(bytes);
     }
 
-    /// Move the bytes that have arrived by `now_us` into `out`, but never more than `most`.
+    /// Moves at most `most` bytes that have arrived by `now_us` into `out`.
     pub fn arrived(&mut self, now_us: u64, most: usize, out: &mut Vec<u8>) {
         let now_ps = now_us * PS_PER_US;
         if self.queue.is_empty() || self.front_ps > now_ps {
@@ -49,7 +48,7 @@ impl Line {
         self.carried += count as u64;
     }
 
-    /// Bytes not yet at the other end.
+    /// Returns the number of bytes that have not arrived yet.
     pub fn pending(&self) -> usize {
         self.queue.len()
     }
@@ -65,14 +64,14 @@ impl Line {
     }
 }
 
-/// Faults of a line at the moment.
+/// Present faults of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFault {
-    /// Share of bytes that vanish, 0..1.
+    /// Share of bytes that are lost, 0..1.
     pub lost: f64,
     /// Share of bytes with a flipped bit, 0..1.
     pub flipped: f64,
-    /// Bytes are held back until this is over.
+    /// `true` if bytes are delayed until the fault ends.
     pub held: bool,
 }
 

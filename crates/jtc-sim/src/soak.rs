@@ -1,4 +1,4 @@
-//! Hours of virtual time with random commands and faults, every millisecond checked: the soak run.
+//! Soak run: hours of virtual time with random commands and faults, with a check of every millisecond.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryState};
 use jtc_dynamics::JointVec;
@@ -15,8 +15,8 @@ use crate::world::{Statistics, World};
 /// Step time of the paths, ms.
 pub const PATH_STEP_MS: u16 = 10;
 
-/// A path of the soak run: from `from` (rad) to somewhere near and back, drawn from the seed. All of them pass the check of the
-/// host (`jtc traj check`), so that a stop on them must come to its end in time.
+/// Returns a path of the soak run, drawn from the seed: from `from` (rad) to a near position and back. All paths pass the check of the host
+/// (`jtc traj check`), so a stop on them must end in time.
 pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let to = from.map(|q| (q + 1.2 * (rng.f64() - 0.5)).clamp(-1.4, 1.4));
@@ -28,21 +28,21 @@ pub fn path(from: &JointVec, seed: u64) -> Vec<RawPoint> {
 pub struct SoakReport {
     /// Virtual time, s.
     pub seconds: f64,
-    /// Times that each state was entered.
+    /// Number of times that each state was entered.
     pub entered: [u64; 6],
     /// Milliseconds in each state.
     pub spent_ms: [u64; 6],
-    /// Trajectories run to their end.
+    /// Number of finished trajectories.
     pub finished: u64,
-    /// Faults thrown in.
+    /// Number of injected faults.
     pub faults: u64,
     /// Milliseconds with a torque at its limit.
     pub limited_ms: u64,
-    /// Commands sent.
+    /// Number of sent commands.
     pub commands: u64,
-    /// Counted by the world.
+    /// Counters of the simulation.
     pub statistics: Statistics,
-    /// The invariant that was broken; the run ends there.
+    /// Invariant that was broken, which ends the run.
     pub violation: Option<Violation>,
 }
 
@@ -89,14 +89,14 @@ pub struct Soak {
     report: SoakReport,
     state: ControllerState,
     trajectory: TrajectoryState,
-    /// Time of the next command and of the next fault, ms.
+    /// Time of the next command, ms; the next field is that of the next fault.
     next_command: u64,
     next_fault: u64,
     now: u64,
 }
 
 impl Soak {
-    /// A world that differs with the seed: model errors, drives, line rate, start pose.
+    /// Creates a simulation that depends on the seed: model errors, drives, line rate, start pose.
     pub fn new(seed: u64) -> Self {
         let mut rng = fastrand::Rng::with_seed(seed ^ 0x736F_616B);
         let mut config = SimConfig { seed, log_entries: 200, ..SimConfig::default() };
@@ -104,7 +104,7 @@ impl Soak {
         config.baud = [Some(115_200), Some(921_600), Some(3_000_000), None][rng.usize(0..4)];
         config.support = if rng.u8(0..8) == 0 { Support::None } else { Support::Brakes };
         config.gripper = true;
-        // Alignment times that leave time for other things.
+        // Alignment times that leave time for other events.
         let quick = rng.bool();
         let mut drive = if rng.u8(0..3) == 0 { DriveConfig::older() } else { DriveConfig::default() };
         drive.first_enable_ms = if quick { 300 } else { 4000 };
@@ -124,7 +124,7 @@ impl Soak {
         }
     }
 
-    /// Let `ms` pass; false when an invariant was broken.
+    /// Simulates `ms` milliseconds; returns false if an invariant was broken.
     pub fn run(&mut self, ms: u64) -> bool {
         for _ in 0..ms {
             if self.report.violation.is_some() {
@@ -144,12 +144,12 @@ impl Soak {
         }
     }
 
-    /// Forgets the log of the flight recorder.
+    /// Clears the log of the flight recorder.
     pub fn clear_log(&mut self) {
         self.world.clear_log();
     }
 
-    /// Returns the world, to analyse a violation.
+    /// Returns the simulation, to analyse a violation.
     pub fn world(&self) -> &World {
         &self.world
     }
@@ -183,7 +183,7 @@ impl Soak {
         }
     }
 
-    /// Sends a command: mostly a sensible one in the present state, sometimes any.
+    /// Sends a command: mostly one that makes sense in the present state, sometimes any.
     fn command(&mut self) {
         let waiting = self.world.host_write_pending() > 0;
         self.next_command = self.now + self.rng.u64(5..1500);
@@ -216,7 +216,7 @@ impl Soak {
         }
     }
 
-    /// Returns a motion from the present position to a near one and back, in one trajectory.
+    /// Returns a trajectory from the present position to a near one and back.
     fn motion(&mut self) -> Vec<u8> {
         let from = self.world.telemetry().joints.map(|j| j.position);
         host::trajectory(&path(&from, self.rng.u64(..)), PATH_STEP_MS, 113).concat()
@@ -249,7 +249,7 @@ impl Soak {
             7 => host::frame(FrameType::FrictionTableUseDefault, &[]),
             8 => host::frame(FrameType::FrictionPolynomialUseDefault, &[]),
             _ => {
-                // A good frame with a flipped bit.
+                // A valid frame with a flipped bit.
                 let mut bytes = host::exec(ExecCommand::Execute);
                 let at = rng.usize(0..bytes.len());
                 bytes[at] ^= 1 << rng.u8(0..8);
@@ -285,7 +285,7 @@ impl Soak {
             17 => FaultKind::SerialFlipped { probability: small },
             18 => FaultKind::SerialDelayed,
             19 => FaultKind::TickOverrun,
-            // Most are weak, some stronger than any torque limit.
+            // Most pushes are weak, some are stronger than any torque limit.
             _ => FaultKind::Push { joint, torque: PUSH_MAX * (2.0 * rng.f64() - 1.0).powi(3) },
         };
         // Short and long ones.

@@ -1,4 +1,4 @@
-//! Connects the simulated joint bus to a bus that others can join: they see every frame, and their frames take part.
+//! Connects the simulated joint bus to another bus: its members see every frame, and their frames take part in the simulation.
 use core::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, Id};
@@ -6,34 +6,34 @@ use jtc_bus::Frame;
 
 use crate::world::World;
 
-/// Frames taken from the other side in one millisecond.
+/// Largest number of frames that are taken from the other bus in one millisecond.
 const MOST: usize = 32;
 
-/// A tap on the joint bus of a world.
+/// Tap on the joint bus of a simulation.
 pub struct BusTap<B> {
     bus: B,
-    /// Frames given to the other side.
+    /// Number of frames sent to the other bus.
     pub sent: u64,
-    /// Frames taken from the other side.
+    /// Number of frames taken from the other bus.
     pub taken: u64,
-    /// Frames of the other side that cannot be on this bus, or found no room.
+    /// Number of frames of the other bus that are not valid on this bus, or that it could not take.
     pub refused: u64,
 }
 
 impl<B: CanBus> BusTap<B> {
-    /// Tie `bus` to a world.
+    /// Connects `bus` to a simulation.
     pub fn new(bus: B) -> Self {
         Self { bus, sent: 0, taken: 0, refused: 0 }
     }
 
-    /// Call after each `World::step`: sends the frames of the simulated bus, and takes frames of others, which are
-    /// carried in the next millisecond.
+    /// Sends the frames of the simulated bus, and takes frames of other members, which are carried in the next millisecond. Must be called
+    /// after each `World::step`.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;
             let converted =
                 Id::standard(u32::from(frame.id)).and_then(|id| CanFrame::fd_padded(id, frame.data()));
-            // Every frame of the joint bus has such an id and length.
+            // Every frame of the joint bus has an id and a length that can be converted.
             let Ok(converted) = converted else { continue };
             self.bus.send(&converted)?;
             self.sent += 1;

@@ -1,4 +1,4 @@
-//! Events that a person types while a simulation runs: `push 3 12 0.5`, `hand FILE`.
+//! Events that a user types while a simulation runs: `push 3 12 0.5`, `hand FILE`.
 use core::fmt;
 
 use jtc_bus::{JOINTS, Joint};
@@ -7,24 +7,24 @@ use jtc_bus::{JOINTS, Joint};
 pub const TYPED_EVENTS_HELP: &str =
     "push JOINT TORQUE_NM SECONDS (as in `push 3 12 0.5`), hand FILE (as in `hand lead.csv`)";
 
-/// Strongest push, N·m.
+/// Largest push, N·m.
 pub(crate) const PUSH_MAX: f64 = 400.0;
 /// Longest push, s.
 const PUSH_MAX_S: f64 = 60.0;
 
-/// Something that was typed.
+/// Typed event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TypedEvent {
-    /// Someone pushes.
+    /// Push on a joint.
     Push {
         /// Joint.
         joint: Joint,
-        /// N·m in the joint's positive direction.
+        /// Torque in the joint's positive direction, N·m.
         torque: f64,
-        /// s.
+        /// Duration, s.
         seconds: f64,
     },
-    /// A hand leads the arm along the joint positions of a trajectory file, while it is taught.
+    /// Hand that leads the arm along the joint positions of a trajectory file, while the arm is taught.
     Hand {
         /// Name as typed.
         file: String,
@@ -45,9 +45,9 @@ impl fmt::Display for TypedEvent {
 /// Reasons why a typed line is not an event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TypedEventError {
-    /// The event does not exist.
+    /// Unknown event.
     Unknown(String),
-    /// A push has three words after its name.
+    /// Wrong number of words of a push, which has three after its name.
     PushWords(usize),
     /// Invalid word of a push, as typed, and its allowed range.
     Value {
@@ -55,10 +55,10 @@ pub enum TypedEventError {
         what: &'static str,
         /// Word as typed.
         word: String,
-        /// Smallest and largest.
+        /// Smallest and largest allowed value.
         allowed: (f64, f64),
     },
-    /// A hand without a file.
+    /// Hand without a file.
     NoFile,
 }
 
@@ -84,7 +84,7 @@ impl fmt::Display for TypedEventError {
 impl std::error::Error for TypedEventError {}
 
 impl TypedEvent {
-    /// The event of a line; `None` for an empty line or a comment (`#`).
+    /// Returns the event of a line; `None` for an empty line or a comment (`#`).
     pub fn parse(line: &str) -> Result<Option<Self>, TypedEventError> {
         let line = line.trim();
         let (name, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));

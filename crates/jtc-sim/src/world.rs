@@ -1,4 +1,4 @@
-//! The whole world, one millisecond at a time: host line, controller, joint bus, drives, arm.
+//! The complete simulation in steps of one millisecond: host line, controller, joint bus, drives, arm.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::{BusState, ControllerState};
 use jtc_wire::FrameType;
@@ -18,10 +18,10 @@ mod exchange;
 pub use access::Statistics;
 pub use exchange::Exchange;
 
-/// Length of a tick, µs.
+/// Duration of a tick, µs.
 const TICK_US: u64 = 1000;
 
-/// The simulated world.
+/// Simulation of a controller with its arm.
 pub struct World {
     config: SimConfig,
     ticks: u64,
@@ -29,10 +29,10 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Time with which the board measures silence on its line, and the time of the last byte, µs.
+    /// Time by which the board measures silence on its line, µs; the next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Longest silence on the line, µs; `None`: as long as in virtual time.
+    /// Longest silence on the line, µs; `None`: as in virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -54,11 +54,11 @@ pub struct World {
     good_frames: u64,
     bad_frames: u64,
     log: Log,
-    /// Inputs and outputs of the board, if they are watched.
+    /// Inputs and outputs of the board, if they are recorded.
     exchange: Option<Box<Exchange>>,
 }
 
-/// Controller state that was logged last.
+/// State of the controller in the last log entries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     state: ControllerState,
@@ -67,7 +67,7 @@ struct Seen {
 }
 
 impl World {
-    /// A world in which all power was just switched on.
+    /// Creates a simulation that was just switched on.
     pub fn new(config: SimConfig) -> Self {
         let plant = Plant::new(&config);
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
@@ -129,7 +129,7 @@ impl World {
         self.note();
     }
 
-    /// Faults that begin or end now.
+    /// Begins and ends faults.
     fn step_faults(&mut self) {
         let telemetry = self.board.telemetry();
         let (state, point) = (telemetry.state, telemetry.point);
@@ -159,10 +159,10 @@ impl World {
         }
     }
 
-    /// The hand's pull of this millisecond.
+    /// Applies the hand's pull of this millisecond.
     fn lead_by_hand(&mut self) {
         let Some(hand) = &mut self.hand else { return };
-        // Closed brakes do not yield to a hand: it waits until every drive is enabled.
+        // Closed brakes do not yield to a hand, so it waits until every drive is enabled.
         let free = self.plant.node_states()[..JOINTS] == [NodeState::ENABLED; JOINTS];
         let teaching = free && self.board.telemetry().state == ControllerState::Teaching;
         let truth = self.plant.truth();
@@ -173,7 +173,7 @@ impl World {
         }
     }
 
-    /// Make the faults at work, and no others, act.
+    /// Applies the present faults, and no others.
     fn apply_faults(&mut self) {
         let mut bus = BusFault::default();
         let mut line = LineFault::default();
@@ -191,7 +191,7 @@ impl World {
                 FaultKind::SerialFlipped { probability } => line.flipped = probability,
                 FaultKind::SerialDelayed => line.held = true,
                 FaultKind::TickOverrun => self.overrun = true,
-                // The others are the plant's.
+                // The other faults are applied by the plant.
                 _ => {}
             }
         }
@@ -200,7 +200,7 @@ impl World {
         self.plant.set_faults(self.faults.active());
     }
 
-    /// Bytes from the host reach the parser.
+    /// Passes bytes from the host to the parser.
     fn receive(&mut self) {
         let now = self.now_us();
         let mut fresh = Vec::new();
@@ -211,7 +211,7 @@ impl World {
             }
         }
         if let Some(most) = self.silence_us.filter(|_| self.to_device.is_idle()) {
-            // The time never goes back.
+            // The time never decreases.
             let before = self.line_us.saturating_sub(TICK_US).max(self.heard_us);
             self.line_us = self.line_us.min(self.heard_us.saturating_add(most)).max(before);
         }
@@ -219,7 +219,7 @@ impl World {
             self.heard_us = self.line_us;
         }
         if let Some(exchange) = &mut self.exchange {
-            // The pin keeps its level if no tick comes.
+            // The pin keeps its level without a tick.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }

@@ -1,13 +1,13 @@
-//! Gears that yield: between a motor and its link there is a spring with damping.
+//! Elastic gears: a spring with damping between a motor and its link.
 //!
-//! The motor's side has friction, the brake, the drive's torque and most of the rotor's inertia; pushes, hands, walls and end stops
-//! act on the link. Positions and speeds of the motor are seen through the gear, as all of a joint's numbers are.
+//! Friction, the brake, the drive's torque and most of the rotor's inertia act on the motor's side. Pushes, hands, walls and end stops act
+//! on the link. Positions and speeds of the motor are given at the joint, through the gear.
 use jtc_dynamics::{JOINTS, JointVec};
 
 use super::{Arm, BRAKED, LIGHTEST, along, braked};
 
-/// Part of the rotor's inertia that turns with the link, as the output of a gear does, kg·m²: without it a light last link would swing
-/// too fast for any step. A rotor has at least twice as much.
+/// Part of the rotor's inertia that turns with the link, like the output of a gear, kg·m². Without it a light last link would vibrate too
+/// fast for any step. A rotor has at least twice this inertia.
 pub(super) const OUTPUT: f64 = 0.01;
 /// Damping over stiffness of a gear with known stiffness and unknown damping, s.
 const DAMPING_TIME: f64 = 5e-4;
@@ -22,18 +22,18 @@ pub struct Gear {
 }
 
 impl Gear {
-    /// A gear that does not yield.
+    /// Rigid gear.
     pub const RIGID: Self = Self { stiffness: f64::INFINITY, damping: 0.0 };
-    /// Smallest and largest stiffness that the simulator's options take, N·m/rad.
+    /// Smallest and largest stiffness that the simulator's options accept, N·m/rad.
     pub const STIFFNESS: (f64, f64) = (100.0, 1e6);
 
-    /// A gear of this stiffness (N·m/rad) with a damping of 0.0005 s times the stiffness: a joint that swings with 30 Hz on it has 5 %
-    /// of the critical damping.
+    /// Creates a gear of this stiffness (N·m/rad) with a damping of 0.0005 s times the stiffness. A joint that vibrates at 30 Hz on it has
+    /// 5 % of the critical damping.
     pub fn new(stiffness: f64) -> Self {
         Self { stiffness, damping: if stiffness.is_finite() { DAMPING_TIME * stiffness } else { 0.0 } }
     }
 
-    /// Returns `true` if the gear yields.
+    /// Returns `true` if the gear is elastic.
     pub fn is_elastic(&self) -> bool {
         self.stiffness.is_finite()
     }
@@ -45,7 +45,7 @@ impl Default for Gear {
     }
 }
 
-/// Positions and velocities of links and motors: a state, or how fast it changes.
+/// Positions and velocities of links and motors, or their derivatives.
 #[derive(Clone, Copy)]
 struct Sides {
     q: JointVec,
@@ -71,13 +71,13 @@ struct Drives<'a> {
     torque: &'a JointVec,
     /// Torques on the links, N·m.
     outside: &'a JointVec,
-    /// Inertias that turn with the motors and with the links, kg·m². A rigid gear has all at its link.
+    /// Inertias that turn with the motors and with the links, kg·m². With a rigid gear all of the inertia turns with the link.
     motor: &'a JointVec,
     link: &'a JointVec,
 }
 
 impl Arm {
-    /// A sub-step with motors and links apart; brakes are at the motors.
+    /// Simulates a sub-step with separate motors and links. Brakes act on the motors.
     pub(super) fn elastic_substep(
         &mut self,
         tau: &JointVec,
@@ -112,7 +112,7 @@ impl Arm {
         self.elastic_runge_kutta(&drives, damped, dt);
     }
 
-    /// Torque of the spring on the link, N·m; 0 in a rigid gear.
+    /// Returns the torque of the spring on the link, N·m; 0 for a rigid gear.
     fn gear_torque(&self, j: usize) -> f64 {
         let gear = &self.parts.gears[j];
         if gear.is_elastic() {
@@ -122,7 +122,7 @@ impl Arm {
         }
     }
 
-    /// Like `runge_kutta` of rigid gears, with the motors as bodies of their own.
+    /// Like `runge_kutta` for rigid gears, with the motors as separate bodies.
     fn elastic_runge_kutta(&mut self, drives: &Drives<'_>, damped: f64, dt: f64) {
         let start = Sides { q: self.q, qd: self.qd, motor: self.motor, motor_speed: self.motor_speed };
         let (z0, half) = (self.bristles, 0.5 * dt);

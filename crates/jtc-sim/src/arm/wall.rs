@@ -4,15 +4,15 @@ use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
 use super::{Arm, SimArm};
 
-/// A wall this near counts as touched when the length of the steps is chosen, m or rad.
+/// Distance below which a wall counts as touched when the number of sub-steps is chosen, m or rad.
 const NEAR: f64 = 0.01;
 
 /// Side of an angle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Angles greater than it.
+    /// Angles greater than the given one.
     Above,
-    /// Angles less than it.
+    /// Angles less than the given one.
     Below,
 }
 
@@ -22,13 +22,12 @@ impl core::fmt::Display for Side {
     }
 }
 
-/// Flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the speed inwards, and
-/// never less than 0.
+/// Flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the inward speed, and at least 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wall {
-    /// A plane that the origin of the flange meets.
+    /// Plane that the origin of the flange touches.
     Plane {
-        /// A point of the surface in the base frame, m.
+        /// Point of the surface in the base frame, m.
         position: [f64; 3],
         /// Direction out of the wall in the base frame, of any length but 0.
         normal: [f64; 3],
@@ -37,9 +36,9 @@ pub enum Wall {
         /// N·s/m.
         damping: f64,
     },
-    /// An angle that a joint meets.
+    /// Angle that a joint touches.
     Joint {
-        /// Which.
+        /// Joint.
         joint: Joint,
         /// Angle at which the wall begins, rad.
         angle: f64,
@@ -52,32 +51,32 @@ pub enum Wall {
     },
 }
 
-/// Place of a wall.
+/// Surface of a wall.
 #[derive(Clone, Debug)]
 enum Surface {
     Plane {
         normal: [f64; 3],
-        /// Place of the surface along the normal, m.
+        /// Position of the surface along the normal, m.
         offset: f64,
-        /// The arm under a gravity of 1 m/s² into the wall: it knows the torques of a force along the normal at the flange.
+        /// Arm in a gravity of 1 m/s² into the wall. It gives the joint torques of a force along the normal at the flange.
         pulled: Box<Dynamics>,
     },
     Joint {
         index: usize,
-        /// 1: it pushes to greater angles.
+        /// Direction of the push: 1 to greater angles, −1 to smaller ones.
         sign: f64,
         angle: f64,
     },
 }
 
-/// A wall in contact with an arm, or out of it.
+/// Wall with its state, in contact with the arm or not.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     wall: Wall,
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// Distance by which the surface is set back from its place, m or rad.
+    /// Distance of the surface behind its configured position, m or rad.
     recess: f64,
 }
 
@@ -88,15 +87,15 @@ struct Touch {
 }
 
 impl Touch {
-    /// Speed out of the wall, m/s or rad/s.
+    /// Returns the speed out of the wall, m/s or rad/s.
     fn speed(&self, qd: &JointVec) -> f64 {
         self.torques.iter().zip(qd).map(|(g, v)| g * v).sum()
     }
 }
 
 impl Contact {
-    /// `dynamics` computes the flange of the arm at `q`. A wall that would begin inside the arm begins at its surface, and goes to its own
-    /// place as the arm leaves: no wall throws an arm.
+    /// Creates the state of a wall; `dynamics` computes the flange of the arm at `q`. A wall that would begin inside the arm begins at the
+    /// surface of the arm, and moves to its configured position as the arm leaves. So no wall throws an arm.
     pub fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
         let (surface, stiffness, damping) = match wall {
             Wall::Plane { position, normal, stiffness, damping } => {
@@ -146,8 +145,8 @@ impl Contact {
         }
     }
 
-    /// Returns the increase of the square of the highest natural frequency (1/s²) and of the fastest decay (1/s) by the wall, for an arm
-    /// that may touch it within `dt`; 0 if the arm is far. `mobility`: acceleration of the joints by torques.
+    /// Returns the increases by the wall of the square of the highest natural frequency (1/s²) and of the fastest decay (1/s), if the arm
+    /// may touch the wall within `dt`; otherwise 0. `mobility` returns the acceleration of the joints by torques.
     pub fn rates(
         &self,
         dynamics: &Dynamics,
@@ -165,7 +164,7 @@ impl Contact {
         (self.stiffness * inverse_mass, self.damping * inverse_mass)
     }
 
-    /// Lets a surface that is set back from its place follow the arm after a move.
+    /// Moves a surface that is not at its configured position after the arm.
     pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
@@ -174,21 +173,21 @@ impl Contact {
 }
 
 impl Arm {
-    /// Torques of the walls' forces at `q`, `qd` (N·m) are added to `sum`.
+    /// Adds the torques of the walls' forces at `q`, `qd` (N·m) to `sum`.
     pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
         for contact in &self.contacts {
             contact.push(&self.dynamics, q, qd, damped, sum);
         }
     }
 
-    /// Torques of the walls on the joints, N·m.
+    /// Returns the torques of the walls on the joints, N·m.
     pub fn wall_torque(&self) -> JointVec {
         let mut sum = [0.0; JOINTS];
         self.push_of_walls(&self.q, &self.qd, 1.0, &mut sum);
         sum
     }
 
-    /// Sets the walls; walls that are present already stay unchanged, others are removed.
+    /// Sets the walls. Walls that are already present stay unchanged, others are removed.
     pub fn set_walls(&mut self, walls: &[Wall]) {
         let mut known = core::mem::take(&mut self.contacts);
         for &wall in walls {

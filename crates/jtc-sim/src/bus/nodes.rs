@@ -8,25 +8,25 @@ use crate::request::NodeRequest;
 
 /// Time from the end of a request to the first ready answer, and from each answer to the next, µs.
 pub(super) const ANSWER_US: (u32, u32) = (38, 6);
-/// Bytes of the gripper's answer to Move.
+/// Length of the gripper's answer to Move, bytes.
 const GRIPPER_ANSWER: usize = 20;
 
-/// The seven nodes.
+/// All seven nodes.
 #[derive(Clone, Debug)]
 pub struct Nodes {
-    /// Base to wrist.
+    /// Drives from the base to the wrist.
     pub drives: [Drive; JOINTS],
     /// Node 6; `None`: not installed.
     pub gripper: Option<Gripper>,
 }
 
 impl Nodes {
-    /// Any node acknowledges frames.
+    /// Returns true if any node acknowledges frames.
     pub fn any_on_bus(&self) -> bool {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
-    /// Returns the states of the nodes; Fault if there is no gripper.
+    /// Returns the states of the nodes; without a gripper its state is Fault.
     pub fn states(&self) -> [NodeState; NODES] {
         let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
@@ -43,7 +43,7 @@ impl Nodes {
         let answer = self.receive(node, now_us, request)?;
         let mut frame = answer.emit(*scales.get(node).unwrap_or(&scales[0]));
         if matches!(answer, Answer::Gripper(_)) {
-            // Real grippers send 20 bytes; the last of them have no meaning.
+            // Real grippers send 20 bytes; the last bytes have no meaning.
             let mut data = [0; GRIPPER_ANSWER];
             let len = frame.data().len().min(GRIPPER_ANSWER);
             data[..len].copy_from_slice(&frame.data()[..len]);

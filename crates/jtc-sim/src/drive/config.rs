@@ -3,41 +3,41 @@
 /// Side of the gear.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EncoderPlace {
-    /// The motor's, seen through the gear.
+    /// Motor's side, seen through the gear.
     #[default]
     Motor,
-    /// The link's.
+    /// Link's side.
     Link,
 }
 
 /// Properties that differ between drives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveConfig {
-    /// Silence after power-up and reset, ms.
+    /// Time without answers after power-up and reset, ms.
     pub boot_ms: u32,
-    /// Motor alignment at the first enable after a reset, ms.
+    /// Duration of the first enable after a reset, with the motor alignment, ms.
     pub first_enable_ms: u32,
-    /// Later enables, ms.
+    /// Duration of later enables, ms.
     pub enable_ms: u32,
-    /// Rest of the motor control after a stop, ms.
+    /// Pause of the motor control after a stop, ms.
     pub rest_ms: u32,
-    /// Speed at 32767, rad/s: 2.0, older drives 6.283185.
+    /// Speed at the raw value 32767, rad/s: 2.0, for older drives 6.283185.
     pub velocity_full_scale: f64,
-    /// Measured speed that trips, rad/s, either way. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times the default
-    /// arm's velocity limit; [`SimConfig::new`](crate::SimConfig::new) sets each joint's to 1.2 times its limit.
+    /// Measured speed at which the drive trips, rad/s, in both directions. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times
+    /// the default arm's velocity limit. [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the limit of each joint.
     pub over_speed: f64,
-    /// Side of the gear at which the position is read; the speed is always the motor's. The side matters only for gears that yield.
+    /// Side of the gear at which the position is measured; the speed is always that of the motor. It matters only for elastic gears.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
-    /// Torque at the joint over the requested torque, which the drive reports as delivered. Known drives: about 1/1.3.
+    /// Torque at the joint divided by the requested torque, which the drive reports as delivered. Known drives: about 1/1.3.
     pub delivers: f64,
-    /// The drive takes one message per interrupt: after back-to-back requests it is one message late for good.
+    /// `true` if the drive takes one message per interrupt. After two consecutive requests it then stays one message late.
     pub one_message_per_interrupt: bool,
-    /// ChangeFsm is executed in the interrupt and answered with the transition's code; else with the state
-    /// before.
+    /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise it answers with the
+    /// previous state.
     pub answers_transition: bool,
-    /// Answers to Move have 20 bytes; else 16.
+    /// `true` if answers to Move have 20 bytes, otherwise 16.
     pub long_answers: bool,
 }
 
@@ -61,10 +61,10 @@ impl Default for DriveConfig {
 }
 
 impl DriveConfig {
-    /// Smallest and largest speed of the trip that the simulator's options take, rad/s.
+    /// Smallest and largest over-speed limit that the simulator's options accept, rad/s.
     pub const OVER_SPEED: (f64, f64) = (0.01, 100.0);
 
-    /// The firmware before the present one: other speed scale, short answers, one message per interrupt.
+    /// Returns the properties of the firmware before the present one: other speed scale, short answers, one message per interrupt.
     pub fn older() -> Self {
         Self {
             velocity_full_scale: 6.283185,
@@ -76,21 +76,21 @@ impl DriveConfig {
     }
 }
 
-/// Effects of faults on a drive at the moment.
+/// Present effects of faults on a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveFault {
-    /// The node is off the bus; its motor goes on.
+    /// `true` if the node is off the bus; its motor continues.
     pub silent: bool,
     /// Motor-control fault bits.
     pub motor_control: u8,
-    /// The gate driver reports a fault.
+    /// `true` if the gate driver reports a fault.
     pub hardware: bool,
     /// Offset of the encoder reading, rad.
     pub encoder_offset: f64,
-    /// The position is reported as not accurate.
+    /// `true` if the position is reported as not accurate.
     pub not_accurate: bool,
-    /// The safety line is at the level that means danger.
+    /// `true` if the safety line is at the level that means danger.
     pub safety_line: bool,
-    /// Requests for another state are answered and have no effect.
+    /// `true` if requests for another state are answered and have no effect.
     pub ignores_state: bool,
 }

@@ -1,19 +1,19 @@
-//! The sensors of a drive: a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and a late speed from the motor's own
-//! encoder.
+//! Sensors of a drive: a coarse absolute encoder at the joint ([`EncoderPlace`](super::EncoderPlace)), and a delayed speed from the motor's
+//! own encoder.
 
-/// Full turns of the 16-bit absolute encoder.
+/// Counts per turn of the 16-bit absolute encoder.
 const ENCODER_COUNTS: f64 = 65_536.0;
-/// rad at 32768 encoder counts as the bus scales positions.
+/// Position of 32768 encoder counts on the scale of the bus, rad.
 const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
 /// Counts of the motor's incremental encoder per radian of the joint, with the gear ratio of 121.
 const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
-/// Encoder differences of 1 ms that the speed is the mean of.
+/// Number of encoder differences of 1 ms in the mean for the speed.
 const SPEED_WINDOW: usize = 10;
 
-/// Both encoders.
+/// Both encoders of a drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Encoders {
-    /// Motor encoder of the last ticks, counts: a ring.
+    /// Ring with the motor encoder of the last ticks, counts.
     history: [i64; SPEED_WINDOW],
     oldest: usize,
 }
@@ -28,7 +28,7 @@ impl Encoders {
         (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001)
     }
 
-    /// Position of a joint at `q` (rad) as the absolute encoder reads it, rad. Whole turns are lost.
+    /// Returns the position of a joint at `q` (rad) as the absolute encoder reads it, rad. Whole turns are lost.
     pub fn position(&self, q: f64) -> f64 {
         let turns = q / core::f64::consts::TAU;
         let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
@@ -36,7 +36,8 @@ impl Encoders {
     }
 }
 
-/// Returns the next whole number below; `f64::floor` is a call if the processor's own instruction may not be used.
+/// Returns the largest whole number that is not above `x`; `f64::floor` is a function call if the processor's own instruction may not be
+/// used.
 pub(super) fn floor(x: f64) -> i64 {
     let near = x as i64;
     near - i64::from(near as f64 > x)

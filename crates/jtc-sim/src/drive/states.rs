@@ -1,29 +1,29 @@
-//! The state machine of a drive: requests stay pending until a transition erases them, and enabling takes its time.
+//! State machine of a drive. A request stays pending until a transition erases it, and enabling takes time.
 use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// Transitions that generations of drives number differently, as this one does.
+/// Transitions whose numbers differ between generations of drives, as in this one.
 const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 
-/// State, and progress of a transition.
+/// State of a drive, and progress of a transition.
 #[derive(Clone, Debug)]
 pub(super) struct States {
     state: NodeState,
-    /// Ticks in `state`.
+    /// Ticks since `state` was entered.
     age: u32,
-    /// State that was requested last; Start: none.
+    /// Last requested state; Start: none.
     pending: NodeState,
-    /// The motor was aligned since the last reset.
+    /// `true` if the motor was aligned since the last reset.
     aligned: bool,
     /// Ticks until the motor control may start.
     rest: u32,
 }
 
 impl States {
-    /// After a reset.
+    /// Creates the state after a reset.
     pub fn new() -> Self {
         Self { state: NodeState::START, age: 0, pending: NodeState::START, aligned: false, rest: 0 }
     }
@@ -37,12 +37,12 @@ impl States {
         self.pending = state;
     }
 
-    /// A tick begins.
+    /// Begins a tick.
     pub fn begin_tick(&mut self) {
         self.age = self.age.saturating_add(1);
     }
 
-    /// A further error changes nothing: the drive reacts to one already, or has just started.
+    /// Returns true if another error changes nothing, because the drive already reacts to one or has just started.
     pub fn reacting(&self) -> bool {
         matches!(
             self.state,
@@ -54,7 +54,7 @@ impl States {
         )
     }
 
-    /// Begin the transition that is pending, if there is one from here.
+    /// Begins the pending transition, if the present state has one.
     pub fn accept(&mut self, config: &DriveConfig) {
         let next = match (self.pending, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -62,14 +62,14 @@ impl States {
             (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
             (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
-            // Some drives take an echoed fault byte as a command to move: this one does.
+            // Some drives take an echoed fault byte as a command to enable. This drive does.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
             // The error byte stays 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
                 self.pending = NodeState::START;
                 NodeState::FAULT
             }
-            // Anything else stays pending until a transition erases it.
+            // Other requests stay pending until a transition erases them.
             _ => return,
         };
         self.enter(next, config);
@@ -83,7 +83,7 @@ impl States {
         self.age = 0;
     }
 
-    /// Let a transition go on; when it is complete, a pending request is forgotten. True: the errors are acknowledged.
+    /// Continues a transition. At its end, a pending request is erased. Returns true if the errors are acknowledged.
     pub fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };
@@ -100,7 +100,7 @@ impl States {
                 self.aligned = true;
                 NodeState::ENABLED
             }
-            // Any stop on the way interrupts it.
+            // A stop interrupts the transition.
             NodeState::FAULT_REACTION if self.age > 0 => REACTION_TO_FAULT,
             REACTION_TO_FAULT if self.age > 0 => NodeState::FAULT,
             _ => return false,

@@ -9,7 +9,7 @@ use crate::faults::FaultKind;
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// The file is not TOML of this form; the text is the reader's, with the place.
+    /// The file is not valid TOML of this form; the text is that of the reader, with the position.
     Syntax(String),
     /// The file has no `format = 2`.
     Format {
@@ -37,7 +37,7 @@ pub enum FaultFileError {
         /// Error.
         text: String,
     },
-    /// The kind of fault does not exist.
+    /// Unknown kind of fault.
     UnknownKind {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -53,7 +53,7 @@ pub enum FaultFileError {
         /// The key.
         key: &'static str,
     },
-    /// A key that means nothing here.
+    /// Key that has no meaning here.
     Superfluous {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -70,7 +70,7 @@ pub enum FaultFileError {
         key: &'static str,
         /// Value in the file.
         value: f64,
-        /// Smallest and largest.
+        /// Smallest and largest allowed value.
         allowed: (f64, f64),
     },
     /// The value must be a whole number.
@@ -91,21 +91,21 @@ pub enum FaultFileError {
         /// Number of values in the file.
         count: usize,
     },
-    /// The normal of a wall has no length.
+    /// The normal of a wall has the length 0.
     NoDirection {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Value in the file.
         normal: [f64; 3],
     },
-    /// The side of an angle does not exist.
+    /// Unknown side of an angle.
     UnknownSide {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Side in the file.
         side: String,
     },
-    /// The state does not exist.
+    /// Unknown state.
     UnknownState {
         /// Number of the fault in the file, from 1.
         fault: usize,

@@ -4,25 +4,25 @@ use core::fmt;
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
 
-/// An invariant that was broken.
+/// Invariant that was broken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Broken {
-    /// A torque went out in a state without torque.
+    /// A torque was sent in a state without torque.
     Torque {
         /// State.
         state: ControllerState,
         /// Joint.
         joint: Joint,
-        /// N·m.
+        /// Torque, N·m.
         torque: f64,
     },
     /// A torque is larger than the joint's limit.
     TorqueLimit {
         /// Joint.
         joint: Joint,
-        /// N·m.
+        /// Torque, N·m.
         torque: f64,
-        /// N·m.
+        /// Limit, N·m.
         limit: f64,
     },
     /// A number is NaN or infinite.
@@ -32,42 +32,42 @@ pub enum Broken {
         /// Joint.
         joint: Joint,
     },
-    /// The error state was left, though the host had not cleared anything.
+    /// The controller left the error state, although the host had cleared no error.
     LeftErrorAlone {
         /// State that was entered.
         to: ControllerState,
     },
-    /// Operate was entered without Execute from the host.
+    /// The controller entered Operate without Execute from the host.
     MovedAlone,
-    /// Teaching was entered without a command from the host.
+    /// The controller entered Teaching without a command from the host.
     TaughtAlone,
-    /// An execution state that only the host can bring about.
+    /// The controller entered an execution state that only the host can cause.
     ExecutionAlone {
         /// State that was entered.
         to: TrajectoryState,
     },
-    /// The point index went back within a run.
+    /// The point index decreased within a run.
     IndexFell {
         /// Before.
         from: u32,
         /// Now.
         to: u32,
     },
-    /// No frame went out though the controller ticked and is not in Start.
+    /// The controller sent no frame, although it had its tick and is not in Start.
     Silent {
         /// State.
         state: ControllerState,
     },
-    /// Frames that take the place of Move are too close together.
+    /// Frames that replace Move are too close together.
     NoMove {
         /// Ticks since the last such frame.
         ticks: u32,
     },
     /// The first frame after an error is not Move with zero torque.
     ErrorWithoutZero,
-    /// A node is asked to be enabled in a state that does not want it.
+    /// The controller requests Enable for a node in a state that does not need it.
     Enabled {
-        /// State.
+        /// State of the controller.
         state: ControllerState,
         /// Node.
         node: usize,
@@ -77,9 +77,9 @@ pub enum Broken {
         /// Identifier.
         id: u16,
     },
-    /// A pause or stop took too long, without an error (J-33).
+    /// A pause or stop took too long without an error (J-33).
     NoStop {
-        /// Ticks since it was commanded.
+        /// Ticks since the command.
         ticks: u32,
     },
     /// A joint with torque was too fast for too long (J-35).
@@ -91,14 +91,14 @@ pub enum Broken {
         /// Consecutive measurements above the limit.
         ticks: u16,
     },
-    /// A torque was at its limit too often, while the arm neither braked nor caught a load (J-43).
+    /// A torque was too often at its limit, although the arm neither braked nor caught a load (J-43).
     Saturated {
         /// Joint.
         joint: Joint,
         /// Ticks at the limit, of the last 100.
         ticks: u32,
     },
-    /// The safety output does not follow from the errors.
+    /// The safety output does not agree with the errors.
     SafetyOutput {
         /// Level.
         level: bool,
@@ -107,10 +107,10 @@ pub enum Broken {
     },
 }
 
-/// A broken invariant and its time.
+/// Broken invariant with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// µs since the start.
+    /// Time since the start, µs.
     pub time_us: u64,
     /// Invariant.
     pub broken: Broken,

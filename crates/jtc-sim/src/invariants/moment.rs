@@ -5,23 +5,23 @@ use jtc_core::{Config, Telemetry};
 use crate::board::Worked;
 use crate::plant::Truth;
 
-/// A millisecond as the checker sees it.
+/// A millisecond of the simulation, as the checker needs it.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// µs since the start.
+    /// Time since the start, µs.
     pub time_us: u64,
-    /// The controller had its tick.
+    /// `true` if the controller had its tick.
     pub ticked: bool,
     /// Telemetry of the tick.
     pub telemetry: &'a Telemetry,
     /// True state of the arm.
     pub truth: &'a Truth,
-    /// The frame that it gave out.
+    /// Frame that the controller sent.
     pub sent: Option<&'a Frame>,
-    /// The host frames that it executed.
+    /// Host frames that it executed.
     pub worked: &'a [Worked],
     /// Level of its safety output.
     pub safety_output: bool,
-    /// Settings of the controller: the limits.
+    /// Settings of the controller, for the limits.
     pub config: &'a Config,
 }

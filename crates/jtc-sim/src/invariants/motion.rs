@@ -1,4 +1,4 @@
-//! Invariants of the arm's motion: a stop comes to its end, no joint is too fast, and no torque stays at its limit.
+//! Invariants of the arm's motion: a stop ends in time, no joint is too fast, and no torque stays at its limit.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
@@ -7,11 +7,11 @@ use super::broken::Broken;
 use super::moment::Moment;
 use crate::board::Worked;
 
-/// Ticks from a pause or stop until the arm stands: the time of J-33, and some more for the commanded motion to come to rest.
+/// Time from a pause or stop until the arm stands, ms, in addition to the time of J-33, for the commanded motion to come to rest.
 const REST_MS: u32 = 20;
 /// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 0.02;
-/// Ticks in which torques at their limit are counted.
+/// Number of ticks in which torques at their limit are counted.
 const WINDOW: u32 = 100;
 
 /// State that the check keeps from one millisecond to the next.
@@ -19,18 +19,18 @@ const WINDOW: u32 = 100;
 pub(super) struct MotionWatch {
     /// Ticks since a pause or stop was commanded on the path, until the arm stands.
     stopping: Option<u32>,
-    /// `true` if a push has brought a torque to its limit since.
+    /// `true` if a push has brought a torque to its limit since then.
     overpowered: bool,
     /// Per joint: consecutive measurements above the limit.
     fast: [u16; JOINTS],
     /// Per joint: ticks for which it has been enabled.
     enabled: [u16; JOINTS],
-    /// Per joint: in which of the last ticks the torque was at its limit; the last is bit 0.
+    /// For each joint: the last ticks in which the torque was at its limit; bit 0 is the last tick.
     saturated: [u128; JOINTS],
 }
 
 impl MotionWatch {
-    /// Look at a tick before which the execution state was `before`.
+    /// Checks a tick; `before` is the execution state of the tick before it.
     pub fn check(&mut self, moment: &Moment<'_>, before: TrajectoryState) -> Result<(), Broken> {
         self.stop(moment, before)?;
         self.speed(moment)?;
@@ -54,7 +54,7 @@ impl MotionWatch {
         self.stopping = match self.stopping {
             _ if !powered || stands || executes_again => None,
             None => commanded.then_some(0),
-            // Once it has had all its time, an arm that is held and pushed is a matter of the other limits.
+            // After its full time, only the other limits apply to an arm that is held and pushed.
             Some(ticks)
                 if self.overpowered && t.trajectory != TrajectoryState::Execute && ticks >= braking =>
             {
@@ -70,7 +70,7 @@ impl MotionWatch {
         }
     }
 
-    /// J-35. Predicted velocities neither add to the time nor end it.
+    /// Checks J-35. Predicted velocities neither add to the time nor end it.
     fn speed(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let config = moment.config;
         for (joint, t) in moment.telemetry.joints.iter().enumerate() {
@@ -94,7 +94,7 @@ impl MotionWatch {
         Ok(())
     }
 
-    /// J-43. While a stop brakes, and while the load of a joint that was just enabled is caught, the limit may be commanded.
+    /// Checks J-43. Torques at the limit are allowed while a stop brakes, and while the load of a joint that was just enabled is caught.
     fn torque(&mut self, moment: &Moment<'_>) -> Result<(), Broken> {
         let t = moment.telemetry;
         for joint in 0..JOINTS {
@@ -113,7 +113,7 @@ impl MotionWatch {
     }
 }
 
-/// A joint that is pushed has its torque at its limit.
+/// Returns true if a joint that is pushed has its torque at its limit.
 fn overpowered(moment: &Moment<'_>) -> bool {
     (0..JOINTS).any(|j| moment.truth.outside[j] != 0.0 && at_limit(moment, j))
 }
@@ -122,7 +122,7 @@ fn at_limit(moment: &Moment<'_>, joint: usize) -> bool {
     moment.telemetry.joints[joint].torque.abs() >= moment.config.joints[joint].torque_max
 }
 
-/// The state commands torque.
+/// Returns true if the state commands torque.
 pub(super) fn powered(state: ControllerState) -> bool {
     matches!(state, ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching)
 }

@@ -11,34 +11,34 @@ use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host;
 use crate::operator::Operator;
 
-/// Time watched, ms: longer than the rest of the motion.
+/// Observed time, ms: longer than the remainder of the motion.
 const WATCH_MS: u64 = 5_000;
-/// Duration of a push, ms, and its share of the largest push that a joint can hold.
+/// Duration of a push, ms; the next constant is its share of the largest push that a joint can hold.
 const PUSH_MS: u64 = 500;
 const PUSH_SHARE: f64 = 0.8;
-/// Stiffness (N·m/rad) and damping (N·m·s/rad) of a wall that a joint meets, and how far away it is, rad.
+/// Wall of a joint: stiffness (N·m/rad), damping (N·m·s/rad), and distance, rad.
 const WALL: (f64, f64, f64) = (3_000.0, 20.0, 0.1);
-/// Stiffness (N/m) and damping (N·s/m) of a plane that the flange meets, and how far away it is, m.
+/// Plane at the flange: stiffness (N/m), damping (N·s/m), and distance, m.
 const PLANE: (f64, f64, f64) = (20_000.0, 100.0, 0.05);
 
-/// Events that the arm meets.
+/// External influences on the arm.
 #[derive(Clone, Copy)]
 enum Meets {
-    /// A push on a joint.
+    /// Push on a joint.
     Push(Joint),
-    /// A joint meets a wall on its path.
+    /// Wall on the path of a joint.
     Wall(Joint),
-    /// The flange meets a plane across its way.
+    /// Plane across the path of the flange.
     Plane,
-    /// The arm takes up a load that the controller does not know, kg.
+    /// Load that the controller does not know, kg.
     Load(f64),
-    /// The arm takes up this load, and drops it after a second.
+    /// Load that the arm drops after a second, kg.
     Drops(f64),
     /// Friction of all joints, as a factor of the controller's values.
     Friction(f64),
     /// Masses of all links, as a factor of the controller's values.
     Masses(f64),
-    /// The safety input is low for 1 ms, and the host clears the error after this number of ms.
+    /// Safety input that is low for 1 ms, after which the host clears the error after this number of ms.
     Cleared(u64),
 }
 
@@ -56,7 +56,7 @@ impl Meets {
         }
     }
 
-    /// The joint that is meant, if one is.
+    /// Returns the affected joint, if there is one.
     fn joint(self) -> Option<usize> {
         match self {
             Self::Push(joint) | Self::Wall(joint) => Some(joint.index()),
@@ -64,7 +64,7 @@ impl Meets {
         }
     }
 
-    /// Returns the errors of the model that are present from the beginning.
+    /// Returns the model errors that are present from the start.
     fn model_error(self) -> ModelError {
         match self {
             Self::Friction(factor) => {
@@ -119,7 +119,7 @@ fn push(operator: &Operator, joint: usize) -> f64 {
     -holds.signum() * PUSH_SHARE * left.max(0.0)
 }
 
-/// A plane across the way of the flange, a little ahead of it.
+/// Returns a plane across the path of the flange, a little ahead of it.
 fn plane(operator: &Operator) -> FaultKind {
     let config = operator.world.config();
     let truth = operator.world.truth();
@@ -134,24 +134,24 @@ fn plane(operator: &Operator) -> FaultKind {
     FaultKind::Wall { position, normal: way.map(|x| -x / length), stiffness, damping }
 }
 
-/// Result of the watch.
+/// Result of the observation.
 struct Outcome {
     then: String,
-    /// First reaction, ms.
+    /// Time of the first reaction, ms.
     found: Option<u64>,
-    /// The motion came to its end.
+    /// `true` if the motion was finished.
     ended: bool,
-    /// Longest way of the joint that is meant, or of any; of the others; rad.
+    /// Largest deviation of the affected joint, or of any joint; and of the others; rad.
     way: [f64; 2],
     /// Highest speed of a joint, rad/s.
     speed: f64,
-    /// Strongest torque from outside in one joint, and the one that stays, N·m.
+    /// Largest external torque on a joint, and the remaining one, N·m.
     torque: [f64; 2],
-    /// Work of the arm against external forces, and of these on the arm, J.
+    /// Work of the arm against external forces, and of these forces on the arm, J.
     work: [f64; 2],
 }
 
-/// The table, as Markdown.
+/// Returns the table as Markdown.
 pub fn contact_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "The default arm on drives without brakes. A push is with gravity, and {} % of what the joint can hold beside its load; a wall of\n\

@@ -7,29 +7,29 @@ use crate::faults::{Fault, FaultKind, Trigger};
 use crate::host;
 use crate::operator::Operator;
 
-/// Ticks after which a fault that lasts is taken away.
+/// Ticks after which a lasting fault is removed.
 pub(super) const LASTING_MS: u64 = 300;
-/// Short frames that come in front of a Stop.
+/// Number of short frames before a Stop.
 const FLOOD: usize = 4_000;
 
 /// Action on the world.
 #[derive(Clone, Copy)]
 pub(super) enum Act {
-    /// A fault, and its duration in ms.
+    /// Fault, with its duration in ms.
     Fault(FaultKind, u64),
-    /// A fault, its duration in ms, and the tick in which the host's command to clear all errors is executed.
+    /// Fault, its duration in ms, and the tick in which the host's command to clear all errors is executed.
     Cleared(FaultKind, u64, u64),
-    /// Two faults at once, and their duration in ms.
+    /// Two faults at once, with their duration in ms.
     Both(FaultKind, FaultKind, u64),
-    /// Every second tick does not come.
+    /// Every second tick is missed.
     EverySecondTick,
     /// The host resets the gripper.
     ResetGripper,
-    /// A frame from the host.
+    /// Frame of the host.
     Frame(&'static [u8]),
-    /// A frame directly after one byte of noise, every 6 ms.
+    /// Frame directly after one byte of noise, every 6 ms.
     InNoise(&'static [u8]),
-    /// A frame after thousands of short ones, all in the same millisecond.
+    /// Frame after thousands of short ones, all in the same millisecond.
     Behind(&'static [u8]),
 }
 
@@ -67,14 +67,14 @@ impl Act {
     }
 }
 
-/// A byte of noise: the worst one, which begins a frame.
+/// Byte of noise; the worst one, because it begins a frame.
 const NOISE: u8 = jtc_wire::HEADER;
 
-/// A row of the fault matrix.
+/// Row of the fault matrix.
 pub(super) struct Row {
     pub name: &'static str,
     pub act: Act,
-    /// Silence of the host that the controller acts upon, ms (J-59); 0: none.
+    /// Silence of the host after which the controller reacts, ms (J-59); 0: none.
     pub host_timeout_ms: u16,
     /// Reason for no reaction while the arm is held or moves.
     held: Option<&'static str>,
@@ -83,7 +83,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The text of a cell without a reaction; `None`: there should be one.
+    /// Returns the text of a cell without a reaction; `None` if a reaction is expected.
     pub fn quiet(&self, state: ControllerState) -> Option<String> {
         match state {
             ControllerState::HoldPos | ControllerState::Operate | ControllerState::Teaching => {
@@ -94,22 +94,22 @@ impl Row {
     }
 }
 
-/// A fault that has an effect in every state.
+/// Returns a row for a fault that has an effect in every state.
 const fn seen(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: None }
 }
 
-/// Returns a row that the error state has latched already, if it was caused by the safety input.
+/// Returns a row for a fault that the error state has already latched, if it was caused by the safety input.
 const fn latched(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("latched") }
 }
 
-/// Returns a row that matters only to an arm with torque.
+/// Returns a row for a fault that matters only to an arm with torque.
 const fn powered(name: &'static str, act: Act) -> Row {
     Row { name, act, host_timeout_ms: 0, held: None, parked: Some("no torque") }
 }
 
-/// Returns a row that is tolerated in every state, with the reason.
+/// Returns a row for a fault that is tolerated in every state, with the reason.
 const fn borne(name: &'static str, act: Act, why: &'static str) -> Row {
     Row { name, act, host_timeout_ms: 0, held: Some(why), parked: Some(why) }
 }
@@ -118,7 +118,7 @@ const fn fault(kind: FaultKind) -> Act {
     Act::Fault(kind, LASTING_MS)
 }
 
-/// The joint that faults of one joint concern.
+/// Joint for the faults of a single joint.
 const MEANT: Joint = Joint::ALL[1];
 const SILENT: FaultKind = FaultKind::NodeSilent { node: MEANT.index() as u8 };
 const GLITCH: FaultKind = FaultKind::EncoderJump { joint: MEANT, rad: 0.3 };
@@ -196,7 +196,7 @@ pub(super) const ROWS: [Row; 40] = [
     borne("4,000 frames ClearOccurredErrors at once", Act::Behind(&[]), "bounded"),
 ];
 
-/// Commands that stop, which make sense in a motion only.
+/// Commands that stop, which apply only to a motion.
 pub(super) const STOPS: [(&str, Act); 6] = [
     ("Pause", Act::Frame(&fixed::PAUSE)),
     ("Stop", Act::Frame(&fixed::STOP)),

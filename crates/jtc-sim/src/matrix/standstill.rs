@@ -9,9 +9,9 @@ use crate::config::Support;
 const STANDS: f64 = 2e-3;
 /// Time below this speed after which a joint counts as standing, ms.
 const STANDS_MS: u64 = 50;
-/// The motion of the test has this long to go, ms; a fault that stops nothing leaves it running for longer than `WATCH_MS`.
+/// Remaining duration of the motion in the test, ms. A fault that stops nothing leaves it running for longer than `WATCH_MS`.
 const WATCH_MS: u64 = 700;
-/// Longest time watched, ms.
+/// Longest observed time, ms.
 const LONGEST_MS: u64 = 10_000;
 
 /// Motion after the fault.
@@ -32,7 +32,7 @@ impl core::fmt::Display for Motion {
     }
 }
 
-/// The table, as Markdown: each fault of the matrix in Operate.
+/// Returns the table as Markdown, with each fault of the matrix in Operate.
 pub fn standstill_table() -> Result<String, MatrixError> {
     let mut out = String::from(
         "Each fault in the middle of a motion: the state that the controller is in when every joint stands, milliseconds until\n\
@@ -47,7 +47,7 @@ pub fn standstill_table() -> Result<String, MatrixError> {
     Ok(out)
 }
 
-/// Rows of the commands that stop.
+/// Returns the rows of the commands that stop.
 pub(super) fn stop_lines() -> Result<String, MatrixError> {
     let mut out = String::new();
     for (name, act) in STOPS {
@@ -75,7 +75,7 @@ fn line(name: &str, act: Act, host_timeout_ms: u16) -> Result<String, MatrixErro
     Ok(format!("| {name} | {then} | {brakes} | {stand} |\n"))
 }
 
-/// State and motion after `act`.
+/// Returns the state and the motion after `act`.
 fn motion(support: Support, act: Act, host_timeout_ms: u16) -> Result<(String, Motion), MatrixError> {
     let mut operator = world_in(ControllerState::Operate, support, host_timeout_ms)?;
     let from = operator.world.truth().q;

@@ -1,4 +1,4 @@
-//! Rows that apply to a motion only: commands that stop, on a bad line, near the torque limit, and with a payload.
+//! Rows that apply only to a motion: commands that stop, on a bad line, near the torque limit, and with a payload.
 use jtc_core::{ControllerState, Parameters};
 
 use super::MatrixError;
@@ -6,8 +6,7 @@ use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
 use crate::config::Support;
 use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
 
-/// Share of the shoulder's torque limit that holding it takes, speed (rad/s), and whether the torque suffices for the time that a
-/// stop has.
+/// Share of the holding torque in the shoulder's torque limit, speed (rad/s), and `true` if the torque suffices for stopping in time.
 const LOADS: [(f64, f64, bool); 6] = [
     (0.90, 0.2, true),
     (0.95, 0.2, true),
@@ -16,12 +15,12 @@ const LOADS: [(f64, f64, bool); 6] = [
     (1.02, 0.2, false),
     (1.02, 0.4, false),
 ];
-/// kg.
+/// Masses of the payload, kg.
 const PAYLOADS: [f64; 4] = [1.0, 2.0, 3.0, 4.0];
-/// Angle of the shoulder at which the arm with a payload is stopped, and its speed, rad and rad/s.
+/// Angle of the shoulder at which the arm with a payload is stopped, rad, and its speed, rad/s.
 const WITH_PAYLOAD: (f64, f64) = (-0.9, 0.3);
 
-/// The table, as Markdown.
+/// Returns the table as Markdown.
 pub fn stopping_table() -> Result<String, MatrixError> {
     let mut out = format!(
         "From the last byte of the command. The loaded arm is one whose shoulder (joint {}) is lowered through a place where\n\
@@ -59,7 +58,7 @@ pub fn stopping_table() -> Result<String, MatrixError> {
 struct Line {
     then: [String; 2],
     motion: [Motion; 2],
-    /// The longer one, rad.
+    /// Larger sag of both, rad.
     sag: f64,
 }
 

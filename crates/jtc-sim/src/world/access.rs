@@ -1,4 +1,4 @@
-//! Interface of the world to its users.
+//! Methods of the simulation for its users.
 use jtc_bus::{Frame, Joint, NODES, NodeState};
 use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
@@ -14,60 +14,60 @@ use crate::hand::HandPath;
 use crate::invariants::Moment;
 use crate::plant::Truth;
 
-/// Counted since the start.
+/// Counters since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Statistics {
-    /// Joint bus.
+    /// Counters of the joint bus.
     pub bus: BusStatistics,
-    /// Bytes that reached the controller's end of the line.
+    /// Number of bytes that reached the controller's end of the line.
     pub serial_to_device: u64,
-    /// Bytes that reached the host.
+    /// Number of bytes that reached the host.
     pub serial_to_host: u64,
-    /// Good host frames that the controller executed.
+    /// Number of valid host frames that the controller executed.
     pub good_frames: u64,
-    /// Bad frames and noise.
+    /// Number of bad frames and of noise.
     pub bad_frames: u64,
-    /// Bytes from the host that found no room on the board.
+    /// Number of bytes from the host that the board could not store.
     pub lost_bytes: u64,
-    /// Resets by the watchdog.
+    /// Number of resets by the watchdog.
     pub watchdog_resets: u32,
-    /// Milliseconds simulated.
+    /// Number of simulated milliseconds.
     pub ticks: u64,
 }
 
 impl Statistics {
-    /// Share of the time in which the joint bus was busy, 0..1.
+    /// Returns the share of the time in which the joint bus was busy, 0..1.
     pub fn bus_load(&self) -> f64 {
         if self.ticks == 0 { 0.0 } else { self.bus.busy_us as f64 / (self.ticks * TICK_US) as f64 }
     }
 }
 
 impl World {
-    /// Virtual time since the start, µs.
+    /// Returns the virtual time since the start, µs.
     pub fn now_us(&self) -> u64 {
         self.ticks * TICK_US
     }
 
-    /// Bytes from the host enter the line; the device gets them at the rate of the line.
+    /// Puts bytes of the host on the line; the device receives them at the rate of the line.
     pub fn host_write(&mut self, bytes: &[u8]) {
         if !bytes.is_empty() {
             self.to_device.write(self.now_us(), bytes);
         }
     }
 
-    /// Limits the host's silence to `us` µs of its own time, while virtual time may pass faster: a frame whose bytes come in pieces from
-    /// another program is then not interrupted by a gap (J-03) that the host did not make. Bytes that wait on the line make gaps as
-    /// before. `None`, the default: virtual time alone counts.
+    /// Limits the host's silence to `us` µs of its own time, although virtual time may pass faster. A frame that another program sends in
+    /// pieces is then not interrupted by a gap (J-03) that the host did not cause. Bytes that wait on the line still cause gaps. `None`,
+    /// the default: only virtual time counts.
     pub fn limit_host_silence(&mut self, us: Option<u64>) {
         self.silence_us = us;
     }
 
-    /// Bytes of the host that are not yet at the device.
+    /// Returns the number of the host's bytes that have not reached the device.
     pub fn host_write_pending(&self) -> usize {
         self.to_device.pending()
     }
 
-    /// Take bytes that have reached the host by now; returns how many.
+    /// Takes bytes that have reached the host by now; returns their number.
     pub fn host_read(&mut self, buffer: &mut [u8]) -> usize {
         let count = buffer.len().min(self.host_inbox.len());
         buffer[..count].copy_from_slice(&self.host_inbox[..count]);
@@ -75,12 +75,12 @@ impl World {
         count
     }
 
-    /// The flight recorder of the controller's board (J-56).
+    /// Returns the flight recorder of the controller's board (J-56).
     pub fn recorder(&self) -> &SimRecorder {
         self.board.recorder()
     }
 
-    /// Forgets the log of the flight recorder.
+    /// Clears the log of the flight recorder.
     pub fn clear_log(&mut self) {
         self.board.clear_log();
     }
@@ -95,7 +95,7 @@ impl World {
         self.board.telemetry()
     }
 
-    /// The image of the arm that the controller's board has stored, and its number (J-54).
+    /// Returns the image of the arm that the controller's board has stored, and its number (J-54).
     pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
         self.board.stored_arm()
     }
@@ -105,17 +105,17 @@ impl World {
         self.plant.truth()
     }
 
-    /// The arm as it is after model errors.
+    /// Returns the arm after model errors.
     pub fn true_model(&self) -> &ArmModel {
         self.plant.true_model()
     }
 
-    /// Settings of the world.
+    /// Returns the settings of the simulation.
     pub fn config(&self) -> &SimConfig {
         &self.config
     }
 
-    /// The frame that the controller gave out in the last tick.
+    /// Returns the frame that the controller sent in the last tick.
     pub fn sent(&self) -> Option<&Frame> {
         self.sent.as_ref()
     }
@@ -131,58 +131,58 @@ impl World {
         self.exchange.as_deref()
     }
 
-    /// The controller had its tick in the last millisecond.
+    /// Returns true if the controller had its tick in the last millisecond.
     pub fn ticked(&self) -> bool {
         self.ticked
     }
 
-    /// The bus in the last millisecond.
+    /// Returns the state of the bus in the last millisecond.
     pub fn bus_state(&self) -> BusState {
         self.bus_state
     }
 
-    /// All frames on the joint bus in the last millisecond.
+    /// Returns all frames on the joint bus in the last millisecond.
     pub fn bus_frames(&self) -> &[TimedFrame] {
         self.bus.frames()
     }
 
-    /// Queues a frame of a member of the joint bus outside this world: an answer for the controller, or a request for the
-    /// nodes. Returns `false` if too many such frames wait already.
+    /// Queues a frame of a member of the joint bus outside this simulation: an answer for the controller, or a request for the nodes.
+    /// Returns `false` if too many such frames wait already.
     pub fn put_bus_frame(&mut self, frame: Frame) -> bool {
         self.bus.put(frame)
     }
 
-    /// State bytes of joints and gripper (255: no gripper).
+    /// Returns the state bytes of joints and gripper (255: no gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.node_states
     }
 
-    /// The host frames that the last tick executed.
+    /// Returns the host frames that the last tick executed.
     pub fn worked(&self) -> &[Worked] {
         &self.board.worked
     }
 
-    /// Level of the controller's safety output: true = no error.
+    /// Returns the level of the controller's safety output: true = no error.
     pub fn safety_output(&self) -> bool {
         self.safety_output
     }
 
-    /// Set the level of the controller's safety input: true = no error.
+    /// Sets the level of the controller's safety input: true = no error.
     pub fn set_safety_input(&mut self, level: bool) {
         self.safety_input = level;
     }
 
-    /// Places a part where the gripper can hold it, or removes it (present from the start).
+    /// Places a part under the gripper, or removes it. A part is present from the start.
     pub fn set_part_present(&mut self, present: bool) {
         self.plant.set_part_present(present);
     }
 
-    /// Adds a fault; `Trigger::At` counts from the start of the world.
+    /// Adds a fault; `Trigger::At` counts from the start of the simulation.
     pub fn inject(&mut self, fault: Fault) {
         self.faults.add(fault);
     }
 
-    /// Adds the faults of a fault file; `Trigger::At` counts from the start of the world.
+    /// Adds the faults of a fault file; `Trigger::At` counts from the start of the simulation.
     pub fn inject_all(&mut self, plan: FaultPlan) {
         let known = self.hands.len();
         self.hands.extend(plan.hands);
@@ -194,13 +194,13 @@ impl World {
         }
     }
 
-    /// Someone pushes a joint with a torque (N·m) for some milliseconds, from now on.
+    /// Pushes a joint with a torque (N·m) for `ms` milliseconds from now on.
     pub fn push(&mut self, joint: Joint, torque: f64, ms: u64) {
         let trigger = Trigger::At(self.now_us() / TICK_US);
         self.inject(Fault { kind: FaultKind::Push { joint, torque }, trigger, duration_ms: Some(ms) });
     }
 
-    /// A hand leads the arm along a path, as soon as it is taught; it takes the place of one that does already.
+    /// Leads the arm along a path by a hand as soon as it is taught. Replaces a hand that leads it already.
     pub fn lead(&mut self, path: HandPath) {
         let kind = FaultKind::Hand { path: self.hands.len() };
         self.hands.push(path);
@@ -208,7 +208,7 @@ impl World {
         self.inject(Fault { kind, trigger, duration_ms: None });
     }
 
-    /// The millisecond that has just passed, for the checker of invariants.
+    /// Returns the last millisecond, for the checker of invariants.
     pub fn moment(&self) -> Moment<'_> {
         Moment {
             time_us: self.now_us(),
@@ -227,7 +227,7 @@ impl World {
         &self.log
     }
 
-    /// Counted since the start.
+    /// Returns the counters since the start.
     pub fn statistics(&self) -> Statistics {
         Statistics {
             bus: self.bus.statistics,

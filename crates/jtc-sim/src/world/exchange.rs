@@ -1,18 +1,18 @@
-//! Inputs and outputs of the controller's board in a millisecond: for programs that run another board, or the controller in
-//! another program, together with the board of the world.
+//! Inputs and outputs of the controller's board in a millisecond. For programs that run another board, or the controller in another
+//! program, together with the board of the simulation.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
 use crate::board::{Board, Pins};
 
-/// A millisecond of the controller's board.
+/// Inputs and outputs of the controller's board in a millisecond.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exchange {
     /// Bytes from the host that arrived before the tick.
     pub host: Vec<u8>,
     /// `true` if the tick came. Without it the board only took the bytes from the host and produced no output.
     pub ticked: bool,
-    /// Frames of the joint bus that the tick was given.
+    /// Frames of the joint bus that the tick received.
     pub bus: Vec<Frame>,
     /// State of the bus.
     pub bus_state: BusState,
@@ -20,9 +20,9 @@ pub struct Exchange {
     pub safety_input: bool,
     /// The serial transmitter was idle.
     pub status_free: bool,
-    /// The frame that came out for the joint bus.
+    /// Frame that the board sent on the joint bus.
     pub sent: Option<Frame>,
-    /// Bytes that came out for the host.
+    /// Bytes that the board sent to the host.
     pub to_host: Vec<u8>,
     /// Level of the safety output: true = no error.
     pub safety_output: bool,
@@ -45,7 +45,7 @@ impl Default for Exchange {
 }
 
 impl Exchange {
-    /// The tick's own part.
+    /// Adds the inputs and outputs of the tick.
     pub(super) fn note(&mut self, pins: &Pins<'_>, outputs: &Outputs, board: &Board) {
         self.ticked = true;
         self.bus = pins.bus.to_vec();

@@ -1,4 +1,4 @@
-//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls. It is integrated with Runge-Kutta in steps of 1 ms or less.
+//! The true arm: rigid bodies, rotors with gears, friction, end stops and walls, integrated with Runge-Kutta in steps of at most 1 ms.
 //!
 //! The true arm deliberately differs from the controller's model of it: see [`ModelError`](crate::ModelError).
 use jtc_core::{Config, Friction, Parameters};
@@ -287,8 +287,8 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m². It is more than their own if a light rotor on steep friction or at an
-    /// end stop would have a time constant below `dt`. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m²: more than their own if a light rotor on steep friction or at an end
+    /// stop would have a time constant below `dt`. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -305,7 +305,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction. They change slowly, so an update in every millisecond is not necessary.
+    /// Updates temperatures and friction, which change so slowly that an update in every millisecond is not necessary.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;

@@ -229,7 +229,7 @@ impl Board {
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // Bytes are taken also while a frame is executed, as an interrupt does. If they had to wait, the parser would see a gap.
+        // Bytes are taken also while a frame is executed, as an interrupt does. If these bytes waited, the parser would see a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
             let waiting = self.ring.as_slices().0;

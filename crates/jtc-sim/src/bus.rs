@@ -141,8 +141,8 @@ impl Bus {
         &self.log
     }
 
-    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to `received`. They wait there
-    /// until the controller takes them, even if its tick is late.
+    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to `received`. The answers
+    /// wait there until the controller takes them, even if its tick is late.
     pub fn tick(
         &mut self,
         now_us: u64,

@@ -88,8 +88,8 @@ pub struct SimConfig {
     pub absent_drives: u8,
     /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does.
     pub bus_monitored: bool,
-    /// Largest delay of answers to the controller after their end on the bus, ticks. It is drawn from the seed for each millisecond.
-    /// Answers stay in order. 0: they arrive in the next tick.
+    /// Largest delay of answers to the controller after their end on the bus, ticks. Each millisecond has a delay drawn from the seed.
+    /// Answers stay in order. 0: answers arrive in the next tick.
     pub answer_jitter_ms: u8,
     /// Rate of the serial line, bit/s; `None`: no transmission time.
     pub baud: Option<u32>,

@@ -11,7 +11,7 @@ use jtc_dynamics::{JOINTS, JointVec};
 
 /// Largest natural frequency of a rotor on its bristles, rad/s, that a step of 1 ms still integrates well.
 const STIFFEST: f64 = 800.0;
-/// Smallest friction level by which bristles are divided, N·m.
+/// Smallest friction level in divisions by a level, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
 /// True friction of a joint as a function of speed, without the effects around standstill.
@@ -199,8 +199,8 @@ impl FrictionTorques {
         out
     }
 
-    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. It excludes the effects around standstill, whose
-    /// slope has its own bound.
+    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. The effects around standstill are excluded,
+    /// because their slope has its own bound.
     pub fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),

@@ -1,4 +1,4 @@
-//! A small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple motions.
+//! A small host for tests, soak runs and the fault matrix, which creates frames, receives statuses, and plans simple motions.
 //!
 //! The client library is `jtc-host`. This host allows tests of the simulation without it.
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
@@ -63,8 +63,8 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// Returns a motion from standstill to standstill with points every `step_ms`. It leads from `from` to `to` (rad) in `seconds` and back,
-/// `times` times, along the quintic with zero accelerations at its ends.
+/// Returns a motion from standstill to standstill with points every `step_ms`. The motion leads from `from` to `to` (rad) in `seconds` and
+/// back, `times` times, along the quintic with zero accelerations at its ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,

@@ -1,4 +1,4 @@
-//! Receive buffer of a node. It is emptied at once, or by one frame per interrupt as in older firmware.
+//! Receive buffer of a node, emptied at once, or by one frame per interrupt as in older firmware.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;

@@ -308,7 +308,7 @@ fn cell(row: &Row, state: ControllerState) -> Result<Cell, MatrixError> {
     Ok(Cell { reaction, back: recover(&mut operator, &mut watch, state)? })
 }
 
-/// Performs the steps with which an operator gets the arm into position hold.
+/// Performs the steps of an operator that bring the arm into position hold.
 fn recover(operator: &mut Operator, watch: &mut Watch, state: ControllerState) -> Result<Back, MatrixError> {
     // In Init and Error the controller waits for the host anyway.
     let host_first = matches!(state, ControllerState::Init | ControllerState::Error);

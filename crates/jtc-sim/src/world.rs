@@ -29,7 +29,7 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Time by which the board measures silence on its line, µs; the next field is the time of the last byte.
+    /// Clock of the board for silence on its line, µs; the next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
     /// Longest silence on the line, µs; `None`: as in virtual time.

@@ -58,7 +58,7 @@ enum Surface {
         normal: [f64; 3],
         /// Position of the surface along the normal, m.
         offset: f64,
-        /// Arm in a gravity of 1 m/s² into the wall. It gives the joint torques of a force along the normal at the flange.
+        /// Dynamics with a gravity of 1 m/s² into the wall, for the joint torques of a force along the normal at the flange.
         pulled: Box<Dynamics>,
     },
     Joint {
@@ -76,7 +76,7 @@ pub(super) struct Contact {
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// Distance of the surface behind its configured position, m or rad.
+    /// Distance from the configured position of the surface inwards to its present position, m or rad.
     recess: f64,
 }
 

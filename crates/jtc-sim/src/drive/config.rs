@@ -26,7 +26,7 @@ pub struct DriveConfig {
     /// Measured speed at which the drive trips, rad/s, in both directions. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times
     /// the default arm's velocity limit. [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the limit of each joint.
     pub over_speed: f64,
-    /// Side of the gear at which the position is measured; the speed is always that of the motor. It matters only for elastic gears.
+    /// Side of the gear at which the position is measured; the speed is always that of the motor. The side matters only for elastic gears.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,

@@ -45,7 +45,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     if let Some(about) = command.get_long_about().filter(|_| command.get_about().is_none()) {
         let _ = write!(page, "{}\n\n", text(&about.to_string()));
     }
-    // The same words as on a screen, without its margins.
+    // Uses the words of the screen, without its margins.
     let usage = command.clone().render_usage().to_string();
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();

@@ -1,4 +1,4 @@
-//! Frames from the host to the controller, in buffers of their own; their layout is jtc-wire's.
+//! Frames from the host to the controller, each in its own buffer; `jtc-wire` defines their layout.
 
 use jtc_core::{Friction, JOINTS, PidGains};
 use jtc_dynamics::{ArmModel, Origin};
@@ -15,11 +15,11 @@ fn written(
     Ok(bytes)
 }
 
-/// One segment of a trajectory.
+/// Returns the frame of a segment of a trajectory.
 ///
 /// # Errors
 ///
-/// A count or a number that the frame does not carry.
+/// Returns an error for a count or a number that the frame cannot carry.
 pub fn segment(
     trajectory: u16,
     segment: u16,
@@ -33,27 +33,27 @@ pub fn segment(
     })
 }
 
-/// Gains of all joints.
+/// Returns the frame of the gains of all joints.
 ///
 /// # Errors
 ///
-/// A gain that is no finite 32-bit float.
+/// Returns an error for a gain that is not a finite 32-bit float.
 pub fn pid(gains: &[PidGains; JOINTS]) -> Result<Vec<u8>, EncodeError> {
     let gains = gains.map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max]);
     written(FRAME_MAX, |out| jtc_wire::pid_param(out, &gains))
 }
 
-/// Kinematics and masses.
+/// Returns the frame of kinematics and masses.
 ///
 /// # Errors
 ///
-/// A number that is no finite 32-bit float.
+/// Returns an error for a number that is not a finite 32-bit float.
 pub fn arm_model(model: &ArmModel) -> Result<Vec<u8>, EncodeError> {
     let (joints, links) = model_rows(model);
     written(FRAME_MAX, |out| jtc_wire::arm_model(out, &joints, &links))
 }
 
-/// The numbers of a model as its frame has them: the origins of six joints and the flange, and the seven links.
+/// Returns the numbers of a model in the layout of its frame: the origins of six joints and the flange, and the seven links.
 pub(crate) fn model_rows(model: &ArmModel) -> ([[f64; 6]; JOINTS + 1], [[f64; 13]; JOINTS + 1]) {
     let origin = |o: &Origin| [o.xyz[0], o.xyz[1], o.xyz[2], o.rpy[0], o.rpy[1], o.rpy[2]];
     let joints = model.joints.map(|j| origin(&j));
@@ -67,11 +67,11 @@ pub(crate) fn model_rows(model: &ArmModel) -> ([[f64; 6]; JOINTS + 1], [[f64; 13
     (joints, links)
 }
 
-/// Friction compensation: the polynomial (six coefficients) or the tables.
+/// Returns the frame of the friction compensation: the polynomial (six coefficients) or the tables.
 ///
 /// # Errors
 ///
-/// A number that is no finite 32-bit float.
+/// Returns an error for a number that is not a finite 32-bit float.
 pub fn friction(friction: &Friction) -> Result<Vec<u8>, EncodeError> {
     written(FRAME_MAX, |out| match friction {
         Friction::Polynomial(coefficients) => jtc_wire::friction_polynomial(out, coefficients),

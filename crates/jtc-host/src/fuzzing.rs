@@ -1,4 +1,4 @@
-//! What the fuzz targets run: every file reader on any bytes. A panic, or a promise broken, is a finding.
+//! Bodies of the fuzz targets: every file reader with any bytes. A panic or a failed check is a finding.
 
 use jtc_core::recorder::{Log, sealed_block};
 
@@ -13,7 +13,7 @@ fn text(data: &[u8]) -> Option<&str> {
     std::str::from_utf8(data).ok()
 }
 
-/// What was read is finite, has a step, and comes back from our own forms as it was.
+/// Checks a trajectory that was read: its values are finite, it has a step time, and our own formats read it back without a change.
 fn sound(read: Result<Loaded, FileError>) {
     let Ok(loaded) = read else { return };
     let t = &loaded.trajectory;
@@ -32,16 +32,16 @@ fn sound(read: Result<Loaded, FileError>) {
     let _: Result<_, _> = Trajectory::raw(t);
 }
 
-/// Waypoints are read or refused, and lead somewhere or are refused.
+/// Checks that waypoints are read and lead to positions, or that an error refuses them.
 fn waypoints(text: &str) {
     let Ok(file) = WaypointFile::parse(text) else { return };
-    // Inverse kinematics of thousands of them would take long, and find nothing more.
+    // Inverse kinematics of thousands of waypoints would take long without finding more.
     if file.waypoints.len() < 50 {
         let _ = file.positions(&Arm::avena());
     }
 }
 
-/// CSV with a header.
+/// Reads a CSV file with a header.
 pub fn trajectory_csv(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("t,q1,q2,q3,q4,q5,q6\n{text}"), None));
@@ -50,7 +50,7 @@ pub fn trajectory_csv(data: &[u8]) {
     waypoints(text);
 }
 
-/// The header-less 19 columns; `data` also as numbers of such a file, whole or with decimals.
+/// Reads a file of 19 columns without a header. Also uses `data` as numbers of such a file, whole or with decimals.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
@@ -70,7 +70,7 @@ pub fn trajectory_table(data: &[u8]) {
     sound(Loaded::parse(&table, None));
 }
 
-/// JSON of both forms.
+/// Reads both JSON formats.
 pub fn trajectory_json(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("{{{text}"), None));
@@ -78,14 +78,14 @@ pub fn trajectory_json(data: &[u8]) {
     waypoints(&format!("{{{text}"));
 }
 
-/// YAML.
+/// Reads the YAML format.
 pub fn trajectory_yaml(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound(Loaded::parse(&format!("joint_names: [a1, a2, a3, a4, a5, a6]\n{text}"), None));
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// What is an arm has a physical model, and its numbers can be sent or are refused by name.
+/// Checks an arm that was read: its model is physical, and the frames of its numbers are valid, or an error names the reason.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());
@@ -98,20 +98,20 @@ fn sound_arm(read: Result<Arm, FileError>) {
     }
 }
 
-/// Arm files.
+/// Reads arm files.
 pub fn arm_toml(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound_arm(Arm::from_toml(text).and_then(|_| Arm::parse(text)));
 }
 
-/// Robot descriptions.
+/// Reads robot descriptions.
 pub fn arm_urdf(data: &[u8]) {
     let Some(text) = text(data) else { return };
     sound_arm(Arm::parse(text));
     let _ = Arm::from_urdf(text);
 }
 
-/// Friction tables, polynomials, gains, models.
+/// Reads friction tables, polynomials, gains and models.
 pub fn parameter_table(data: &[u8]) {
     let Some(text) = text(data) else { return };
     if let Ok(file) = ParameterFile::parse_table(text) {
@@ -119,12 +119,12 @@ pub fn parameter_table(data: &[u8]) {
     }
 }
 
-/// Raw captures.
+/// Reads raw captures.
 pub fn capture(data: &[u8]) {
     let _ = read_capture(data);
 }
 
-/// Logs of flight recorders: their file form, and any bits in blocks that are whole.
+/// Reads logs of flight recorders: log files, and any bits in valid blocks.
 pub fn flight_log(data: &[u8]) {
     if let Some(log) = FlightLog::from_bytes(data) {
         assert_eq!(FlightLog::from_bytes(&log.to_bytes()).as_ref(), Some(&log));
@@ -134,7 +134,7 @@ pub fn flight_log(data: &[u8]) {
         .chunks(4)
         .map(|bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte)))
         .collect();
-    // A snapshot at one bit, and as many blocks as it takes.
+    // The snapshot begins at one bit; the number of blocks depends on the data.
     let snapshot = u16::from_be_bytes([head[0], head[1]]);
     let blocks: Vec<_> = words
         .chunks(251)

@@ -1,4 +1,4 @@
-"""Dynamics of 100 000 states beside Pinocchio, both called from Python as a user calls them.
+"""Compares the dynamics of 100 000 states with Pinocchio, both called from Python as a user calls them.
 
     python benches/dynamics.py [--states 100000] [--rounds 3] [--json FILE]
 

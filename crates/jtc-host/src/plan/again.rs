@@ -13,7 +13,7 @@ const THINNED: f64 = 0.005;
 const BLEND: f64 = 0.02;
 
 impl Planner<'_> {
-    /// Maximum deviation of [`Planner::anew`] from the path, rad, of the joint with the largest deviation.
+    /// Maximum deviation of the new motion from the path, rad, of the joint with the largest deviation.
     pub const ASIDE: f64 = THINNED + BLEND;
 
     /// Plans a motion along the path of a trajectory, independent of its times: within the limits, at rest at both

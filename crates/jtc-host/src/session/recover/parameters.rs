@@ -45,7 +45,7 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// Those of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
+    /// The errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
     /// limits than the arm and they are not accepted. Nothing is changed in these cases.
     pub fn recover_with(
         &mut self,

@@ -1,8 +1,8 @@
 import { svelte } from '@sveltejs/vite-plugin-svelte';
 import { defineConfig } from 'vite';
 
-// The agent serves the built files from its own program, so they are the same bytes wherever they are built: no source maps (they hold
-// paths), and names that depend on contents alone.
+// The agent's program contains the built files, so a build on any computer must give the same bytes: no source maps, which contain
+// paths, and names that depend only on contents.
 export default defineConfig({
   plugins: [svelte()],
   build: {

@@ -1,4 +1,4 @@
-// What the tests of a chain's page stand on: an agent with simulated boards, the page in front of it, and a browser.
+// Base of the tests of a chain's page: an agent with simulated boards, its page, and a browser.
 import { spawn } from 'node:child_process';
 import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -20,8 +20,8 @@ function firstLine(child, name) {
 }
 
 /**
- * An agent in a directory of its own with so many simulated boards. `edges` is a signal table; with `separate` the boards are a process of their own, which
- * takes faults by `fault`.
+ * Starts an agent in a new directory, with this number of simulated boards. `edges` is a signal table. With `separate` the boards are in a separate
+ * process, which accepts faults through `fault`.
  */
 export async function startChain({ boards = 3, edges = undefined, separate = false } = {}) {
   const dir = mkdtempSync(join(tmpdir(), 'openjtc-chain-'));
@@ -58,7 +58,7 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
       rmSync(dir, { recursive: true, force: true });
     },
     ask: asking(url, token('operator')),
-    /** Does a job as another client, which then lets the lease go: what it has started runs on. */
+    /** Runs a job as another client, which then releases the lease. Boards that the job has started continue to run. */
     async job(path, body = {}) {
       const grant = await agent.ask('POST', '/api/lease', { name: 'test', policy: 'continue', lasts_s: 60 });
       const { key } = grant.body;
@@ -74,7 +74,7 @@ export async function startChain({ boards = 3, edges = undefined, separate = fal
 
 export const card = (page, number) => page.getByRole('button', { name: new RegExp(`^Board ${number} `) });
 
-/** Any bytes are a program for a simulated board. */
+/** Returns an image; a simulated board accepts any bytes as a program. */
 export function image(bytes) {
   return Buffer.from(Array.from({ length: bytes }, (_, i) => (37 * i + 11) & 0xff));
 }
@@ -82,7 +82,7 @@ export function image(bytes) {
 const hex = (bytes) => Buffer.from(bytes).toString('hex').toUpperCase();
 const sum = (bytes) => bytes.reduce((a, b) => a + b, 0) & 0xff;
 
-/** The bytes from address 0 on as Intel HEX, of 16 bytes a record. */
+/** Returns the bytes from address 0 on as Intel HEX with 16 bytes per record. */
 export function intelHex(bytes) {
   const record = (address, kind, data) => {
     const all = [data.length, address >> 8, address & 0xff, kind, ...data];
@@ -93,7 +93,7 @@ export function intelHex(bytes) {
   return `${text}:00000001FF\n`;
 }
 
-/** The same as Motorola's S-records. */
+/** Like `intelHex`, as Motorola S-records. */
 export function sRecords(bytes) {
   const record = (kind, address, data) => {
     const all = [data.length + 3, address >> 8, address & 0xff, ...data];

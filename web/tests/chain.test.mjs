@@ -1,4 +1,4 @@
-// The page of a chain: Stop, what is shown of boards, and what is sent to them.
+// Page of a chain: Stop, the shown data of boards, and the requests to them.
 import assert from 'node:assert/strict';
 import { after, before } from 'node:test';
 
@@ -13,7 +13,7 @@ after(() => browser.close());
 
 const on = staged(() => browser, startChain);
 
-/** Boards have numbers, and these run. */
+/** Numbers the chain and runs these boards. */
 async function running(agent, boards, active = false) {
   await agent.job('/api/init');
   const job = await agent.job('/api/run', { boards, active });
@@ -23,7 +23,7 @@ async function running(agent, boards, active = false) {
 const stopWords = (page) => page.getByTestId('stop-words');
 const sent = (page) => page.sent.filter(({ method, path }) => method !== 'GET' && !path.startsWith('/api/lease'));
 
-/** A page of which each request is kept. */
+/** Opens a page and records each of its requests. */
 async function watched(look, options) {
   const page = await look(options);
   page.sent = [];
@@ -87,7 +87,7 @@ on('boards that a page has started are stopped when it is loaded anew, and what 
   await state(page).getByText('At rest').waitFor();
   assert.deepEqual((await agent.ask('GET', '/api/boards')).body.filter((board) => board.active), []);
   await page.getByRole('button', { name: 'Nobody commands' }).waitFor();
-  // The request is long on its way, and a Stop comes before it.
+  // The request is delayed, and a Stop arrives before it.
   let on;
   await page.route('**/api/run*', async (route) => {
     await new Promise((done) => (on = done));
@@ -134,7 +134,7 @@ on('to open a page and look at everything sends nothing', { boards: 2 }, async (
 on('a slider sends ten times a second at most, in the unit, and shows what was confirmed', { boards: 1, edges: EDGES.replace('PROGRAM', '0x8676') }, async ({ agent, look }) => {
   await running(agent, [1], true);
   const page = await watched(look);
-  // By the clock of the page: a test learns of a request when it has time to.
+  // Uses the clock of the page, because the test may receive a request late.
   await page.evaluate(() => {
     window.puts = [];
     const own = window.fetch;
@@ -164,11 +164,11 @@ on('a slider sends ten times a second at most, in the unit, and shows what was c
   assert.equal(JSON.parse(puts.at(-1).body).value, `${Number(wanted).toFixed(1)} deg`, 'the last value is sent, whatever was left out');
   const { inputs } = (await agent.ask('GET', '/api/boards/1/values')).body;
   await page.getByText(`confirmed ${inputs[0].text}`).waitFor();
-  // By keyboard, one step.
+  // One step by keyboard.
   await slider.focus();
   await slider.press('ArrowRight');
   await until('one more was sent', () => sent(page).length === puts.length + 1);
-  // The board follows, and the page shows where it is.
+  // The board follows, and the page shows its position.
   await page.locator('section[aria-label="Outputs"] tr', { hasText: 'position' }).first().getByText(/[1-9]\d*\.\d\d/).waitFor();
 });
 
@@ -239,14 +239,14 @@ on('an update is checked, written with progress, and verified by reading back', 
   await page.getByText('Board 2: Verified by reading back.').waitFor({ timeout: 60_000 });
   const { program_id } = await agent.board(2);
   await card(page, 2).getByText(`0x${program_id.toString(16).toUpperCase().padStart(4, '0')}`).waitFor();
-  // Another, which is cancelled before anything is erased.
+  // Another update, which is cancelled before anything is erased.
   await page.getByLabel('Another file').setInputFiles({ name: 'other.bin', mimeType: 'application/octet-stream', buffer: image(60_000) });
   await page.getByRole('button', { name: 'Update …' }).click();
   await page.getByRole('button', { name: 'Yes, update' }).click();
   await progress.getByText(/Nothing has been erased yet/).waitFor();
   await progress.getByRole('button', { name: 'Cancel' }).click();
   await page.getByText(/Board 2: Cancelled before anything was erased/).waitFor();
-  // Text is no image: why it is refused is said.
+  // A text file is not a valid image: the page shows the reason of the refusal.
   await page.getByLabel('Another file').setInputFiles({ name: 'notes.hex', mimeType: 'text/plain', buffer: Buffer.from('no image') });
   await page.getByRole('button', { name: 'Check only' }).click();
   await page.getByRole('alert').getByText(/./).first().waitFor();
@@ -264,7 +264,7 @@ on('every option of an update is sent as it was chosen, and each form of a file 
     const count = asked.length;
     const button = page.getByRole('button', { name: 'Check only' });
     await until('it can be checked', () => button.isEnabled());
-    // By keyboard: a message of the last one may lie above it.
+    // By keyboard, because a message about the last check may cover the button.
     await button.press('Enter');
     await until('it was asked', () => asked.length > count);
     await until('that is over', async () => (await agent.ask('GET', '/api/jobs')).body.every((job) => job.stage !== 'running'));
@@ -291,13 +291,13 @@ on('every option of an update is sent as it was chosen, and each form of a file 
   const sent = await check(/Checks passed|Next: /);
   assert.deepEqual([sent.format, sent.addresses, sent.date, sent.expect_program_id], ['hex', 'byte', '2026-01-02', 0x4b3f]);
   assert.deepEqual([sent.group, sent.force, sent.accept_unverified, sent.boards], [true, true, true, [{ board: 1 }, { board: 2 }]]);
-  // A second image is for other boards than these: said before anything is written, and taken away again.
+  // A second image does not fit these boards: the page says so before anything is written. Then the image is removed again.
   await page.getByLabel('Second image').setInputFiles({ name: 'data.bin', mimeType: 'application/octet-stream', buffer: bytes });
   await until('it is read', () => page.getByRole('button', { name: 'Without a second image' }).isVisible());
   assert.equal((await check(/Next: /)).second, bytes.toString('base64'));
   await page.getByRole('button', { name: 'Without a second image' }).click();
   assert.equal((await check(/Checks passed|Next: /)).second, undefined);
-  // The same name again, built anew: its new bytes.
+  // A file that was built again under the same name is sent with its new bytes.
   await choose('app.txt', Buffer.from(intelHex(image(32))));
   assert.equal(Buffer.from((await check(/Checks passed|Next: /)).image, 'base64').toString(), intelHex(image(32)));
 });
@@ -367,7 +367,7 @@ on('Stop stands at one place on every tab and in dialogs', { boards: 2 }, async 
 
 on('no width scrolls sideways, and axe finds nothing, light and dark', { boards: 3, edges: EDGES.replace('PROGRAM', '0x8676') }, async ({ agent, look }) => {
   await running(agent, [1, 2], true);
-  // What axe looks at depends on the colours and on whether the page is a narrow one: twice is enough.
+  // The result of axe depends only on the colours and on a narrow or wide page, so two runs are sufficient.
   const seen = new Set(['360 light', '1400 dark']);
   const flaws = async (page, where) => {
     if (![...seen].some((of) => where.endsWith(of))) return;

@@ -1,4 +1,4 @@
-// What the page guards against: torque with another arm's parameters, an arm drawn where it is not, waypoints in other units, keys that cannot work.
+// Mistakes that the page prevents: torque with another arm's parameters, an arm drawn in a wrong pose, waypoints in wrong units, keys without effect.
 import assert from 'node:assert/strict';
 import { readFileSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,7 +11,7 @@ before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-// At a port, as a real controller is: the question names the arm and the risk.
+// The controller is at a port, like a real one: the dialog names the arm and the risk.
 on('a controller without parameters gets none before the page has asked which arm it is', { faults: 'format = 2\n' }, async ({ agent, look }) => {
   const page = await look();
   const sent = [];
@@ -20,7 +20,7 @@ on('a controller without parameters gets none before the page has asked which ar
   });
   await state(page).getByText('No torque').waitFor();
   const dialog = page.getByRole('dialog', { name: 'Which arm is this?' });
-  // Wherever the page offers it, and neither Escape nor Enter on what has the focus first recovers.
+  // Tests each Recover button of the page. Neither Escape nor Enter on the element with the first focus recovers the arm.
   for (const [button, key] of [[state(page).getByRole('button', { name: 'Recover …' }), 'Escape'], [page.locator('#panel').getByRole('button', { name: 'Recover …' }), 'Enter']]) {
     await button.focus();
     await page.keyboard.press('Enter');
@@ -33,7 +33,7 @@ on('a controller without parameters gets none before the page has asked which ar
     await dialog.waitFor({ state: 'detached' });
   }
   assert.deepEqual(sent, []);
-  // Another arm: its file is compared, and given.
+  // Another arm: its file is compared and sent.
   const { text } = (await agent.ask('GET', '/api/arm')).body;
   writeFileSync(join(agent.dir, 'mine.toml'), text.replace('kp = 8000', 'kp = 7900'));
   await state(page).getByRole('button', { name: 'Recover …' }).click();
@@ -60,7 +60,7 @@ on('an arm at rest is drawn where it stands in a new theme, and when its gains a
   });
   const same = async (what) => (await posed()).measured.forEach((q, i) => assert.ok(Math.abs(q - at[i]) < 0.002, `${what}: joint ${i + 1} is drawn at ${q}, stands at ${at[i]}`));
   const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
-  // Dark, light, and as the system has it.
+  // Dark, light, and the setting of the system.
   for (const wanted of ['dark', 'light', 'light']) {
     await page.getByRole('button', { name: /^Theme/ }).click();
     await until(`the theme is ${wanted}`, async () => (await theme()) === wanted);
@@ -107,7 +107,7 @@ on('waypoints that are added are in the units of the file, and planned so', {}, 
     const { body } = await agent.ask('GET', `/api/trajectories/${/number (\d+)/.exec(kept)[1]}/points`);
     body.positions_rad.at(-1).forEach((q, i) => assert.ok(Math.abs(q - to[i]) < 0.005, `${file}, ${button}: joint ${i + 1} ends at ${q} rad, the arm stands at ${to[i]} rad`));
   }
-  // A table that cannot take the row stays as it is.
+  // A table that cannot take the row is unchanged.
   const own = 't,q1,q2,q3,q4,q5,q6,qd1\n';
   await text.fill(own);
   await page.getByRole('button', { name: 'Add current position' }).click();
@@ -124,7 +124,7 @@ on('the jog keys are disabled while a motion is uploaded, with the reason', {}, 
   await page.click('#tab-jog');
   const keys = page.getByRole('button', { name: /^Joint \d, / });
   await until('they are enabled', async () => (await keys.count()) === 12 && (await keys.nth(0).isEnabled()));
-  // Seen in one moment: an upload is short.
+  // The page itself watches for the upload, which is short.
   const seen = page.evaluate(() => new Promise((done) => {
     const look = () => {
       const reason = [...document.querySelectorAll('#panel .note')].map((note) => note.textContent).find((text) => /being uploaded/.test(text));

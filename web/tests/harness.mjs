@@ -1,4 +1,4 @@
-// What the tests of the built page stand on: an agent with a simulated arm, the page in front of it, and a browser.
+// Base of the tests of the built page: an agent with a simulated arm, its page, and a browser.
 import assert from 'node:assert/strict';
 import { spawn } from 'node:child_process';
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
@@ -10,15 +10,15 @@ import { fileURLToPath } from 'node:url';
 
 import { chromium } from 'playwright-core';
 
-/** Pictures of pages in which a test has failed. */
+/** Folder for pictures of pages with a failed test. */
 const FAILED = fileURLToPath(new URL('./out/', import.meta.url));
-/** Those of the docs, which say what they are called. */
+/** Folder for the pictures in the docs, which contain their names. */
 const PICTURES = fileURLToPath(new URL('../pictures/', import.meta.url));
 const SHOWN = readFileSync(new URL('../../docs/dashboard.md', import.meta.url), 'utf8');
 const JTC = process.env.JTC ?? fileURLToPath(new URL('../../target/release/jtc', import.meta.url));
 const CHROMIUM = process.env.CHROMIUM ?? '/usr/bin/chromium';
 
-/** `jtc` with these arguments; resolves to what it printed. */
+/** Runs `jtc` with these arguments; resolves to its output. */
 export function jtc(args, options = {}) {
   return new Promise((done, fail) => {
     const child = spawn(JTC, args, options);
@@ -30,7 +30,7 @@ export function jtc(args, options = {}) {
   });
 }
 
-/** An agent in a directory of its own: with a simulated arm, or at a simulated controller's port, in which what `faults` says goes wrong. */
+/** Starts an agent in a new directory: with a simulated arm, or with `faults` at the port of a simulated controller that has these faults. */
 export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = undefined } = {}) {
   const dir = mkdtempSync(join(tmpdir(), 'openjtc-web-'));
   const tokenFile = join(dir, 'tokens.toml');
@@ -65,12 +65,12 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
     dir,
     operator: token('operator'),
     viewer: token('viewer'),
-    /** As a computer that loses power: nothing is closed in order. */
+    /** Kills the agent, which then closes nothing, as after a power failure. */
     kill() {
       child.kill('SIGKILL');
       return gone;
     },
-    /** Another one at its address. */
+    /** Kills the agent and starts another one at its address. */
     async again() {
       child.kill('SIGKILL');
       await gone;
@@ -89,7 +89,7 @@ export async function startAgent({ extra = [], listen = '127.0.0.1:0', faults = 
   };
 }
 
-/** Requests to an agent with a token; status and body of the answer. */
+/** Returns a function for requests to an agent with this token, which resolves to status and body of the answer. */
 export function asking(url, token) {
   return async (method, path, body, key) => {
     const headers = { Authorization: `Bearer ${token}`, 'Content-Type': 'application/json' };
@@ -112,18 +112,18 @@ export function startBrowser() {
   return chromium.launch(LAUNCH);
 }
 
-/** A browser that can be killed, as a tablet whose battery is empty. */
+/** Starts a browser that can be killed, like a tablet with an empty battery. */
 export async function startMortal() {
   const server = await chromium.launchServer(LAUNCH);
   return { browser: await chromium.connect(server.wsEndpoint()), kill: () => server.kill() };
 }
 
-/** Takes a picture for the docs where PICTURES is set and they show one of this name. */
+/** Takes a picture for the docs if PICTURES is set and the docs show a picture of this name. */
 export async function picture(page, name) {
   if (process.env.PICTURES && SHOWN.includes(`/${name}.png`)) await page.screenshot({ path: join(PICTURES, `${name}.png`) });
 }
 
-/** An agent with its page, for one test; `look` opens it in a browser of its own. */
+/** Returns an agent with its page for one test; `look` opens the page in a new browser context. */
 export function stage(browser, agent) {
   const contexts = [];
   return {
@@ -134,7 +134,7 @@ export function stage(browser, agent) {
       contexts.push(page.context());
       return page;
     },
-    /** What each page shows, for whoever looks for the reason of a failure. */
+    /** Takes a picture of each page, to find the reason of a failure. */
     async picture(name) {
       for (const [i, context] of contexts.entries()) {
         for (const page of context.pages()) await page.screenshot({ path: join(FAILED, `${name}-${i}.png`), fullPage: true }).catch(() => {});
@@ -147,7 +147,7 @@ export function stage(browser, agent) {
   };
 }
 
-/** Does it on a stage of its own, and takes a picture where it fails. */
+/** Defines tests that run on a new stage each. A failed test takes a picture. */
 export function staged(browser, start = startAgent) {
   return (name, options, act) =>
     test(name, async () => {
@@ -164,19 +164,19 @@ export function staged(browser, start = startAgent) {
     });
 }
 
-/** What the page says of the state. */
+/** Returns the part of the page with the state. */
 export function state(page) {
   return page.locator('section[aria-label="State"]');
 }
 
-/** Waits until the page says that the arm is held. */
+/** Waits until the page shows that the arm is held. */
 export function held(page) {
   return state(page).getByText('Holding', { exact: true }).waitFor();
 }
 
 /**
- * Listens from now on for what the page says in passing; what is returned waits until it has. Words may be gone before a busy browser
- * answers, so the page itself notes them.
+ * Listens from now on for a text that the page shows for a short time. The returned function waits until it was shown. The page itself notes it,
+ * because the text may have disappeared before a busy browser answers.
  */
 export async function says(page, pattern) {
   await page.evaluate((source) => {
@@ -188,18 +188,18 @@ export async function says(page, pattern) {
   return () => page.waitForFunction(() => window.heard, undefined, { polling: 100 });
 }
 
-/** The browser has complained of nothing but refused requests. */
+/** Checks that the browser has reported no errors except refused requests. */
 export function fine(page) {
   assert.deepEqual(page.complaints.filter((text) => !/status of 40[459]/.test(text)), []);
 }
 
-/** Recovers a controller without parameters, and answers which arm it is. */
+/** Recovers a controller without parameters, and selects the arm in the dialog. */
 export async function recoverAs(page, arm = 'avena') {
   await state(page).getByRole('button', { name: 'Recover …' }).click();
   await page.getByRole('dialog').getByRole('button', { name: `Recover as ${arm}` }).click();
 }
 
-/** A page that collects what a browser complains of. With `clock` the test may stop its time, and let it go on as it says (`passes`). */
+/** Opens a page that collects the errors of the browser. With `clock` the test can stop the time of the page, and advance it with `passes`. */
 export async function open(browser, url, { clock = false, ...options } = {}) {
   const context = await browser.newContext({ viewport: { width: 1400, height: 900 }, ...options });
   const page = await context.newPage();
@@ -214,12 +214,12 @@ export async function open(browser, url, { clock = false, ...options } = {}) {
   return page;
 }
 
-/** So much time passes for a page, ms, and then none: what it shows then does not depend on how busy this computer is. */
+/** Advances the time of a page by `ms` and then stops it, so that the page does not depend on the load of this computer. */
 export async function passes(page, ms) {
   await page.clock.pauseAt((await page.evaluate(() => Date.now())) + ms);
 }
 
-/** Waits until a condition holds in this process: long, for a computer that has much else to do. */
+/** Waits until a condition holds in this process; the timeout is long, for a busy computer. */
 export async function until(what, condition, within = 120_000) {
   const end = Date.now() + within;
   for (;;) {
@@ -230,7 +230,7 @@ export async function until(what, condition, within = 120_000) {
   }
 }
 
-/** Recovers the arm and runs what is given, as another client. */
+/** Calls `act` with the lease of another client. */
 export async function commanding(agent, act, name = 'test') {
   const grant = await agent.ask('POST', '/api/lease', { name, lasts_s: 60 });
   if (grant.status !== 200) throw new Error(JSON.stringify(grant));
@@ -253,7 +253,7 @@ export async function recover(agent) {
   return commanding(agent, async (key) => {
     const job = await agent.ask('POST', '/api/recover', { defaults: true }, key);
     await ended(agent, job.body.number);
-    // The drives are enabled one moment later than the controller holds.
+    // The drives are enabled shortly after the controller holds the arm.
     await until('the arm is held', async () => (await agent.ask('GET', '/api/status')).body.controller.joints.every((joint) => joint.state === 'OperationEnable'));
   });
 }

@@ -1,5 +1,5 @@
-// How the page looks, and that everyone can use it: each tab fits a phone and a large screen, and is read by axe, in light and dark. The pictures
-// in pictures/ are taken where PICTURES is set.
+// Layout and accessibility of the page: each tab fits a phone and a large screen, and axe finds no fault in light and dark. If PICTURES is set,
+// the tests also take the pictures in pictures/.
 import assert from 'node:assert/strict';
 import { writeFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -11,14 +11,14 @@ import { commanding, ended, jtc, picture, recover, staged, startBrowser, state, 
 
 const TABS = ['state', 'run', 'jog', 'teach', 'arm', 'plots', 'log'];
 const SIZES = [[360, 740], [800, 1180], [1400, 900]];
-// What axe looks at depends on the colours and on whether the page is a narrow one: twice is enough.
+// The result of axe depends only on the colours and on a narrow or wide page, so two runs are sufficient.
 const READ = ['360 light', '1400 dark'];
 let browser;
 before(async () => (browser = await startBrowser()));
 after(() => browser.close());
 const on = staged(() => browser);
 
-/** All of it is reported, not the first alone. */
+/** All faults so far; they are reported together. */
 const wrong = [];
 function collect(found, what) {
   wrong.push(...found.map((each) => `${what}: ${each}`));
@@ -34,7 +34,7 @@ async function reads(page, what) {
   collect(found, what);
 }
 
-/** Nothing is wider than the page, and everything that is touched is large enough for it. */
+/** Checks that nothing is wider than the page, and that all controls are large enough for a touch. */
 async function fits(page, what) {
   const found = await page.evaluate(() => {
     const out = [];
@@ -48,7 +48,7 @@ async function fits(page, what) {
   collect(found, what);
 }
 
-/** An arm with something on each tab: a pose, a run that is over, a payload. */
+/** Prepares an arm with content for each tab: poses, a finished run, a payload. */
 async function furnish(agent) {
   await recover(agent);
   await commanding(agent, async (key) => {
@@ -141,7 +141,7 @@ on('a motion and its preview', {}, async ({ agent, look }) => {
   await page.waitForTimeout(500);
   await reads(page, 'preview');
   await picture(page, 'preview-1400-light');
-  // Slow, for a busy computer that takes seconds for a picture.
+  // At a low speed, because a busy computer needs seconds for a picture.
   await page.getByLabel('Speed, % of its own').selectOption({ label: '25 %' });
   await page.getByRole('button', { name: /^Run/ }).click();
   await state(page).getByText('Moving', { exact: true }).waitFor();

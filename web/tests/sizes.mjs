@@ -1,4 +1,4 @@
-// Holds the built page to its sizes: what is loaded first, and all of it, as a browser gets it compressed.
+// Checks the sizes of the built pages, compressed as for a browser: the scripts that are loaded first, and all files.
 import { readdirSync, readFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -13,7 +13,7 @@ const follow = (path, first) => {
   if (first.has(path)) return;
   first.add(path);
   const text = readFileSync(path, 'utf8');
-  // Static imports alone: what is imported by a call is loaded later.
+  // Only static imports: dynamic imports are loaded later.
   for (const [, next] of text.matchAll(/(?:from|import)\s*["'](\.\/[^"']+\.js)["']/g)) follow(join(dirname(path), next), first);
 };
 let large = false;

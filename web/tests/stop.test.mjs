@@ -1,4 +1,4 @@
-// Stop, and what is said when nothing can be known: the part of the page that everything else stands behind.
+// Stop, and the messages about an unknown state: the most important part of the page.
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -12,7 +12,7 @@ after(() => browser.close());
 
 const on = staged(() => browser);
 
-/** Half a minute of motion, begun by another client: it lasts longer than a busy computer takes to act. */
+/** Starts a motion of half a minute as another client, and calls `act` during it: long enough for a busy computer. */
 async function moving(agent, act) {
   await jtc(['example', 'motion', '-o', agent.dir]);
   const text = readFileSync(join(agent.dir, 'motion.csv'), 'utf8');
@@ -35,7 +35,7 @@ on('Stop by one touch ends a motion, and says what it did', {}, async ({ agent, 
   await state(page).getByText('Holding').waitFor();
   await moving(agent, async () => {
     await state(page).getByText('Moving').waitFor();
-    // The press alone: nobody has to let go for it.
+    // Stop acts on the press, without a release of the button.
     const box = await page.getByRole('button', { name: /STOP/ }).boundingBox();
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     const said = await says(page, /Stopped on the path in \d\.\d s; the arm is held/);
@@ -134,7 +134,7 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   await recover(agent);
   const page = await look({ clock: true });
   await state(page).getByText('Holding').waitFor();
-  // A picture that is drawn for the first time keeps a computer without graphics busy.
+  // The first drawing keeps a computer without graphics hardware busy.
   await until('the arm is drawn', () => page.getByTestId('view').evaluate((box) => (box.scene?.drawn ?? 0) > 0));
   await jtc(['example', 'motion', '-o', agent.dir]);
   await page.click('#tab-run');
@@ -142,7 +142,7 @@ on('an agent that hangs is noticed as well, and comes back by itself', {}, async
   agent.suspend();
   await passes(page, 2000);
   await page.getByText('No connection', { exact: true }).first().waitFor();
-  // The window in which somebody looks for a file stays open longer than that.
+  // A file dialog may stay open longer than that.
   await file.setInputFiles(join(agent.dir, 'motion.csv'));
   agent.wake();
   await page.clock.resume();
@@ -169,10 +169,10 @@ on('a Stop that nobody confirms says so, at once and as often as it is touched',
   const page = await look();
   await state(page).getByText('Holding').waitFor();
   const words = page.getByTestId('stop-words');
-  // What is opened later is loaded now.
+  // Loads the parts of the page that are opened later.
   await page.getByRole('button', { name: 'Nobody commands' }).click();
   await page.getByRole('button', { name: 'Close' }).click();
-  // An earlier one, whose words are still shown.
+  // The message of an earlier Stop is still shown.
   await page.getByRole('button', { name: /STOP/ }).click();
   await words.getByText(/Nothing was moving/).waitFor();
   const seen = await page.evaluate(() => {
@@ -191,7 +191,7 @@ on('a Stop that nobody confirms says so, at once and as often as it is touched',
   assert.match(await words.innerText(), /STOP NOT SENT/);
   const texts = [...new Set(await page.evaluate(() => globalThis.seen))];
   assert.deepEqual(texts.filter((text) => !/NOT CONFIRMED|NOT SENT|being sent|Nothing was moving/.test(text)), []);
-  // In a dialog it is said beside the button there.
+  // A dialog shows the message next to its own button.
   await page.getByRole('button', { name: 'Not known' }).click();
   await page.getByRole('dialog').getByRole('alert').getByText(/STOP NOT SENT/).waitFor();
   agent.wake();
@@ -216,7 +216,7 @@ on('Pause touched twice is a pause', {}, async ({ agent, look }) => {
   }
   await state(page).getByText('Paused', { exact: true }).waitFor();
   assert.equal((await agent.ask('GET', '/api/status')).body.controller.trajectory, 'Pause');
-  // Said in whole, beside what is wrong.
+  // The message is complete and visible in addition to the errors.
   await page.setViewportSize({ width: 360, height: 740 });
   const [toasts, dock] = await Promise.all([page.getByRole('region', { name: 'Messages' }).boundingBox(), page.locator('footer').boundingBox()]);
   assert.ok(toasts.y + toasts.height <= dock.y, JSON.stringify({ toasts, dock }));
@@ -226,7 +226,7 @@ on('an address with a token that is none shows the page all the same', {}, async
   await recover(agent);
   const page = await look({ token: '%E0%A4%A' });
   await page.getByRole('dialog').getByText(/not accepted/).waitFor();
-  // On this computer nobody needs a token to stop, and a wrong one keeps nobody from it.
+  // On the agent's own computer a Stop needs no token, and a wrong token does not prevent it.
   await page.getByRole('dialog').getByRole('button', { name: /STOP/ }).click();
   await until('it was sent', async () => (await agent.ask('GET', '/api/status')).body.last_halt === 1);
 });

@@ -7,7 +7,7 @@ import { given, minus, nameParts, rangeOf, stepOf, text, typed, unitWords } from
 import type { BoardObject, Status } from '../../src/lib/chain/types.ts';
 import { boardList, boardWords, busWords, eventWords, stoppedWords } from '../../src/lib/chain/words.ts';
 
-/** A clock that is moved by hand. */
+/** Clock that the test sets. */
 class Clock {
   time = 0;
   #waiting: { at: number; act: () => void }[] = [];

@@ -29,7 +29,7 @@ class FakeSocket implements Socket {
   }
 }
 
-/** Time that goes on when it is advanced. */
+/** Clock that the test advances. */
 class World implements Surroundings {
   time = 0;
   sockets: FakeSocket[] = [];

@@ -40,7 +40,7 @@ function scene(): ArmScene {
   return new ArmScene(new Canvas() as unknown as HTMLCanvasElement, LIGHT, renderer);
 }
 
-/** Ten places where an arm rests: the zero pose, one joint, all, near limits, tiny. */
+/** Ten poses of an arm at rest: the zero pose, with one joint moved, with all joints moved, near limits, tiny positions. */
 const POSES: number[][] = [
   [0, 0, 0, 0, 0, 0], [0.14, 0.5, -1, 0, 0.8, 0], [0, 0, -0.47, 0, 0, 0], [2.99, -2.99, 2.99, -2.99, 2.99, -2.99], [0, 0, 0, 0, 0, 1.57],
   [-1.2, 0.3, 0.3, 0.3, 0.3, 0.3], [1e-5, -1e-5, 1e-5, 0, 0, 0], [0.0001, 0.5, -1.0001, 0.0004, 0.8, 0.0001], [-0.7, -0.6, 1.1, 0.4, 0.7, 0.2], [3, 3, 3, 3, 3, 3],
@@ -48,7 +48,7 @@ const POSES: number[][] = [
 const COM: Vector = [0.01, -0.02, 0.06];
 const GHOST_OFF = 0.2;
 
-/** What makes new bodies while the arm rests. */
+/** Changes that create new bodies while the arm is at rest. */
 const CHANGES: Record<string, (drawn: ArmScene) => void> = {
   'a dark theme': (drawn) => drawn.paint(DARK),
   'a dark theme and a light one again': (drawn) => {

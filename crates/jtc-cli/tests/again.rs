@@ -1,4 +1,4 @@
-//! Interrupted runs: their remainder, and the place from which it runs.
+//! Interrupted runs: their remainder, and the position from which it runs.
 #![cfg(unix)]
 
 use crate::common;
@@ -146,7 +146,7 @@ fn moving_with(sim: &Sim, words: &[&str]) -> std::process::Child {
     moving_while(sim, &[&["traj", "run"], words].concat(), 1.0)
 }
 
-/// Stopped by a user, or interrupted with its program: the remainder runs from the last proved place.
+/// After a stop by the user, or if the program was interrupted, the remainder runs from the last recorded position.
 #[test]
 fn a_run_that_was_broken_off_goes_on_where_it_was() {
     let sim = Sim::start(&["--no-throttle"]).held();
@@ -163,7 +163,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
         let before = place(&sim);
         assert!(before[0] > 0.01, "{before:?}");
         let output = sim.jtc(&["--json", "traj", "continue", &record]).ends(0);
-        // A recorded stop shows the final position of the arm; an unrecorded stop proves no place.
+        // A recorded stop shows the final position of the arm; an unrecorded stop shows none.
         let stands = output.err.contains("and the arm stands there: it goes on from there");
         assert!(stands || signal == "-KILL" && output.err.contains("no later place of it"), "{}", output.err);
         let value = output.json();
@@ -190,7 +190,7 @@ fn a_run_that_was_broken_off_goes_on_where_it_was() {
     assert!(!std::path::Path::new(&rest).exists());
 }
 
-/// After an error the arm is recovered first; if it was moved meanwhile, an approach leads to the place.
+/// After an error the arm is recovered first. If it was moved meanwhile, an approach leads to the position.
 #[test]
 fn a_run_that_ended_in_an_error_goes_on_after_an_approach() {
     let faults =

@@ -4,7 +4,7 @@ use crate::common;
 
 use common::{Sim, jtc, motion};
 
-/// An arm file whose first two joints have lower speed limits than the controller.
+/// Writes an arm file whose first two joints have lower speed limits than the controller.
 fn slower(dir: &std::path::Path) -> String {
     let arm = include_str!("../../../arms/avena.toml").replacen(
         "velocity_max_rad_s = 1.5",

@@ -4,7 +4,7 @@ use crate::common;
 
 use common::{Sim, motion};
 
-/// Joint 3 of this arm is missing on the bus.
+/// Fault file: joint 3 of this arm is missing on the bus.
 const WITHOUT: &str = "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_s = 0\n";
 
 #[test]

@@ -161,7 +161,7 @@ fn broken_off() {
     page.finish();
 }
 
-/// A hand leads the simulated arm.
+/// Tests the section in which a hand leads the simulated arm.
 fn taught() {
     let mut page = Page::new(PAGE, "teach");
     let mut desk = Desk::simulated(&["--no-throttle"]);

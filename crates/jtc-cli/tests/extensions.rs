@@ -5,7 +5,7 @@ use crate::common;
 use common::{Sim, jtc, motion};
 use serde_json::Value;
 
-/// An arm file that is not the built-in arm: a gain, a limit of a joint, and a setting of the controller differ.
+/// Writes an arm file that differs from the built-in arm in a gain, a limit of a joint, and a setting of the controller.
 fn another(sim: &Sim) -> String {
     let text = include_str!("../../../arms/avena.toml")
         .replacen("name = \"avena\"", "name = \"another\"", 1)

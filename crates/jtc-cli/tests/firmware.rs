@@ -17,7 +17,7 @@ const H745: &str = "nucleo-h745zi-q";
 /// A wrong SHA-256; the library computes the correct one of 4096 bytes.
 const WRONG: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// An image of this board, which does nothing.
+/// Returns an image for this board, which does nothing.
 fn image(board: &str) -> Vec<u8> {
     let mut bytes = vec![0; 0x1000];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
@@ -39,7 +39,7 @@ fn image(board: &str) -> Vec<u8> {
     bytes
 }
 
-/// A drive with this label, an image, and in another folder a catalogue that lists the image with a wrong digest.
+/// Creates a drive with this label, an image, and in another folder a catalogue that lists the image with a wrong digest.
 fn desk(label: &str) -> (Dir, String, String) {
     let dir = Dir::new();
     fs::create_dir(dir.path(label)).unwrap();

@@ -5,11 +5,11 @@ use crate::common;
 use common::{Sim, jtc, slow_motion};
 use serde_json::Value;
 
-/// Joint 3 falls silent in the middle of a motion.
+/// Fault file: joint 3 does not answer in the middle of a motion.
 const SILENT: &str =
     "format = 2\n[[fault]]\nkind = \"node-silent\"\njoint = 3\nat_point = 700\nfor_s = 0.5\n";
 
-/// A controller after this fault.
+/// Returns a controller after this fault.
 fn after_fault() -> Sim {
     let sim = Sim::with_faults(&["--no-throttle"], SILENT).held();
     let file = sim.file("motion.csv", &slow_motion(30));
@@ -35,7 +35,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
         (&Value::from("joint 3: does not answer"), &Value::from(true))
     );
     assert_eq!(first["joints"], serde_json::json!([3]));
-    // At least two seconds before it, 0.3 s after it, all real values.
+    // The log begins at least two seconds before the fault and ends 0.3 s after it, with all measured values.
     let at = first["time_s"].as_f64().unwrap();
     assert!(fetched["from_s"].as_f64().unwrap() < at - 2.0);
     assert!((fetched["to_s"].as_f64().unwrap() - at - 0.3).abs() < 1e-9);
@@ -43,7 +43,7 @@ fn j56_after_a_fault_the_log_leads_with_what_broke_first_and_replays_without_a_d
     assert!(count(&fetched, "replayed") > 2_300, "{fetched}");
     assert_eq!((count(&fetched, "other_arm"), count(&fetched, "other_trajectory")), (0, 0));
 
-    // The page begins with the fault; the recording is a normal one, and holds the log.
+    // The page begins with the fault. The recording is a normal one that also contains the log.
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains("after the start of the device: joint 3: does not answer"));
     let report = jtc(&["--json", "report", &recording, "--out", &sim.path("again.html")]).ends(0).json();

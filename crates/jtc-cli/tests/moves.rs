@@ -61,7 +61,7 @@ fn j55_a_run_that_the_controller_s_arm_or_payload_forbids_moves_nothing() {
     let motion = format!("{folder}/motion.csv");
     let elsewhere = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
     let refused = |sim: &Sim, kind: &str| {
-        // Slowly: the given payload does not exist.
+        // At a low speed, because the real arm does not carry the payload that was set.
         sim.jtc(&["move", "--to", "0.3,0.2,-0.3,0,0,0", "--speed", "20"]).ends(0);
         let refused = sim.json(&["traj", "run", &motion, "--approach"], 4);
         let kinds: Vec<_> =
@@ -383,7 +383,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     let planned = jtc(&["--json", "plan", &taught, "-o", &out, "--blend", "0.02"]).ends(0).json();
     assert_eq!(planned["waypoints"].as_u64(), Some(count));
     sim.jtc(&["traj", "run", &out, "--approach"]).ends(0);
-    // As led: there and back, 0.3 rad.
+    // The replay moves as the hand did: there and back, 0.3 rad.
     let replay = ["traj", "replay", &recording, "--measured", "--approach"];
     let mut patience = Patience::begin();
     let output = loop {
@@ -403,7 +403,7 @@ fn a_motion_by_hand_is_waypoints_or_run_again() {
     }
 }
 
-/// Joint 1, which gravity does not turn, there and back in 3 s.
+/// Returns a motion of joint 1, which gravity does not turn, there and back in 3 s.
 fn lead() -> String {
     let row = |i: i32| {
         let q = 0.15 - 0.15 * (std::f64::consts::TAU * f64::from(i) / 300.0).cos();

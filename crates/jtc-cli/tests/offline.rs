@@ -269,7 +269,7 @@ fn examples_are_files_that_the_named_commands_take() {
             "toml" if name == "arm" => drop(jtc(&["params", "show", file]).ends(0)),
             "toml" => {}
             _ if file.ends_with("-waypoints.csv") => {
-                // Not a trajectory yet.
+                // A file of waypoints is not a trajectory.
                 let refused = jtc(&["traj", "check", file]).ends(2);
                 assert!(refused.err.contains("`jtc plan`"), "{}", refused.err);
                 let planned = dir.path().join(format!("{name}-planned.csv"));

@@ -98,7 +98,7 @@ impl Session {
     }
 }
 
-/// Exit code, stdout, the rest of stderr, and the simulator.
+/// Exit code, stdout and remaining stderr of a command, and the simulator.
 struct Ended {
     code: i32,
     value: serde_json::Value,

@@ -5,10 +5,10 @@ use crate::common;
 use common::{Sim, jtc, moving_while};
 use serde_json::Value;
 
-/// Bent, so that shoulder and elbow carry the payload.
+/// Motion to a bent pose, in which shoulder and elbow carry the payload.
 const BENT: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n1.5,0,0.35,0.3,0,0.3,0\n3,0,0.7,0.6,0,0.6,0\n";
 
-/// Stretched out at the end.
+/// Returns a motion to a stretched pose.
 fn stretched() -> String {
     BENT.replace("0.7,0.6,0,0.6", "1.5,0.1,0,0.1").replace("0.35,0.3,0,0.3", "0.75,0.05,0,0.05")
 }

@@ -12,7 +12,7 @@ fn json(words: &[&str], code: i32) -> Value {
     jtc(&[&["--json", "plan"], words].concat()).ends(code).json()
 }
 
-/// Time and positions of each line of a trajectory.
+/// Returns time and positions of each line of a trajectory.
 fn rows(file: &str) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(file).unwrap();
     let mut lines = text.lines();

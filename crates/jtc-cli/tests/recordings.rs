@@ -96,7 +96,7 @@ fn a_run_that_is_killed_leaves_its_recording() {
     }
 }
 
-/// Milliseconds of the path in a recording that is still being written.
+/// Returns the path time of a recording that is still being written, ms.
 fn recorded_ms(record: &str) -> u64 {
     let samples = jtc_host::recording::Recording::read(std::path::Path::new(record)).map(|read| read.samples);
     samples.unwrap_or_default().iter().map(|sample| u64::from(sample.point)).max().unwrap_or(0)
@@ -132,7 +132,7 @@ fn a_recording_that_breaks_off_on_the_way_is_an_error_although_the_run_was_good(
     std::fs::write(&file, motion(0.2)).unwrap();
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
-    // A reader that takes only the header.
+    // The reader takes only the header.
     let reader = std::thread::spawn({
         let pipe = pipe.clone();
         move || {

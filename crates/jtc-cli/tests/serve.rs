@@ -149,7 +149,7 @@ fn an_agent_without_a_port_and_with_wrong_words_says_what_to_do() {
     assert!(open.err.contains("chmod 600"), "{}", open.err);
 }
 
-/// An arm file under another name, and with gains that no frame carries.
+/// Writes two arm files: one with another name, and one with gains that no frame can carry.
 fn arm_files(dir: &tempfile::TempDir) -> [String; 2] {
     let avena = include_str!("../../../arms/avena.toml");
     let file = |name: &str, text: String| {

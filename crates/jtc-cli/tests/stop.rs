@@ -202,7 +202,7 @@ fn teaching_is_ended_and_the_arm_is_held() {
     assert!(stopped.out.contains("stopped: the arm stands; jtc teach record"), "{}", stopped.out);
     ends(child, 5);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
-    // Directly, too.
+    // A direct Stop ends teaching, too.
     cell.jtc(&["teach", "on"]).ends(0);
     cell.jtc(&["stop"]).ends(0);
     assert_eq!(cell.0.json(&["status"], 0)["state"], "HoldPos");
@@ -237,7 +237,7 @@ fn a_program_that_uses_the_library_is_stopped_while_it_is_busy_otherwise() {
     let checked = CheckedTrajectory::check(&loaded.trajectory, &arm, &status.positions(), &options).unwrap();
     session.upload(&checked, |_| Flow::Continue).unwrap();
     session.execute(&checked).unwrap();
-    // The program does not read any more.
+    // The program no longer reads.
     std::thread::sleep(Duration::from_millis(1500));
     let stopped = cell.jtc(&["--json", "stop"]).ends(0).json();
     assert_eq!(stopped["arms"][0]["moved"], true, "{stopped}");
@@ -285,7 +285,7 @@ fn nothing_to_stop_is_a_success_in_every_state() {
     cell.jtc(&["recover", "--defaults"]).ends(0);
     nothing("HoldPos", "Null");
     cell.jtc(&["traj", "run", &file]).ends(0);
-    // A finished one is ended by the first Stop.
+    // The first Stop ends a finished trajectory.
     let direct = cell.jtc(&["stop"]).ends(0);
     assert_eq!(direct.out.trim_end(), "nothing was moving: state HoldPos, trajectory Stop");
     nothing("HoldPos", "Stop");

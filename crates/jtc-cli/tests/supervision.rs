@@ -7,7 +7,7 @@ use crate::common;
 use common::{Sim, agent::Agent, moving_while};
 use test_kit::patience::Patience;
 
-/// An arm held by a controller that supervises its host.
+/// Returns an arm that is held by a controller with host supervision.
 fn supervised(host_timeout_ms: u32) -> Sim {
     let sim = Sim::start(&[]);
     let arm = include_str!("../../../arms/avena.toml");
@@ -17,7 +17,7 @@ fn supervised(host_timeout_ms: u32) -> Sim {
     sim.held()
 }
 
-/// A motion of 8 s.
+/// Motion of 8 s.
 const MOTION: &str = "t,q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0,0\n8,0.4,0,0,0,0,0\n";
 
 #[test]

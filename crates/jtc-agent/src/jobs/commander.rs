@@ -1,4 +1,4 @@
-//! Session of an HTTP client, which has no connection of its own: each request shows that the client is alive.
+//! Session of an HTTP client without a connection to the line: each request shows that the client is alive.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
@@ -22,7 +22,7 @@ const MOTION_ENDED: &str = "motion-ended";
 /// Function that runs on the session of a client.
 type Work = Box<dyn FnOnce(&mut Session<ClientPort>) + Send>;
 
-/// Connection of a client to the line, with a session on a thread of its own.
+/// Connection of a client to the line, with its session on a separate thread.
 pub struct Commander {
     /// Number of the client on the line.
     pub client: ClientId,

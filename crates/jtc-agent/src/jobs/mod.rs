@@ -1,5 +1,5 @@
-//! Work of an agent for clients without a connection of their own: keeps their connections to the line, runs their
-//! jobs, and writes a journal that a client can read when it returns.
+//! Work of an agent for clients without a connection to the line: keeps connections for them, runs their jobs, and writes a journal that a
+//! client can read when it returns.
 mod commander;
 mod give;
 mod happening;
@@ -35,7 +35,7 @@ pub use task::{STOPPED, Task, stopped};
 
 /// Number of jobs that are kept.
 const KEPT: usize = 256;
-/// Largest number of clients without a connection of their own.
+/// Largest number of clients without a connection to the line.
 const COMMANDERS_MAX: usize = 32;
 /// Time after the end of its lease until a silent client is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);

@@ -49,7 +49,7 @@ pub type Notify = Box<dyn FnMut(Notice) + Send>;
 pub struct Disk {
     queue: SyncSender<Message>,
     waiting: Arc<AtomicUsize>,
-    /// Number of samples of this recording that found no place.
+    /// Number of samples of this recording that did not fit into the queue.
     lost: u64,
 }
 

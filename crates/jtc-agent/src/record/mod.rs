@@ -191,7 +191,7 @@ struct Reel {
     clock: Option<StatusClock>,
 }
 
-/// Statuses with their arrival times, and number of statuses that found no place.
+/// Statuses with their arrival times, and number of statuses that did not fit into the queue.
 type Arrived = Rc<RefCell<(VecDeque<(Duration, Status)>, u64)>>;
 
 /// State of the following thread.

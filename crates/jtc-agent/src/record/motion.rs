@@ -89,7 +89,7 @@ impl Follower {
     pub fn status(&mut self, now: Duration, status: &Status) -> Vec<Step> {
         let mut steps = self.silence(now);
         let motion = self.motion(now, status);
-        // Another motion gets a recording of its own, even directly after the last one.
+        // Another motion gets a separate recording, even directly after the last one.
         let another = motion.is_some_and(|motion| {
             self.open.as_ref().is_some_and(|open| open.motion != motion)
                 || motion == Motion::Execution && self.begins_anew(status)

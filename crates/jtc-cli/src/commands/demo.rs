@@ -23,9 +23,9 @@ use crate::tape::Tape;
 
 /// Seed of the demo: every demo gives the same figures.
 const SEED: u64 = 1;
-/// Time before and after the motion that is recorded too.
+/// Recorded time before and after the motion.
 const MARGIN: Duration = Duration::from_millis(400);
-/// Drives take 4 s for their first enable.
+/// Longest wait for the drives; their first enable takes 4 s.
 const BRING_UP: Duration = Duration::from_secs(30);
 
 /// Files of the demo, in the order of the output.

@@ -31,7 +31,7 @@ pub struct Finished {
     kept: VecDeque<Done>,
     /// Number of runs, without approaches.
     runs: usize,
-    /// Runs and approaches that are no longer kept.
+    /// Runs and approaches whose figures were dropped.
     left_out: usize,
 }
 

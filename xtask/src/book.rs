@@ -17,7 +17,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Returns cargo for the program that makes the book. It is a separate workspace, so that a build of the project does not build mdbook.
+/// Returns cargo for the program that makes the book, a separate workspace, so that a build of the project does not build mdbook.
 fn tool(words: &[&str]) -> Command {
     let mut cargo = cargo(words);
     cargo.args(["--quiet", "--locked", "--manifest-path"]).arg(root().join("book/Cargo.toml"));

@@ -78,8 +78,8 @@ pub fn build(board: &str) -> Result<PathBuf> {
 /// Rate of both lines in the program that [`build_fast`] builds, Bd: the highest of J-01.
 const FAST: &str = "15000000";
 
-/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. It has its own build
-/// directory, so that neither build makes the other one stale.
+/// Builds the first board's program with the fastest lines, which tests need in addition to the flashed programs. The build has its
+/// own directory, so that neither build makes the other one stale.
 pub fn build_fast() -> Result<PathBuf> {
     let target = directory().join("fast");
     run(cargo_for(BOARDS[0], "build")?.env("CARGO_TARGET_DIR", &target).env("OPENJTC_BAUD", FAST))?;

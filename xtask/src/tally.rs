@@ -119,7 +119,7 @@ impl Tally {
     }
 }
 
-/// Returns the output from the first line that begins with `heading`, where test runners describe the failures.
+/// Returns the output from the first line that begins with `heading`; there test runners describe the failures.
 pub fn failures<'a>(output: &'a str, heading: &str) -> &'a str {
     let starts = |line: &str| line.trim_start_matches(['=', '_', ' ']).starts_with(heading);
     let before = output.split_inclusive('\n').take_while(|line| !starts(line)).map(str::len).sum();

@@ -14,7 +14,7 @@ use crate::tally::{self, Counts, Outcome, Tally};
 /// Path of Debian's browser.
 pub const BROWSER: &str = "/usr/bin/chromium";
 
-/// Returns a command for `program` of Node.js in `web/`. It uses Node.js from the references' environment, which needs no installation.
+/// Returns a command for `program` of Node.js in `web/`, from the references' environment, so that no Node.js must be installed.
 fn command(program: &str) -> Result<Command> {
     let python = python::environment("requirements.txt")?;
     let programs = python.parent().context("an interpreter in no folder")?;

@@ -176,7 +176,7 @@ mod console {
 
     use super::Key;
 
-    /// A console needs no other mode for single keys, so there is no mode to restore.
+    /// Does nothing, because a console needs no other mode for single keys.
     pub fn restore() {}
 
     /// Keys from the console.

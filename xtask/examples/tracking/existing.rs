@@ -151,7 +151,7 @@ impl Existing {
         self.pid = [Pid::default(); JOINTS];
     }
 
-    /// Sets the point of this millisecond. The last two milliseconds are omitted.
+    /// Sets the point of this millisecond. The points of the last two milliseconds are omitted.
     fn follow(&mut self, k: u32) {
         let end = (self.points.len() as u32 - 1) * self.step_ms;
         self.phase = Phase::Operate(k);

@@ -19,7 +19,7 @@ enum Target {
 struct Row {
     title: &'static str,
     ours: &'static str,
-    /// Anchors, of which the smallest counts; an anchor that could not be measured is named.
+    /// Anchors; the smallest one counts, and an anchor that could not be measured is named.
     anchors: &'static [&'static str],
     target: Target,
     unit: &'static str,

@@ -47,7 +47,7 @@ mod tests {
         rows.iter().find(|(row, _)| row == name).map(|(_, figures)| *figures)
     }
 
-    /// The page calls a goal met only if its figures meet the goal. It names the joints that miss it, with the limiting quantity.
+    /// The page calls a goal met only if its figures meet the goal, and names the joints that miss it, with the limiting quantity.
     #[test]
     fn j62_the_page_of_tracking_judges_its_own_figures() {
         let (page, sections) = (page(), sections(&page()));

@@ -143,7 +143,7 @@ impl Root {
         chroot
     }
 
-    /// Returns a command that runs dpkg on the system. It installs manual pages, too, which some containers tell dpkg to leave out.
+    /// Returns a command that runs dpkg on the system and installs manual pages, too, which some containers tell dpkg to leave out.
     pub fn dpkg(&self) -> Command {
         let mut dpkg = shell::command("dpkg");
         dpkg.arg("--root").arg(self.path()).arg("--path-include=/usr/*").env("LC_ALL", "C.UTF-8");
@@ -203,7 +203,7 @@ fn installed() -> Result<BTreeMap<String, Installed>> {
         packages.insert(name.to_owned(), Installed { essential: essential == "yes", depends });
         provided.extend(provides.split(',').flat_map(names).map(|other| (other, name.to_owned())));
     }
-    // The name that a package provides counts as a package that depends on it.
+    // A name that a package provides counts as a package that depends on the providing one.
     for (other, by) in provided {
         packages.entry(other).or_insert(Installed { essential: false, depends: vec![vec![by]] });
     }

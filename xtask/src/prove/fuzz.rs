@@ -136,8 +136,8 @@ const COMPARISONS: [&str; 0] = [];
 /// Arguments of the build that is guided only by coverage, in a separate folder so that neither build is repeated.
 const COVERAGE: [&str; 2] = ["--no-trace-compares", "--target-dir=fuzz/target/coverage"];
 
-/// Returns the fuzzer on `directories`; new inputs are written to the first one. It runs without address sanitizer, because the code has no
-/// `unsafe`, and is then several times as fast.
+/// Returns the fuzzer on `directories`; new inputs are written to the first one. The address sanitizer is off, because the code has no
+/// `unsafe` and the fuzzer is several times as fast without it.
 fn fuzz(target: &str, build: &[&str], directories: &[&str], options: &[&str]) -> Command {
     let mut fuzz = nightly(&["cargo", "fuzz", "run", "-s", "none"]);
     fuzz.args(build).arg(target).args(directories).arg("--").args(options);

@@ -24,8 +24,8 @@ pub struct Board {
     byte_over_us: f64,
     /// Largest number of these bytes so far.
     pub queued_most: usize,
-    /// Delays with which the operating system accepts bytes, µs, one for each write; the next field has the bytes of the present write and
-    /// the time of their acceptance.
+    /// Delays of the operating system before it accepts bytes, µs, one for each write; the next field has the bytes of the present write
+    /// and the time of their acceptance.
     pub held_up_us: VecDeque<u64>,
     handed_over: Option<(u64, Vec<u8>)>,
     receiver: Receiver<Vec<u8>>,

@@ -1,12 +1,13 @@
-//! The environment variables of `jtc`.
+//! Environment variables of `jtc`.
 
 use cli_kit::variables::{Retired, Variables};
 
-/// Which variables count, and which once did.
+/// Variables of `jtc`, and those that earlier versions used.
 pub const VARIABLES: Variables = Variables {
     json: "JTC_JSON",
     retired: &[
-        // They made a command move, reset, program, answer a question, overrule a check or write over a file, or set another file.
+        // Variables that made a command move, reset, program, answer a question, override a check or overwrite a file, or that set
+        // another file.
         Retired::less("JTC_ACCEPT_DEVICE_LIMITS", "", "accept-device-limits"),
         Retired::less("JTC_ACCEPT_SUPPLY", "", "accept-supply"),
         Retired::less("JTC_AGAIN", "", "again"),
@@ -35,7 +36,7 @@ pub const VARIABLES: Variables = Variables {
         Retired::less("JTC_TO_FLANGE", "", "to-flange"),
         Retired::less("JTC_TRAJECTORY", "traj continue", "trajectory"),
         Retired::less("JTC_YES", "", "yes"),
-        // They limited or shaped a motion or a result: without them the command would do something else.
+        // Variables that limited or changed a motion or a result: without them the command would do something else.
         Retired::other("JTC_BLEND", "plan", "blend"),
         Retired::other("JTC_BLEND_M", "plan", "blend-m"),
         Retired::other("JTC_BOARD", "", "board"),
@@ -78,7 +79,7 @@ mod tests {
     use super::*;
     use crate::args::Cli;
 
-    /// A new option brings no variable with it that acts: each one is in this list, with the reason why it may exist.
+    /// A new option must not have a variable that acts: this list contains each variable, with the reason why it may exist.
     #[test]
     fn only_places_files_formats_and_harmless_settings_have_a_variable() {
         use Kind::{File, Format, Limit, Line, Output, Place, Simulator};
@@ -127,7 +128,7 @@ mod tests {
             ("JTC_FAULTS", File),
             ("JTC_SIM_RECORD", Output),
         ];
-        // What is programmed, what a controller is given, what moves; and the words before the command that stand for JTC_PORT.
+        // Options for an image, for parameters of a controller and for a motion have no variable.
         let without = [
             "recover --arm",
             "traj continue --trajectory",

@@ -221,7 +221,7 @@ export class ChainPage {
     this.views = boards.map((board) => {
       const beat = board.heartbeat_age_s == null ? undefined : at - board.heartbeat_age_s * 1000;
       const last = before.get(board.number)?.beat;
-      // One heartbeat, received twice: its time differs by the delay of the messages.
+      // The same heartbeat, received twice: the times differ by the delay of the messages.
       return { board, at, beat: beat !== undefined && last !== undefined && Math.abs(beat - last) < BEAT_MS ? last : beat };
     });
     if (this.chosen === undefined || !boards.some((board) => board.number === this.chosen)) this.chosen = boards[0]?.number;

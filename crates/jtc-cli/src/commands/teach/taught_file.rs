@@ -1,4 +1,4 @@
-//! Hand-guided motion as a trajectory file. It is written during teaching, so that it stays complete if the program
+//! Hand-guided motion as a trajectory file, which is written during teaching, so that it stays complete if the program
 //! ends.
 
 use std::fmt::Write as _;

@@ -46,7 +46,7 @@ impl<P: Port> Session<P> {
     /// # Errors
     ///
     /// The errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
-    /// limits than the arm and they are not accepted. Nothing is changed in these cases.
+    /// limits than the arm and they are not accepted. The controller is unchanged in these cases.
     pub fn recover_with(
         &mut self,
         parameters: &RecoverParameters,

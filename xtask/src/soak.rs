@@ -13,7 +13,7 @@ pub fn main(arguments: &[String]) -> Result<ExitCode> {
     shell::nothing_left(&arguments)?;
     ensure!(hours.parse::<f64>().is_ok_and(|h| h > 0.0), "--hours needs a positive number, not `{hours}`");
     ensure!(seed.parse::<u64>().is_ok(), "--seed needs a whole number, not `{seed}`");
-    let program = ["run", "--profile", "dist", "--package", "jtc-sim", "--example", "soak", "--"];
+    let program = ["run", "--profile", "dist", "--package", "sim-checks", "--example", "soak", "--"];
     run(cargo(&program).args(["--hours", &hours, "--seed", &seed]))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -5,6 +5,7 @@
 mod bounds;
 mod catch;
 pub mod check;
+mod commanded;
 mod config;
 mod controller;
 mod deceleration;

@@ -2,7 +2,6 @@
 //!
 //! Each part has its state and one step a tick; [`Motion`] connects them, and does to all of them what a change of the
 //! controller's state requires.
-mod commanded;
 mod law;
 mod limiter;
 mod ramp;
@@ -25,7 +24,6 @@ use crate::parameters::PidGains;
 use crate::path::PathClock;
 use crate::remembered::remembered;
 use crate::teach::Taught;
-pub(crate) use commanded::Commanded;
 use law::ControlLaw;
 pub(crate) use law::{ControlMode, ControlParameters, LawInputs};
 pub(crate) use limiter::{Found, RUSH};

@@ -1,8 +1,8 @@
 //! The paths of the simulator's soak run pass the host's check: a stop on each of them must succeed.
 use jtc_host::check::Checker;
 use jtc_host::{Arm, Point, Trajectory};
-use jtc_sim::soak;
 use proptest::prelude::*;
+use sim_checks::soak;
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]

@@ -8,7 +8,7 @@ pub const TYPED_EVENTS_HELP: &str =
     "push JOINT TORQUE_NM SECONDS (as in `push 3 12 0.5`), hand FILE (as in `hand lead.csv`)";
 
 /// Largest push, N·m.
-pub(crate) const PUSH_MAX: f64 = 400.0;
+pub const PUSH_MAX: f64 = 400.0;
 /// Longest push, s.
 const PUSH_MAX_S: f64 = 60.0;
 

@@ -14,9 +14,11 @@ use crate::serial::{Line, LineFault};
 
 mod access;
 mod exchange;
+mod moment;
 
 pub use access::Statistics;
 pub use exchange::Exchange;
+pub use moment::Moment;
 
 /// Duration of a tick, µs.
 const TICK_US: u64 = 1000;

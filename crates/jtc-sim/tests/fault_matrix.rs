@@ -1,5 +1,5 @@
 //! The table of reactions in docs/safety.md shows the behaviour of the controller. `UPDATE_DOCS=1` updates it.
-use jtc_sim::matrix::{contact_table, fault_matrix, standstill_table, stopping_table};
+use sim_checks::matrix::{contact_table, fault_matrix, standstill_table, stopping_table};
 
 #[test]
 fn j12_j14_j16_j21_j22_each_fault_in_each_state_has_the_documented_reaction() {

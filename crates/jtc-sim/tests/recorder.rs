@@ -3,9 +3,9 @@ use std::collections::HashMap;
 
 use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
 use jtc_core::{Controller, POINTS_MAX, Telemetry, TrajectoryState};
-use jtc_sim::soak::Soak;
 use jtc_sim::{Operator, SimConfig, World, host};
 use jtc_wire::{ExecCommand, LogState, RawPoint, fixed};
+use sim_checks::soak::Soak;
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];

@@ -1,5 +1,5 @@
 //! The short form of the soak run, and its repeatability.
-use jtc_sim::soak::Soak;
+use sim_checks::soak::Soak;
 
 #[test]
 fn j24_random_commands_and_faults_break_no_invariant() {

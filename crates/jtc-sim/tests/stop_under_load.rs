@@ -1,8 +1,8 @@
 //! Pause and Stop while a joint carries nearly its full torque (J-33): time, distance and speed until the arm stands.
 use jtc_core::{Config, ControllerState, TrajectoryState};
-use jtc_sim::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;
+use sim_checks::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 
 /// The torque limit minus the model's torque is sufficient.
 #[test]

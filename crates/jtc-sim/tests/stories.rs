@@ -1,9 +1,9 @@
 //! Short stories of an operator and an arm.
 use jtc_bus::Joint;
 use jtc_core::{ControllerState, TrajectoryState};
-use jtc_sim::invariants::Invariants;
 use jtc_sim::{BusTap, DriveConfig, Fault, FaultKind, Operator, SimConfig, Support, Trigger, host};
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
+use sim_checks::Invariants;
 
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];

@@ -16,7 +16,8 @@ use openjtc_emulator::fdcan::{BusEntry, Outcome};
 use openjtc_emulator::{Board, BoardConfig, FIRST_LINE, Port};
 
 use jtc_core::{ControllerState, Telemetry};
-use jtc_sim::invariants::{Invariants, Moment};
+use jtc_sim::Moment;
+use sim_checks::Invariants;
 use jtc_sim::{FaultKind, host as frames};
 use jtc_wire::{DataStatus, ExecCommand, FrameStatus, Response, Status, StoreState};
 

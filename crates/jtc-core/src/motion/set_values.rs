@@ -1,6 +1,6 @@
 //! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach and of the path.
-use super::commanded::Commanded;
 use crate::catch::Catch;
+use crate::commanded::Commanded;
 use crate::config::Config;
 use crate::deceleration::{Deceleration, moves};
 use crate::interpolation::SetPoint;

@@ -16,8 +16,8 @@ use core::f64::consts::{PI, TAU};
 
 use jtc_wire::StopKind;
 
+use crate::commanded::Commanded;
 use crate::config::Config;
-use crate::motion::Commanded;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 use history::{Answered, History};

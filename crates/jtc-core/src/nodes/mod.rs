@@ -3,9 +3,9 @@
 use jtc_bus::{Answer, JointReport, NodeState, Scale, warning};
 use jtc_wire::{StopKind, can_flag};
 
+use crate::commanded::Commanded;
 use crate::config::Config;
 use crate::io::Inputs;
-use crate::motion::Commanded;
 use crate::{JOINTS, NODES};
 
 mod bring_up;

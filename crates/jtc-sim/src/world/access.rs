@@ -4,6 +4,7 @@ use jtc_core::{BusState, Controller, Telemetry};
 use jtc_dynamics::ArmModel;
 use jtc_wire::RawPoint;
 
+use super::Moment;
 use super::{Exchange, TICK_US, World};
 use crate::board::{SimRecorder, Worked};
 use crate::bus::{BusStatistics, TimedFrame};
@@ -11,7 +12,6 @@ use crate::config::SimConfig;
 use crate::event::Log;
 use crate::faults::{Fault, FaultKind, FaultPlan, Trigger};
 use crate::hand::HandPath;
-use crate::invariants::Moment;
 use crate::plant::Truth;
 
 /// Counters since the start.

@@ -2,7 +2,7 @@
 use jtc_core::{Config, Telemetry};
 
 use super::*;
-use crate::plant::Truth;
+use jtc_sim::Truth;
 
 /// Controller that behaves correctly, tick by tick; each test adds one violation.
 struct Script {

@@ -3,7 +3,7 @@ use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 
 use super::rows::{Act, ROWS, STOPS};
 use super::{MatrixError, words, world_in};
-use crate::config::Support;
+use jtc_sim::Support;
 
 /// Speed below which a joint counts as standing, rad/s.
 const STANDS: f64 = 2e-3;

@@ -1,11 +1,11 @@
-//! Input of the checker.
+//! One millisecond of the simulation, for programs that check each of them.
 use jtc_bus::Frame;
 use jtc_core::{Config, Telemetry};
 
 use crate::board::Worked;
 use crate::plant::Truth;
 
-/// A millisecond of the simulation, as the checker needs it.
+/// Millisecond of the simulation: what the controller did, and the true state of the arm.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
     /// Time since the start, µs.

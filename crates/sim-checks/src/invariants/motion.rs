@@ -4,8 +4,7 @@ use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::ExecCommand;
 
 use super::broken::Broken;
-use super::moment::Moment;
-use crate::board::Worked;
+use jtc_sim::{Moment, Worked};
 
 /// Time from a pause or stop until the arm stands, ms, in addition to the time of J-33, for the commanded motion to come to rest.
 const REST_MS: u32 = 20;

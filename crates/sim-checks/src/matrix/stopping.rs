@@ -3,8 +3,8 @@ use jtc_core::{ControllerState, Parameters};
 
 use super::MatrixError;
 use super::standstill::{Motion, state_then, stood_in_time, stop_lines};
-use crate::config::Support;
 use crate::lowering::{LOADED, Lowering, holding_torque, with_payload};
+use jtc_sim::Support;
 
 /// Share of the holding torque in the shoulder's torque limit, speed (rad/s), and `true` if the torque suffices for stopping in time.
 const LOADS: [(f64, f64, bool); 6] = [

@@ -4,15 +4,13 @@ use jtc_core::{ControllerState, JOINTS, TrajectoryState};
 use jtc_wire::{ExecCommand, FrameType};
 
 mod broken;
-mod moment;
 mod motion;
 
 pub use broken::{Broken, Violation};
-pub use moment::Moment;
 use motion::{MotionWatch, powered};
 
-use crate::board::Worked;
-use crate::world::World;
+use jtc_sim::Worked;
+use jtc_sim::{Moment, World};
 
 /// Ticks between two frames that replace Move.
 const MOVES_BETWEEN: u32 = 3;

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 use std::time::Instant;
 
-use jtc_sim::soak::Soak;
+use sim_checks::soak::Soak;
 
 /// Time after which a new world is created with the next seed, ms.
 const WORLD_MS: u64 = 600_000;

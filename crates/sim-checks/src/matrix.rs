@@ -10,10 +10,10 @@ mod stopping;
 use jtc_core::{ControllerState, JOINTS, error, joint_error};
 use jtc_wire::{ExecCommand, FrameType};
 
-use crate::config::{SimConfig, Support};
-use crate::host;
 use crate::invariants::{Invariants, Violation};
-use crate::operator::{Operator, OperatorError};
+use jtc_sim::host;
+use jtc_sim::{Operator, OperatorError};
+use jtc_sim::{SimConfig, Support};
 
 use rows::{LASTING_MS, ROWS, Row};
 

@@ -4,13 +4,13 @@ use jtc_core::{ControllerState, JOINTS, JointConfig, JointTelemetry, TrajectoryS
 use jtc_dynamics::JointVec;
 use jtc_wire::{ExecCommand, FrameType, RawPoint};
 
-use crate::config::{SimConfig, Support};
-use crate::drive::DriveConfig;
-use crate::faults::{Fault, FaultKind, Trigger};
-use crate::host::{self, Listener};
 use crate::invariants::{Invariants, Violation};
-use crate::typed::PUSH_MAX;
-use crate::world::{Statistics, World};
+use jtc_sim::DriveConfig;
+use jtc_sim::PUSH_MAX;
+use jtc_sim::host::{self, Listener};
+use jtc_sim::{Fault, FaultKind, Trigger};
+use jtc_sim::{SimConfig, Support};
+use jtc_sim::{Statistics, World};
 
 /// Step time of the paths, ms.
 pub const PATH_STEP_MS: u16 = 10;

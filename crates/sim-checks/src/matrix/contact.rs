@@ -5,11 +5,11 @@ use jtc_dynamics::Dynamics;
 
 use super::standstill::state_then;
 use super::{MatrixError, bring_to, config_for};
-use crate::arm::Side;
-use crate::config::{ModelError, Support};
-use crate::faults::{Fault, FaultKind, Trigger};
-use crate::host;
-use crate::operator::Operator;
+use jtc_sim::Operator;
+use jtc_sim::Side;
+use jtc_sim::host;
+use jtc_sim::{Fault, FaultKind, Trigger};
+use jtc_sim::{ModelError, Support};
 
 /// Observed time, ms: longer than the remainder of the motion.
 const WATCH_MS: u64 = 5_000;
@@ -188,8 +188,7 @@ pub fn contact_table() -> Result<String, MatrixError> {
 }
 
 fn outcome(meets: Meets, state: ControllerState) -> Result<Outcome, MatrixError> {
-    let config =
-        crate::config::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
+    let config = jtc_sim::SimConfig { model_error: meets.model_error(), ..config_for(Support::Stand, 0) };
     let mut operator = bring_to(config, state)?;
     if state == ControllerState::HoldPos {
         // After this time the controller knows the load.

@@ -1,8 +1,10 @@
 //! Requests to the thread that owns a device, and the Stops that overtake them.
 //!
 //! One thread owns a device: it alone calls the device's functions. Other threads put requests into the [`Queue`] of this thread, which
-//! takes them one at a time. Stops are numbered. A Stop cancels the request that is being done, and each command that was requested before
-//! the Stop is refused when its turn comes. So a command that was requested before a Stop never begins after it.
+//! takes them one at a time. A request begins when the owner takes it.
+//!
+//! Stops are numbered. A Stop cancels the request that is being done, unless it is an update. A command or an update that was requested
+//! before a Stop and has not begun is refused. So nothing that was requested before a Stop begins after it.
 //!
 //! A front end adds what it knows about a request in a tag: the client, the number of a job.
 use std::collections::VecDeque;
@@ -11,27 +13,13 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Kind of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Stop: see [`Queue::stop`]. It is taken before all others, the newest Stop first.
-    Stop,
+    /// Command. A Stop refuses it while it waits, and cancels it once begun.
+    Command,
     /// Update of a device's program. A Stop refuses it while it waits. Once begun it is not cancelled by a Stop, because a device with a
     /// half-written program could not work afterwards.
     Update,
-    /// Command. A Stop refuses it while it waits, and cancels it once begun.
-    Command,
-    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. It is taken after all commands.
+    /// Question, which changes nothing. A Stop cancels it once begun; while it waits it stays. It is taken after all commands and updates.
     Question,
-}
-
-impl Kind {
-    /// Returns `true` if a request that waits is refused after a Stop.
-    fn is_refused_after_stop(self) -> bool {
-        matches!(self, Self::Update | Self::Command)
-    }
-
-    /// Returns `true` if a Stop cancels a request that has begun.
-    fn is_cancelled_by_stop(self) -> bool {
-        matches!(self, Self::Command | Self::Question)
-    }
 }
 
 /// Reason why a request is not done.
@@ -46,13 +34,16 @@ pub enum Refused {
 }
 
 /// Function of a request: it is called once, with the device `D` or with the reason why the request is not done.
+///
+/// A refusal is passed on in the thread that refuses: that of the owner, or one that cancels, stops or puts a request. No thread may hold
+/// a lock meanwhile that the function needs.
 pub type Act<D> = Box<dyn FnOnce(Result<&mut D, Refused>) + Send>;
 
 /// Request to the owner of a device `D`, with a tag of the front end.
 pub struct Request<D, T> {
     /// Kind of the request.
     pub kind: Kind,
-    /// Number of the last Stop before the request: see [`Queue::stops`].
+    /// Number of the last Stop before the request: see [`Queue::stops`]. It does not matter for questions.
     pub after: u64,
     /// What the front end knows about the request.
     pub tag: T,
@@ -60,14 +51,23 @@ pub struct Request<D, T> {
     pub act: Act<D>,
 }
 
+impl<D, T> Request<D, T> {
+    /// Returns `true` if one of so many Stops came after the request and refuses it.
+    fn is_late(&self, stops: u64) -> bool {
+        self.kind != Kind::Question && self.after < stops
+    }
+}
+
 /// Request that is being done.
 struct Current<T> {
-    kind: Kind,
     tag: T,
+    is_cancelled_by_stop: bool,
     cancelled: bool,
 }
 
 struct State<D, T> {
+    /// Functions of Stops that have not begun, the newest first.
+    stopping: VecDeque<(T, Act<D>)>,
     waiting: VecDeque<Request<D, T>>,
     current: Option<Current<T>>,
     stops: u64,
@@ -79,8 +79,8 @@ pub struct Queue<D, T>(Mutex<State<D, T>>);
 
 impl<D, T> Default for Queue<D, T> {
     fn default() -> Self {
-        let waiting = VecDeque::new();
-        Self(Mutex::new(State { waiting, current: None, stops: 0, closed: false }))
+        let (stopping, waiting) = (VecDeque::new(), VecDeque::new());
+        Self(Mutex::new(State { stopping, waiting, current: None, stops: 0, closed: false }))
     }
 }
 
@@ -96,7 +96,7 @@ impl<D, T: Clone> Queue<D, T> {
     }
 
     /// Requests a Stop: cancels the current request, unless that is an update or a Stop, and puts `act` before all others. Returns the
-    /// number of the Stop.
+    /// number of the Stop. [`Queue::refuse_late`] should follow.
     ///
     /// The owner must watch [`Queue::stops`] or [`Queue::is_cancelled`] while it does a request: `act` has its turn only when the current
     /// request has ended.
@@ -104,7 +104,7 @@ impl<D, T: Clone> Queue<D, T> {
         self.overtake(tag, act, false)
     }
 
-    /// Like [`Queue::stop`], for Stops whose functions all do the same: `act` is dropped if another Stop waits.
+    /// Like [`Queue::stop`], for Stops whose functions all do the same: `act` is dropped if another Stop has not begun.
     pub fn stop_alike(&self, tag: T, act: Act<D>) -> u64 {
         self.overtake(tag, act, true)
     }
@@ -113,19 +113,35 @@ impl<D, T: Clone> Queue<D, T> {
         let mut state = self.lock();
         state.stops += 1;
         if let Some(current) = &mut state.current {
-            current.cancelled |= current.kind.is_cancelled_by_stop();
+            current.cancelled |= current.is_cancelled_by_stop;
         }
         let number = state.stops;
         if state.closed {
             drop(state);
             act(Err(Refused::Closed));
-        } else if !alike || state.waiting.front().is_none_or(|next| next.kind != Kind::Stop) {
-            state.waiting.push_front(Request { kind: Kind::Stop, after: number, tag, act });
+        } else if !alike || state.stopping.is_empty() {
+            state.stopping.push_front((tag, act));
         }
         number
     }
 
-    /// Returns the right to put one request, while nobody else puts or takes one. `None`: the queue is closed.
+    /// Refuses all waiting commands and updates from before the last Stop. The owner refuses them too, but only at their turn.
+    pub fn refuse_late(&self) {
+        let late = {
+            let state = &mut *self.lock();
+            let stops = state.stops;
+            let (late, waiting): (VecDeque<_>, _) =
+                std::mem::take(&mut state.waiting).into_iter().partition(|request| request.is_late(stops));
+            state.waiting = waiting;
+            late
+        };
+        // Without the lock, because the function of a request may use the queue.
+        late.into_iter().for_each(|request| (request.act)(Err(Refused::Stopped)));
+    }
+
+    /// Returns the right to put one request. `None`: the queue is closed.
+    ///
+    /// The place is the lock of the queue: its holder must not call other functions of the queue.
     pub fn place(&self) -> Option<Place<'_, D, T>> {
         Some(Place(self.lock())).filter(|place| !place.0.closed)
     }
@@ -138,17 +154,24 @@ impl<D, T: Clone> Queue<D, T> {
         }
     }
 
-    /// Takes the next request, which is the current one until [`Queue::done`]; a command or an update from before a Stop is refused.
+    /// Takes the next request, which is the current one until [`Queue::done`]: Stops first, then commands and updates, then questions.
     pub fn take(&self) -> Option<Turn<D, T>> {
         let mut state = self.lock();
-        let Request { kind, after, tag, act } = state.waiting.pop_front()?;
-        let is_late = kind.is_refused_after_stop() && after < state.stops;
+        let (tag, act, refused, is_cancelled_by_stop) = match state.stopping.pop_front() {
+            Some((tag, act)) => (tag, act, None, false),
+            None => {
+                let request = state.waiting.pop_front()?;
+                let refused = request.is_late(state.stops).then_some(Refused::Stopped);
+                (request.tag, request.act, refused, request.kind != Kind::Update)
+            }
+        };
         // A refused request is never the current one: when its requester learns of the refusal, nothing is being done for it.
-        state.current = (!is_late).then(|| Current { kind, tag: tag.clone(), cancelled: false });
-        Some(Turn { tag, refused: is_late.then_some(Refused::Stopped), act })
+        let current = Current { tag: tag.clone(), is_cancelled_by_stop, cancelled: false };
+        state.current = refused.is_none().then_some(current);
+        Some(Turn { tag, refused, act })
     }
 
-    /// Marks the current request as done.
+    /// Marks the current request as done. The owner calls this before the requester gets its answer, and after [`Turn::run`] in any case.
     pub fn done(&self) {
         self.lock().current = None;
     }
@@ -158,9 +181,9 @@ impl<D, T: Clone> Queue<D, T> {
         self.lock().current.as_ref().is_some_and(|current| current.cancelled)
     }
 
-    /// Returns `true` if the next request is a Stop.
+    /// Returns `true` if a Stop has not begun.
     pub fn stop_waits(&self) -> bool {
-        self.lock().waiting.front().is_some_and(|next| next.kind == Kind::Stop)
+        !self.lock().stopping.is_empty()
     }
 
     /// Returns `true` if a request with such a tag is being done or waits.
@@ -183,14 +206,18 @@ impl<D, T: Clone> Queue<D, T> {
         request.map(|request| (request.act)(Err(Refused::Cancelled))).is_some()
     }
 
-    /// Closes the queue: waiting requests are refused, and all that come later.
+    /// Closes the queue: all waiting requests and all later ones are refused. Only the owner calls this, when it ends.
     pub fn close(&self) {
-        let waiting = {
+        let (stopping, waiting) = {
             let mut state = self.lock();
             state.closed = true;
-            std::mem::take(&mut state.waiting)
+            // The owner may have panicked in the middle of it.
+            state.current = None;
+            (std::mem::take(&mut state.stopping), std::mem::take(&mut state.waiting))
         };
-        waiting.into_iter().for_each(|request| (request.act)(Err(Refused::Closed)));
+        let acts =
+            stopping.into_iter().map(|(_, act)| act).chain(waiting.into_iter().map(|request| request.act));
+        acts.for_each(|act| act(Err(Refused::Closed)));
     }
 }
 
@@ -201,16 +228,16 @@ impl<D, T> State<D, T> {
     }
 }
 
-/// Right to put one request into a queue.
+/// Right to put one request into a queue: its lock.
 pub struct Place<'a, D, T>(MutexGuard<'a, State<D, T>>);
 
 impl<D, T> Place<'_, D, T> {
-    /// Returns the tags of the current request and of all that wait.
+    /// Returns the tags of the current request and of all that wait, without those of Stops that have not begun.
     pub fn tags(&self) -> impl Iterator<Item = &T> {
         self.0.tags()
     }
 
-    /// Returns the number of waiting requests of this kind.
+    /// Returns the number of waiting requests of these kinds.
     pub fn waiting(&self, is_it: impl Fn(Kind) -> bool) -> usize {
         self.0.waiting.iter().filter(|request| is_it(request.kind)).count()
     }
@@ -335,6 +362,39 @@ mod tests {
         assert_eq!(bench.device, [6, 5, 3]);
         let stopped = Some(Refused::Stopped);
         assert_eq!(bench.log()[1..], [(1, stopped), (2, stopped), (4, stopped), (5, None), (3, None)]);
+    }
+
+    #[test]
+    fn late_requests_are_refused_while_an_update_goes_on() {
+        let mut bench = Bench::default();
+        bench.request(Kind::Update, 0, 1);
+        let turn = bench.queue.take().expect("it waits");
+        bench.request(Kind::Command, 0, 2);
+        bench.request(Kind::Question, 0, 3);
+        bench.stop(4);
+        bench.request(Kind::Command, 1, 5);
+        bench.queue.refuse_late();
+        assert_eq!(bench.log(), [(2, Some(Refused::Stopped))]);
+        turn.run(&mut bench.device);
+        bench.serve();
+        assert_eq!(bench.device, [1, 4, 5, 3]);
+    }
+
+    #[test]
+    fn nothing_is_done_for_a_request_that_is_refused() {
+        let queue = Arc::new(Queue::<Done, u32>::default());
+        let own = queue.clone();
+        let act: Act<Done> = Box::new(move |device| {
+            assert_eq!(device, Err(Refused::Stopped));
+            assert!(!own.has(|tag| *tag == 1));
+        });
+        queue.put(Request { kind: Kind::Command, after: 0, tag: 1, act });
+        queue.stop(2, Box::new(|_| {}));
+        let mut device = Done::new();
+        while let Some(turn) = queue.take() {
+            turn.run(&mut device);
+            queue.done();
+        }
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
+use host_kit::owner::Kind;
 use host_kit::user_folder;
 use pyo3::prelude::*;
 use serde_json::Value;
@@ -213,11 +214,12 @@ impl Chain {
         texts: bool,
         force: bool,
     ) -> Object<'py> {
+        let after = self.owner.now();
         let boards = self::boards(boards)?;
         let (inputs, parameters) = (assignments(inputs)?, assignments(parameters)?);
         let file = file.map(|file| self.parameter_file(py, &file)).transpose()?;
         let run = running::Run { boards, active, inputs, parameters, file, texts, force };
-        plain(py, self.owner.call(py, move |hands| running::run(hands, run))?)
+        plain(py, self.owner.call_after(py, after, move |hands| running::run(hands, run))?)
     }
 
     fn outputs(&self, py: Python<'_>, boards: &str, active: bool) -> PyResult<()> {
@@ -275,8 +277,10 @@ impl Chain {
     }
 
     fn apply_parameters(&self, py: Python<'_>, path: PathBuf, dry_run: bool, force: bool) -> PyResult<usize> {
+        let after = self.owner.now();
         let file = self.parameter_file(py, &path)?;
-        self.owner.call(py, move |hands| values::apply_parameters(hands, &file, dry_run, force))
+        let apply = move |hands: &mut _| values::apply_parameters(hands, &file, dry_run, force);
+        self.owner.call_after(py, after, apply)
     }
 
     /// Returns a reader of samples of boards from now on.
@@ -310,6 +314,7 @@ impl Chain {
         flags: [bool; 10],
         progress: Option<Bound<'py, PyAny>>,
     ) -> Object<'py> {
+        let after = self.owner.now();
         let source = |(file, bytes): (Option<PathBuf>, Option<Vec<u8>>)| {
             file.map(Source::File).or_else(|| bytes.map(Source::Bytes))
         };
@@ -338,7 +343,7 @@ impl Chain {
             check,
         };
         let act = move |hands: &mut _, report: &dyn Fn(Value)| update::update(hands, update, report);
-        plain(py, self.owner.call_with(py, Kind::Update, progress.as_ref(), act)?)
+        plain(py, self.owner.call_with(py, (Kind::Update, after), progress.as_ref(), act)?)
     }
 
     fn doctor<'py>(&self, py: Python<'py>) -> Object<'py> {
@@ -353,9 +358,10 @@ impl Chain {
         image: Option<PathBuf>,
         force: bool,
     ) -> Object<'py> {
+        let after = self.owner.now();
         let image = py.detach(|| image.as_deref().map(procedures::probed_image).transpose())?;
         let options = ProbeOptions { init, alive, image, force };
-        plain(py, self.owner.call(py, move |hands| procedures::probe(hands, options))?)
+        plain(py, self.owner.call_after(py, after, move |hands| procedures::probe(hands, options))?)
     }
 
     fn conformance<'py>(

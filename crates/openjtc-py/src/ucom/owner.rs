@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use host_kit::ErrorKind;
-use host_kit::owner::{Kind, Refused, Request};
+use host_kit::owner::{Act, Kind, Refused, Request};
 use pyo3::prelude::*;
 use serde_json::Value;
 use ucom_host::session::Link;
@@ -23,6 +23,9 @@ enum Message<T> {
     Progress(Value),
     Done(Result<T, Failure>),
 }
+
+/// Channel for the answers to a request.
+type Answers<T> = Mutex<mpsc::Receiver<Message<T>>>;
 
 /// Handle of the thread that owns a session.
 pub struct Owner {
@@ -61,20 +64,37 @@ impl Owner {
         py: Python<'_>,
         act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        self.call_with(py, Kind::Command, None, |hands, _| act(hands))
+        self.call_after(py, self.now(), act)
     }
 
-    /// Like [`Self::call`]; `progress` is called with each progress report.
+    /// Like [`Self::call`], for a request that was made after the Stop with this number: see [`Self::now`].
+    pub fn call_after<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        after: u64,
+        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+    ) -> PyResult<T> {
+        self.call_with(py, (Kind::Command, after), None, |hands, _| act(hands))
+    }
+
+    /// Returns the number of the last Stop. A method that reads files before its request takes the number first, so that a Stop in that
+    /// time is not overlooked.
+    pub fn now(&self) -> u64 {
+        self.shared.queue.stops()
+    }
+
+    /// Like [`Self::call_after`]; `progress` is called with each report.
     pub fn call_with<T: Send + 'static>(
         &self,
         py: Python<'_>,
-        kind: Kind,
+        (kind, after): (Kind, u64),
         progress: Option<&Bound<'_, PyAny>>,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
         let before = self.shared.last_event();
-        let (id, answers) = self.ask(kind, act);
+        let (id, act, answers) = self.request(act);
+        self.shared.queue.put(Request { kind, after, tag: id, act });
         loop {
             let reported = match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
@@ -104,11 +124,13 @@ impl Owner {
 
     /// Stops everything that this session has started after a Ctrl-C, and waits for it. Another Ctrl-C only ends the wait.
     pub fn interrupted(&self, py: Python<'_>) {
-        let (_, answers) = self.ask(Kind::Stop, |hands, _| {
+        if !self.process.is_this() {
+            return;
+        }
+        let answers = self.overtake(Halt::Started, |hands| {
             hands.leave();
             Ok(())
         });
-        self.shared.halt(Halt::Started);
         while let Ok(Received::Nothing) = self.wait(py, &answers) {
             if py.check_signals().is_err() {
                 return;
@@ -124,8 +146,7 @@ impl Owner {
         act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
         self.is_here()?;
-        let (_, answers) = self.ask(Kind::Stop, |hands, _| act(hands));
-        self.shared.halt(halt);
+        let answers = self.overtake(halt, act);
         loop {
             match self.wait(py, &answers)? {
                 Received::Done(result) => return Ok(result?),
@@ -148,11 +169,25 @@ impl Owner {
         }
     }
 
-    fn ask<T: Send + 'static>(
+    /// Requests a Stop: the frames of `halt` go out at once, and `act` has its turn before all other requests.
+    fn overtake<T: Send + 'static>(
         &self,
-        kind: Kind,
+        halt: Halt,
+        act: impl FnOnce(&mut Hands) -> Result<T, Failure> + Send + 'static,
+    ) -> Answers<T> {
+        let (id, act, answers) = self.request(|hands, _| act(hands));
+        self.shared.queue.stop(id, act);
+        // After the current request is cancelled, so that it sends nothing after these frames.
+        self.shared.halt(halt);
+        self.shared.queue.refuse_late();
+        answers
+    }
+
+    /// Returns the number of a new request, its function for the queue, and the channel for its answers.
+    fn request<T: Send + 'static>(
+        &self,
         act: impl FnOnce(&mut Hands, &dyn Fn(Value)) -> Result<T, Failure> + Send + 'static,
-    ) -> (u64, Mutex<mpsc::Receiver<Message<T>>>) {
+    ) -> (u64, Act<Hands>, Answers<T>) {
         let (sender, answers) = mpsc::channel();
         let id = self.shared.next_id();
         let own = self.shared.clone();
@@ -167,19 +202,10 @@ impl Owner {
             let _ = sender.send(Message::Done(done));
         };
         self.shared.asked();
-        let (queue, act) = (&self.shared.queue, Box::new(act));
-        match kind {
-            Kind::Stop => drop(queue.stop(id, act)),
-            _ => queue.put(Request { kind, after: queue.stops(), tag: id, act }),
-        }
-        (id, Mutex::new(answers))
+        (id, Box::new(act), Mutex::new(answers))
     }
 
-    fn wait<T: Send>(
-        &self,
-        py: Python<'_>,
-        answers: &Mutex<mpsc::Receiver<Message<T>>>,
-    ) -> PyResult<Received<T>> {
+    fn wait<T: Send>(&self, py: Python<'_>, answers: &Answers<T>) -> PyResult<Received<T>> {
         py.detach(|| match lock(answers).recv_timeout(LOOK) {
             Ok(Message::Progress(value)) => Ok(Received::Progress(value)),
             Ok(Message::Done(result)) => Ok(Received::Done(result)),

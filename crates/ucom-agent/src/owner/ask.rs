@@ -81,7 +81,10 @@ impl Shared {
             Refused::Cancelled => cancelled(),
             Refused::Closed => gone(),
         })?;
-        let late = asked.and_then(|asked| self.too_late(asked));
+        let late = asked.and_then(|asked| {
+            // A Stop may come while the leases are looked at.
+            self.too_late(asked).or_else(|| (asked.halt < self.queue.stops()).then(|| self.stopped()))
+        });
         if late.is_some() {
             // Before its client learns of it.
             self.queue.done();
@@ -109,6 +112,8 @@ impl Shared {
             // Its answer would be too late, even if it ran.
             let hands = hands.and_then(|hands| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
+                    // Before its client learns of it.
+                    own.queue.done();
                     Err(Problem::new("busy", "its turn did not come in time: it is not done", "ask again"))
                 }
                 false => Ok(hands),

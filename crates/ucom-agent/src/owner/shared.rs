@@ -142,6 +142,8 @@ impl Shared {
             self.queue.stop_alike(Tag::default(), Box::new(act))
         };
         self.show_halts();
+        // Without the lock, because refusals name the requester of the Stop.
+        self.queue.refuse_late();
         number
     }
 

@@ -1,5 +1,5 @@
-//! Diagrams that pages have as text: the script of Mermaid, which draws them in the browser, is a file of the book. Nothing is fetched from
-//! elsewhere when it is read.
+//! Diagrams that pages contain as text. Mermaid draws them in the browser. Its script is a file of the book, so that a reader's browser fetches
+//! nothing from elsewhere.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,11 +8,11 @@ use anyhow::{Context, Result, ensure};
 use mdbook_driver::book::Book;
 use serde_json::Value;
 
-/// The script, as the book has it.
+/// File name of the script in the book.
 const SCRIPT: &str = "mermaid.min.js";
 
-/// Adds the script to the end of each page that has a diagram; returns how many pages they are. The diagrams themselves are left to the
-/// preprocessor of mdbook-mermaid.
+/// Adds the script to the end of each page that has a diagram, and returns the number of these pages. The preprocessor of mdbook-mermaid
+/// handles the diagrams themselves.
 pub fn with_script(book: &mut Book) -> usize {
     let mut pages = 0;
     book.for_each_chapter_mut(|chapter| {
@@ -27,10 +27,10 @@ pub fn with_script(book: &mut Book) -> usize {
     pages
 }
 
-/// Copies the script into the book: mdbook-mermaid brings it with its source.
+/// Copies the script, which is a part of the source of mdbook-mermaid, into the book.
 pub fn copy_script(root: &Path, out: &Path) -> Result<()> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    // It reads the manifests for every platform, of which the build for this computer may have fetched a part only.
+    // `cargo metadata` reads the manifests for every platform. The build for this computer may have fetched only some of them.
     let words = ["metadata", "--format-version", "1", "--locked", "--manifest-path"];
     let asked = Command::new(cargo).args(words).arg(root.join("book/Cargo.toml")).output()?;
     ensure!(asked.status.success(), "cargo metadata: {}", String::from_utf8_lossy(&asked.stderr));

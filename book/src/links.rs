@@ -1,7 +1,7 @@
 //! The links of a page of Markdown.
 
-/// The page with each target of a link that `change` gives another one for; an empty one leaves the words alone. What stands in fenced
-/// blocks is no link.
+/// Returns the page with the targets of its links replaced by those that `change` returns. An empty target leaves the words without a link.
+/// Fenced blocks are not changed.
 pub fn rewritten(page: &str, mut change: impl FnMut(&str) -> Option<String>) -> String {
     let mut out = String::with_capacity(page.len());
     let mut fenced = false;

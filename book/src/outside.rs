@@ -9,14 +9,14 @@ use mdbook_driver::book::{Book, BookItem, Chapter};
 
 use crate::links::rewritten;
 
-/// Folder of the book that files from outside docs/ are in.
+/// Folder of the book for files from outside docs/.
 pub const FOLDER: &str = "repository";
 
 /// Extensions of pictures, which are copied as they are.
 const PICTURES: [&str; 4] = ["png", "svg", "jpg", "gif"];
 
-/// Gives every link that leads out of docs/ a target in the book, with a page for each file that is no picture. Returns the pictures, as
-/// paths from the root of the repository.
+/// Gives every link that leads out of docs/ a target in the book, and adds a page for each file except pictures. Returns the pictures, as paths
+/// from the root of the repository.
 pub fn resolve(root: &Path, book: &mut Book) -> Result<BTreeSet<PathBuf>> {
     let mut files = BTreeSet::new();
     let mut failed = None;
@@ -31,7 +31,7 @@ pub fn resolve(root: &Path, book: &mut Book) -> Result<BTreeSet<PathBuf>> {
             }
             if !root.join(&file).is_file() {
                 failed.get_or_insert(format!(
-                    "{}: {target} is no file: a page links to files only",
+                    "{}: {target} is not a file: a page links only to files",
                     from.display()
                 ));
                 return None;
@@ -69,7 +69,7 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
                 Err(_) if pages.contains(&file) => {
                     Some(format!("{up}{FOLDER}/{}{anchor}", shown(&file).display()))
                 }
-                // What it names is in the repository, and not in the book.
+                // The target is in the repository, but not in the book.
                 Err(_) => Some(String::new()),
             }
         })
@@ -80,7 +80,7 @@ fn chapter(root: &Path, file: &Path, pages: &BTreeSet<PathBuf>) -> Result<Chapte
     Ok(Chapter::new(&name, content, Path::new(FOLDER).join(shown(file)), Vec::new()))
 }
 
-/// How a file is named in the book: pictures as they are, a page for everything else.
+/// Name of a file in the book: pictures keep theirs, every other file becomes a page.
 fn shown(file: &Path) -> PathBuf {
     // mdbook makes an index of a file of that name, and does not follow links to it from other folders.
     if file.file_name() == Some(OsStr::new("README.md")) {
@@ -105,7 +105,7 @@ fn split(target: &str) -> Option<(&str, &str)> {
     (!path.is_empty() && !path.contains("://") && !path.starts_with("mailto:")).then_some((path, anchor))
 }
 
-/// `path` seen from `folder`, from the root of the repository; `None` where it leads out of that.
+/// Resolves `path` relative to `folder` into a path from the root of the repository. Returns `None` if it leads out of the repository.
 fn joined(folder: &Path, path: &str) -> Option<PathBuf> {
     let mut whole = PathBuf::new();
     for part in folder.join(path).components() {

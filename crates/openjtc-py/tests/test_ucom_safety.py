@@ -146,6 +146,32 @@ def test_a_stop_from_another_thread_goes_first(numbered: ucom.SimulatedChain, nu
         assert not numbered_bus.started(1) and not numbered_bus.started(2)
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_stop_ends_a_run_that_still_reads_its_file(
+    numbered: ucom.SimulatedChain, numbered_bus: Bus, tmp_path: Path
+) -> None:
+    file = tmp_path / "parameters.yaml"
+    os.mkfifo(file)
+    with ucom.connect(numbered) as chain:
+        failed: list[errors.Error] = []
+
+        def run() -> None:
+            try:
+                chain.run(1, file=file, active=True)
+            except errors.Error as error:
+                failed.append(error)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        # The run reads the pipe from here on.
+        with file.open("w") as pipe:
+            chain.stop()
+            pipe.write("boards:\n  - board: 1\n    program_id: any\n    par:\n      kp: 1\n")
+        thread.join(30)
+        assert failed[0].code == "cancelled"
+        assert not numbered_bus.started(1)
+
+
 def test_another_master_is_not_disturbed(sim: ucom.SimulatedChain, bus: Bus) -> None:
     with ucom.connect(sim) as chain:
         chain.init()

@@ -1,8 +1,8 @@
 //! Access control: tokens, and checks of the origin of a request.
 //!
 //! A page of another site that is open in a browser can send requests to the address of this computer. Its `Origin`
-//! shows that. A page that has pointed its own name to this computer (DNS rebinding) is recognised by its `Host`. Both
-//! are refused, also with a valid token.
+//! shows that. A page that has pointed its own name to this computer (DNS rebinding) is recognised by its `Host`. The
+//! agent refuses both, even with a valid token.
 mod paths;
 mod tokens;
 
@@ -27,7 +27,8 @@ pub enum Role {
     Operator,
 }
 
-/// Wrong tokens per minute that are answered as such: from one address, and from all addresses together.
+/// Number of wrong tokens per minute that are reported as wrong: per address, and from all addresses together.
+/// Further ones are refused as too many.
 const WRONG_MAX: usize = 20;
 const ALL_WRONG_MAX: usize = 2000;
 const MINUTE: Duration = Duration::from_secs(60);
@@ -377,7 +378,7 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // Also after too many wrong tokens.
+        // Holds after too many wrong tokens as well.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");
@@ -402,7 +403,7 @@ mod tests {
                 assert!(text.len() < 320 && text.contains(&evil[..length.min(200)]), "{text}");
             }
         }
-        // An allowed origin is compared completely, not by its beginning.
+        // The complete text of an origin is compared with an allowed one, not only its beginning.
         let long = format!("https://{}.example", "a".repeat(300));
         let access = access.allowing(std::slice::from_ref(&long));
         let peer = "127.0.0.1".parse().expect("an address");

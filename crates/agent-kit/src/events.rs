@@ -13,14 +13,14 @@ use crate::api::Problem;
 use crate::journal::{Entry, Excerpt, Happening, Journal};
 use crate::socket::{ended, pass};
 
-/// Longest that a request waits for an event, s.
+/// Longest wait of a request for an event, in seconds.
 const WAIT_MAX_S: f64 = 8.0;
 /// Largest number of events in one answer.
 const EVENTS_MAX: usize = 500;
 /// Number of requests that can wait for an event at the same time. Further requests are answered after [`NO_PLACE_S`],
 /// so that connections remain for other clients.
 const WAITING_MAX: usize = 64;
-/// Longest wait of a request beyond that number, s; it limits the load by clients that ask again immediately.
+/// Longest wait of a further request, in seconds. It limits the load by clients that ask again immediately.
 const NO_PLACE_S: f64 = 0.25;
 /// Shortest interval between messages of a stream that are not events.
 const PERIOD: Duration = Duration::from_millis(40);
@@ -124,8 +124,8 @@ impl Events {
     }
 
     /// Sends events on a socket as they occur, and the messages that `show` returns. `show` also returns the time of
-    /// its next call, if `changes` announces no change before. Ends when the client disconnects, does not read, or
-    /// sends a message that is not expected.
+    /// its next call; it is called earlier if `changes` announces a change. Ends when the client disconnects, does
+    /// not read, or sends a message that is not expected.
     pub async fn stream<E: Happening + Serialize, M: Serialize>(
         &self,
         (journal, request): (&Journal<E>, StreamRequest),
@@ -152,7 +152,7 @@ impl Events {
                     return;
                 }
             }
-            // Limits the rate of messages. From the client, only its end is expected.
+            // Limits the rate of messages. Meanwhile the client may only end the connection.
             let next = async {
                 period.tick().await;
                 tokio::select! {

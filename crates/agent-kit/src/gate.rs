@@ -244,8 +244,8 @@ fn address_token(headers: &HeaderMap, uri: &Uri) -> Option<String> {
     asked.and_then(|Query(asked)| asked.token)
 }
 
-/// Returns the token that a page names in the list of protocols of its socket. A browser lets a page set no other
-/// header there, and this header is stored in no history.
+/// Returns the token in the list of protocols of a page's socket. A browser lets a page set no other header there,
+/// and it does not store this header in a history.
 fn protocol_token(headers: &HeaderMap) -> Option<&str> {
     let protocols = text_of(headers, header::SEC_WEBSOCKET_PROTOCOL)?;
     protocols.split(',').find_map(|name| name.trim().strip_prefix(BEARER))

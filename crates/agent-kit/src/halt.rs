@@ -24,8 +24,8 @@ pub struct KnownHalt {
     pub asked_after: Option<u64>,
 }
 
-/// Last Stop or Pause before a request: the number that the client names, else the last one when the head of the
-/// request arrived. The number is taken before the body, which may arrive slowly.
+/// Number of the last Stop or Pause before a request: the number that the client sends, or else the number of the
+/// last one when the head of the request arrived. It is read before the body, which may arrive slowly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AskedAfter(pub u64);
 
@@ -34,7 +34,7 @@ impl KnownHalt {
     ///
     /// # Errors
     ///
-    /// The client names a number that was never counted.
+    /// The client sends a number that no Stop or Pause has yet.
     pub fn among(self, last: u64) -> Result<AskedAfter, Problem> {
         match self.asked_after {
             Some(known) if known > last => {

@@ -120,7 +120,8 @@ mod tests {
         }
     }
 
-    /// After any break of the connection, continuing from the last number gives every event once and in order.
+    /// A client that continues from its last number after any break of the connection gets every event once and in
+    /// order.
     #[test]
     fn events_are_resumed_by_their_numbers() {
         let journal = Journal::default();

@@ -386,7 +386,7 @@ mod tests {
                 assert_eq!(leases.lease().map(|lease| lease.holder), had.then(|| "bob".into()), "{let_go}");
                 let lapsed = leases.lapse(s(looked)).map(|client| client.name);
                 assert_eq!(lapsed, had.then(|| "bob".into()), "{let_go}");
-                // The client may return like every other client.
+                // The former holder may take the lease again, like every other client.
                 assert!(looked > let_go + 5 || leases.command(Some("b"), s(looked)).is_ok() == had);
             }
         }
@@ -429,7 +429,7 @@ mod tests {
     fn the_one_that_was_silent_longest_makes_room_and_never_the_one_who_commands() {
         let mut leases = Leases::default();
         for n in 0..3 * CLIENTS_MAX {
-            // Each client asks after the one before has stopped waiting.
+            // Each client asks after the client before it has stopped waiting.
             let now = s(2 * n as u64);
             let lasts = s(if n == 0 { 60 } else { 1 });
             leases.admit(&n.to_string(), ("x", lasts, ()), true, now).expect("there is room");

@@ -91,8 +91,9 @@ impl CommandLog {
         self.line(what, facts);
     }
 
-    /// Writes a line about a `sender` that can cause many without a token: the first ten lines in full, then one line a
-    /// minute with the number of repetitions (`times`) and the facts of the last.
+    /// Writes a line about a `sender` that can cause many lines without a token. The first ten lines are written in
+    /// full. Later the log gets one line a minute with the number of repetitions (`times`) and the facts of the last
+    /// one.
     pub fn write_repeated(&mut self, what: &'static str, sender: &str, facts: Value) {
         if self.lines.is_none() {
             return;
@@ -210,7 +211,7 @@ mod tests {
 
     use super::*;
 
-    /// Disk with room for a number of bytes, and the bytes that it has taken.
+    /// Disk with space for a number of bytes, and the bytes that were written to it.
     #[derive(Clone, Default)]
     struct Disk(Arc<Mutex<(usize, Vec<u8>)>>);
 
@@ -256,7 +257,7 @@ mod tests {
         let (hangs, until) = sync_channel(0);
         let mut log = CommandLog::on(Hung(until), |_| {});
         log.write("sent", json!({}));
-        // The call returns at all.
+        // The test passes if this call returns.
         drop(log);
         drop::<SyncSender<()>>(hangs);
     }

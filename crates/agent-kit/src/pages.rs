@@ -31,7 +31,7 @@ const LASTING: &str = "assets/";
 /// File endings of formats that are already compressed.
 const COMPRESSED: [&str; 3] = ["png", "woff2", "ico"];
 
-/// Header that names the sites whose pages may use a file.
+/// Header that tells a browser which sites may use a file.
 const SHOWN_TO: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
 
 /// File of the pages, ready to be sent.

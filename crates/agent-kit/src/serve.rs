@@ -86,7 +86,7 @@ async fn accept(router: Router, listener: &tokio::net::TcpListener, tls: Option<
             let _ = stream.set_nodelay(true);
             match tls {
                 None => serve_connection(router, stream, place).await,
-                // A client without a TLS handshake in time gets no answer.
+                // If a client does not complete the TLS handshake in time, it gets no answer.
                 Some(tls) => {
                     let handshake = tokio::time::timeout(head_time(place.few), tls.accept(stream));
                     if let Ok(Ok(stream)) = handshake.await {
@@ -134,7 +134,7 @@ async fn serve_connection(
         .with_upgrades()
         .await;
     is_socket.store(true, Ordering::Relaxed);
-    // A client that has disconnected needs no answer. Sockets have their own places.
+    // A client that has disconnected needs no answer. Sockets are counted separately (`Sockets`).
     drop((served, place));
 }
 

@@ -13,7 +13,7 @@ use crate::access::Role;
 /// Largest number of sockets of viewers and of operators; viewers cannot block operators.
 const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
-/// Protocol that a page names for its socket, in addition to `bearer.` and its token.
+/// Protocol that a page requests for its socket, in addition to `bearer.` and its token.
 pub const PROTOCOL: &str = "openjtc";
 /// Longest message of a client with read-only access, bytes.
 pub const MESSAGE_MAX: usize = 1024;

@@ -1,4 +1,4 @@
-//! Progress bars on stderr. Other output stands above the bar, which leaves no traces.
+//! Progress bars on stderr. Other output is printed above the bar, and a finished bar is removed.
 
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};

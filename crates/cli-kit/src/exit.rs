@@ -1,4 +1,4 @@
-//! Exit codes, as scripts may rely on them.
+//! Exit codes. Scripts may rely on them.
 use host_kit::ErrorKind;
 
 /// A device reported an error.

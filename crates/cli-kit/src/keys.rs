@@ -1,8 +1,8 @@
 //! Single keys from the terminal. The terminal is restored after any end of the command.
 //!
-//! Ctrl-C stays a signal. Ctrl-Z is disabled meanwhile, because a suspended command would leave a machine running
-//! without supervision. Ctrl-S is disabled because it would block the command at its next output, with the stop key
-//! unread.
+//! Ctrl-C still sends a signal. Ctrl-Z is disabled meanwhile, because a suspended command would leave a machine
+//! running without supervision. Ctrl-S is disabled because it would block the command at its next output, and the
+//! command could not read the stop key.
 
 /// A key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +29,7 @@ pub enum Key {
     Escape,
 }
 
-/// Returns the keys in the bytes of a terminal; the rest may be the start of a key.
+/// Returns the keys in the bytes of a terminal, and the remaining bytes, which may be the start of a key.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn parse(bytes: &[u8]) -> (Vec<Key>, &[u8]) {
     let (mut keys, mut rest) = (Vec::new(), bytes);
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(keys(b"\x1BOA\x1B[6~\x1B[1~"), (vec![Key::Up, Key::PageDown, Key::Home], &b""[..]));
         assert_eq!(keys(b"x\x1B[5"), (vec![Key::Char('x')], &b"\x1B[5"[..]));
         assert_eq!(keys(b"\x1B"), (vec![], &b"\x1B"[..]));
-        // An unknown key, and a letter that is not ASCII, are ignored.
+        // Unknown keys and letters that are not ASCII are ignored.
         assert_eq!(keys("\x1B[15~\u{e9}s".as_bytes()), (vec![Key::Char('s')], &b""[..]));
     }
 }

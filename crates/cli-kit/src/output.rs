@@ -34,7 +34,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Creates an output with the program's name before errors; text, or JSON objects.
+    /// Creates an output. `program` is printed before errors; `json` selects JSON objects instead of text.
     pub fn new(program: &'static str, json: bool) -> Self {
         Self { program, json }
     }
@@ -44,7 +44,7 @@ impl Output {
         self.json
     }
 
-    /// Starts to print events as they happen, and notes as events, if JSON was requested.
+    /// Starts to print events as they occur, and notes as events. Does nothing unless JSON was requested.
     pub fn stream(&self) -> std::io::Result<()> {
         if self.json && STREAM.get().is_none() {
             let _ = STREAM.set(Mutex::new(Stream { lines: Lines::stderr()?, began: Instant::now() }));
@@ -64,7 +64,7 @@ impl Output {
         stream.lines.push(event.to_string());
     }
 
-    /// Prints the waiting lines of a stream, while they are read.
+    /// Prints the waiting lines of a stream while the reader reads them.
     pub fn finish() {
         let Some(stream) = STREAM.get() else { return };
         stream.lock().unwrap_or_else(PoisonError::into_inner).lines.finish();
@@ -97,13 +97,13 @@ impl Output {
         });
     }
 
-    /// Remembers why output for stdout was lost. A reader that has disconnected (`… | head`) has read enough: that is
-    /// not a loss.
+    /// Stores the reason why output for stdout was lost. A reader that has disconnected (`… | head`) has read enough,
+    /// so this is not stored as a loss.
     pub fn lose(why: &std::io::Error) {
         stdout::lose(why);
     }
 
-    /// Returns `true` if further output has no reader: a command that only prints may end.
+    /// Returns `true` if nothing reads further output; a command that only prints may then end.
     pub fn gone() -> bool {
         stdout::is_gone()
     }
@@ -144,7 +144,7 @@ impl Output {
         bar::of_bytes(total, what)
     }
 
-    /// Creates a bar on stderr for a motion of `total_ms` milliseconds, with the text of its owner below it, and the
+    /// Creates a bar on stderr for a motion of `total_ms` milliseconds. The text of its owner is below it, and the
     /// keys below that.
     pub fn motion_bar(&self, total_ms: u64, what: &str, keys: &str) -> ProgressBar {
         bar::of_motion(total_ms, what, keys)
@@ -208,8 +208,9 @@ fn stdout_width() -> Option<u16> {
     std::io::stdout().is_terminal().then(|| crossterm::terminal::size().ok()).flatten().map(|size| size.0)
 }
 
-/// Formats rows as a text table; words to the left, columns whose head begins with `>` (figures) to the right. On a
-/// terminal that is too narrow for all columns the remaining ones follow below, with the first column again.
+/// Formats rows as a text table. Words are aligned to the left; columns whose head begins with `>` (figures) to the
+/// right. On a terminal that is too narrow for all columns, the remaining columns follow below, with the first column
+/// repeated.
 pub fn table(head: &[&str], rows: &[Vec<String>]) -> String {
     table_within(head, rows, stdout_width())
 }
@@ -218,7 +219,7 @@ fn table_within(head: &[&str], rows: &[Vec<String>], width: Option<u16>) -> Stri
     let text = whole_table(head, rows);
     let widest = text.lines().map(|line| line.chars().count()).max().unwrap_or(0);
     let Some(width) = width.filter(|width| usize::from(*width) < widest) else { return text };
-    // As many columns as fit next to the first one; at least one, for every width.
+    // Takes as many columns as fit next to the first one, but at least one.
     for count in (2..head.len()).rev() {
         let rest: Vec<usize> = (count..head.len()).collect();
         let pick = |columns: &[usize]| {

@@ -87,8 +87,9 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens `path` for writing. An existing file is refused without `overwrite`, and one of `others` (inputs of the
-    /// command, and its other outputs) always. Commands that send must report themselves that nothing was sent.
+    /// Opens `path` for writing. An existing file is refused without `overwrite`. A file of `others` (inputs of the
+    /// command, and its other outputs) is always refused. Commands that send must report themselves that nothing was
+    /// sent.
     pub fn open(path: &Path, overwrite: bool, others: &[&Path]) -> Result<Self, OutputError> {
         if let Some(other) = others.iter().find(|other| same(path, other)) {
             return Err(OutputError::SameFile { path: path.to_owned(), other: other.to_path_buf() });
@@ -169,7 +170,7 @@ impl Drop for OutputFile {
     }
 }
 
-/// Waits until the bytes are on the disk: a full disk may show only then.
+/// Waits until the bytes are on the disk, because a full disk may be reported only then.
 pub fn settle(file: &File) -> io::Result<()> {
     if file.metadata()?.is_file() { file.sync_all() } else { Ok(()) }
 }
@@ -206,7 +207,7 @@ mod tests {
         std::fs::write(&input, "read").unwrap();
         let code =
             |result: Result<OutputFile, OutputError>| result.err().map(|e| (exit::of(e.kind()), e.code()));
-        // Commands without a port or bus send no frames in any case.
+        // Commands without a port or bus send no frames, so the message does not say that nothing was sent.
         let there = OutputFile::open(&old, false, &[]).err().unwrap();
         assert!(there.to_string().ends_with("is there already"), "{there}");
         assert_eq!(code(OutputFile::open(&old, false, &[])), Some((4, "exists")));

@@ -22,7 +22,7 @@ fn subcommands(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|sub| !sub.is_hide_set() && sub.get_name() != "help" || has_options(sub))
 }
 
-/// Our own `help` has arguments, that of the library has none.
+/// Returns `true` for the program's own `help`, which has arguments. The `help` that clap adds has none.
 fn has_options(command: &Command) -> bool {
     command.get_name() == "help"
         && command.get_subcommands().next().is_none()
@@ -45,7 +45,7 @@ fn one(command: &Command, top: bool, page: &mut String) {
     if let Some(about) = command.get_long_about().filter(|_| command.get_about().is_none()) {
         let _ = write!(page, "{}\n\n", text(&about.to_string()));
     }
-    // Uses the words of the screen, without its margins.
+    // Uses the usage as clap prints it on the screen, without its margins.
     let usage = command.clone().render_usage().to_string();
     let usage = usage.trim_start_matches("Usage:").trim();
     let lines: Vec<&str> = usage.lines().map(str::trim).collect();

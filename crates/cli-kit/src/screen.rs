@@ -15,7 +15,8 @@ use crate::keys::{Key, Keys};
 /// `true` while a view is shown.
 static SHOWN: AtomicBool = AtomicBool::new(false);
 
-/// Restores the terminal after any change. A second call has no effect; a lost terminal is ignored.
+/// Restores the terminal if a view or key input has changed it. A second call has no effect; a lost terminal is
+/// ignored.
 pub fn restore_terminal() {
     if SHOWN.swap(false, Ordering::Relaxed) {
         let mut stdout = std::io::stdout();

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Returns the signals that end a command: Ctrl-C, `kill`, and the end of its terminal, unless it was started to
-/// outlive that (`nohup`).
+/// Returns the signals that end a command: Ctrl-C, `kill`, and SIGHUP when its terminal closes. SIGHUP is left out if
+/// the command was started with `nohup`.
 fn signals() -> impl Iterator<Item = i32> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     #[cfg(unix)]
@@ -25,7 +25,7 @@ fn hangup_ignored() -> bool {
 
 /// Period at which the thread of [`Stop::listen_with`] checks for signals.
 const LOOK: Duration = Duration::from_millis(10);
-/// Time within which several signals count as one.
+/// Signals within this time are treated as one.
 const ONE_PRESS: Duration = Duration::from_millis(100);
 
 /// Set by SIGINT, SIGTERM or SIGHUP.
@@ -37,8 +37,8 @@ impl Stop {
     pub fn listen() -> std::io::Result<Self> {
         let flag = Arc::new(AtomicBool::new(false));
         for signal in signals() {
-            // The second Ctrl-C ends the process in every state: registered first, because it must see the flag of the
-            // last time.
+            // The second Ctrl-C ends the process in every state. This handler is registered first, because it must
+            // read the flag before the other handler sets it.
             signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))?;
             signal_hook::flag::register(signal, Arc::clone(&flag))?;
         }
@@ -49,7 +49,8 @@ impl Stop {
     /// state, with the exit code that `last_words` returns and with the terminal restored; `last_words` runs in a
     /// separate thread and may print.
     ///
-    /// Signals that follow each other within 0.1 s count as one: a terminal and a wrapper may both send theirs.
+    /// Signals that follow each other within 0.1 s are treated as one, because a terminal and a wrapper may both send
+    /// theirs.
     pub fn listen_with(last_words: impl Fn() -> u8 + Send + 'static) -> std::io::Result<Self> {
         let came = Arc::new(AtomicBool::new(false));
         for signal in signals() {

@@ -1,6 +1,6 @@
-//! Sizes of files and folders, as options take them.
+//! Parser for sizes of files and folders in options.
 
-/// Parses a number of bytes, as `500MB`, `2 GB`, `1GiB` or a plain number: `least` or more.
+/// Parses a number of bytes such as `500MB`, `2 GB`, `1GiB` or a plain number. It must be at least `least`.
 ///
 /// # Errors
 ///

@@ -4,15 +4,15 @@ use std::io::{Error, ErrorKind};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Reason why the first lost result could not be printed. A command continues without its output; its exit code shows
-/// the loss at the end.
+/// Reason why the first lost result could not be printed. A command continues without its output; its exit code
+/// reports the loss at the end.
 static LOST: OnceLock<String> = OnceLock::new();
 /// `true` after a failed write to stdout, for any reason.
 static GONE: AtomicBool = AtomicBool::new(false);
 /// `true` while stdout is blocked by a line without a reader.
 static STUCK: AtomicBool = AtomicBool::new(false);
 
-/// Records a failed write. A reader that has disconnected has read enough: that is not a loss.
+/// Records a failed write. A reader that has disconnected has read enough, so this is not recorded as a loss.
 pub(crate) fn lose(why: &Error) {
     GONE.store(true, Ordering::Relaxed);
     if why.kind() != ErrorKind::BrokenPipe {
@@ -30,7 +30,7 @@ pub(crate) fn lost() -> Option<&'static str> {
     LOST.get().map(String::as_str)
 }
 
-/// Marks stdout as blocked: from now on printing code waits for a reader that does not read.
+/// Marks stdout as blocked. From now on, code that prints would wait for a reader that does not read.
 pub(crate) fn set_stuck() {
     STUCK.store(true, Ordering::Relaxed);
 }

@@ -1,4 +1,4 @@
-//! For tests: runs a command as a user does, also at a terminal.
+//! For tests: runs a command as a user does, with or without a terminal.
 
 #[cfg(unix)]
 mod screen;
@@ -15,8 +15,8 @@ pub use screen::Picture;
 #[cfg(unix)]
 pub use terminal::Terminal;
 
-/// Checks that each paragraph of prose below the help of a command is one line, because clap wraps it to the terminal. Lines that begin
-/// with a space are examples or tables.
+/// Checks that each paragraph of prose below the help of a command is one line, because clap wraps it to the
+/// terminal. Lines that begin with a space are examples or tables.
 ///
 /// # Panics
 ///
@@ -92,7 +92,7 @@ pub fn ended(child: Child) -> CommandOutput {
     }
 }
 
-/// Sends a signal to a process of the test, as `kill` names it: `-INT`.
+/// Sends a signal to a process of the test. The name is an option of `kill`, such as `-INT`.
 pub fn signal(child: &Child, name: &str) {
     Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
 }

@@ -71,7 +71,7 @@ pub fn parse_with<Cli: Parser>(
     Err(ExitCode::from(exit::USAGE))
 }
 
-/// Replaces the parser's guess by the command to use, if the word is known but not a command.
+/// Replaces the parser's suggestion by the command to use, if `meant` lists the word.
 fn name_what_is_meant(e: &mut clap::Error, meant: &[(&str, &str)]) {
     let Some(ContextValue::String(word)) = e.get(ContextKind::InvalidSubcommand) else { return };
     let word = word.to_lowercase();

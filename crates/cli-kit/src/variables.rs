@@ -42,7 +42,7 @@ pub struct Variables {
 pub struct Retired {
     /// Its name.
     pub variable: &'static str,
-    /// The words of the command that has the option; empty for every command that has it.
+    /// Words of the command that has the option; empty if all commands that have the option are meant.
     pub command: &'static str,
     /// The long name of the option.
     pub option: &'static str,
@@ -50,7 +50,7 @@ pub struct Retired {
     pub without: Without,
 }
 
-/// Effect on a command that ignores a variable that is set.
+/// Effect of an ignored variable on the command.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum Without {
     /// The command does less than the variable requested: it continues, with a note.
@@ -70,7 +70,8 @@ impl Retired {
         Self { variable, command, option, without: Without::Other }
     }
 
-    /// Returns the option that it set, if the command has it and does not read this variable for it.
+    /// Returns the option that the variable set, if the command has this option and does not read it from this
+    /// variable.
     fn option_of<'a>(&self, command: &'a Command, words: &str) -> Option<&'a Arg> {
         let named = self.command.is_empty() || self.command == words;
         let mut options = command.get_arguments().filter(|arg| arg.get_long() == Some(self.option));
@@ -98,7 +99,7 @@ struct Chosen<'a> {
 }
 
 impl Chosen<'_> {
-    /// Returns the command as typed, in quotation marks of the docs.
+    /// Returns the command as the user typed it, in the quotation marks that the docs use.
     fn typed(&self) -> String {
         format!("`{}`", format!("{} {}", self.program, self.words).trim())
     }
@@ -181,7 +182,7 @@ impl Variables {
         lines
     }
 
-    /// Returns the retired variables that are set, and that belonged to options of this command that are not typed.
+    /// Returns the retired variables that are set for options of this command, unless the user has typed the option.
     fn unread(
         &self,
         chosen: &Chosen<'_>,
@@ -248,7 +249,7 @@ fn is_set_by_variable(arg: &Arg, matches: &ArgMatches) -> bool {
         && (arg.get_action().takes_values() || matches.get_flag(id))
 }
 
-/// Returns the command that the words name, as far as they do.
+/// Returns the command that the user typed, up to the first word that is not a command.
 fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> Chosen<'a> {
     let (mut command, mut words) = (root, Vec::new());
     for word in typed.iter().take_while(|word| *word != "--") {
@@ -260,7 +261,7 @@ fn chosen<'a>(program: &'static str, root: &'a Command, typed: &[OsString]) -> C
     Chosen { program, command, words: words.join(" ") }
 }
 
-/// Returns the options that the error names.
+/// Returns the options that the error message contains.
 fn options_in(error: &clap::Error) -> Vec<String> {
     let mut all = Vec::new();
     for kind in [ContextKind::InvalidArg, ContextKind::PriorArg] {

@@ -7,9 +7,9 @@ use ratatui::widgets::{Block, BorderType, Padding, Paragraph};
 
 use crate::keys::Key;
 
-/// Least columns and rows of a view.
+/// Smallest number of columns and rows of a view.
 pub const LEAST: (u16, u16) = (40, 12);
-/// Least columns and rows of a view with frames around its parts.
+/// Smallest number of columns and rows of a view with frames around its parts.
 pub const FRAMED: (u16, u16) = (80, 24);
 
 /// Returns a frame around a part.
@@ -39,8 +39,8 @@ pub fn wrapped(text: &str, width: u16) -> Vec<String> {
     lines
 }
 
-/// Draws one sentence with the required size, if the terminal is too small. The keys still work, and the sentence names
-/// the one that stops. Returns `true` if the terminal is too small.
+/// If the terminal is too small, draws one sentence with the required size and the key that stops. The keys still
+/// work. Returns `true` if the terminal is too small.
 pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
     let area = frame.area();
     if area.width >= LEAST.0 && area.height >= LEAST.1 {
@@ -58,7 +58,7 @@ pub fn too_small(frame: &mut Frame<'_>, keys: &str) -> bool {
 /// Errors and the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Trouble {
-    /// Text of each cause; the cause of the others comes first.
+    /// Texts of the causes. A cause that leads to others comes first.
     pub causes: Vec<String>,
     /// Defects that do not stop the operation.
     pub warnings: Vec<String>,
@@ -69,8 +69,9 @@ pub struct Trouble {
 }
 
 impl Trouble {
-    /// Returns lines for the head of a view, at most about `most`: as many whole causes as fit, the next command, and
-    /// the result of the last key. The causes that do not fit are returned as the first rows of the scrolled part.
+    /// Returns the lines for the head of a view, at most about `most`: as many complete causes as fit, the next
+    /// command, and the result of the last key. The causes that do not fit are returned as the first rows of the
+    /// scrolled part.
     pub fn lines(&self, width: u16, most: usize) -> (Vec<Line<'static>>, Vec<Line<'static>>) {
         let red = |text: String| Line::from(text).style(Style::new().fg(Color::Red).bold());
         let yellow = |text: String| Line::from(text).style(Style::new().fg(Color::Yellow));
@@ -170,7 +171,7 @@ mod tests {
         lines.iter().map(ToString::to_string).collect()
     }
 
-    /// No cause is cut; causes that do not fit are counted, and are the first rows of the scrolled part.
+    /// No cause is cut. Causes that do not fit are counted, and are the first rows of the scrolled part.
     #[test]
     fn causes_are_shown_whole_or_scroll() {
         let trouble = Trouble {

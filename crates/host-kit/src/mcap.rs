@@ -5,14 +5,14 @@ use mcap::McapError;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-/// Longest record that is read, bytes: memory is allocated for the length that a damaged file states, before the
+/// Longest record that is read, in bytes. Memory is allocated for the length that a damaged file states, before the
 /// missing bytes are detected.
 const MAX_RECORD: usize = 1 << 26;
 
-/// Shows channels, messages and metadata of a file, those in chunks too, and returns `true` if the file was completed.
-/// Reads the file from beginning to end, in small pieces: memory holds at most one record. Attachments and indices are
-/// skipped unread, because the library panics at damaged ones. Errors after the data are ignored, because an index
-/// stands there.
+/// Passes the channels, messages and metadata of a file to `see`, including those in chunks. Returns `true` if the
+/// file was completed. Reads the file from beginning to end in small pieces, so memory holds at most one record.
+/// Attachments and indices are skipped unread, because the library panics at damaged ones. Errors after the data are
+/// ignored, because only the index follows.
 ///
 /// # Errors
 ///
@@ -22,7 +22,7 @@ pub fn each_record<E: From<McapError>>(
     mut file: impl Read,
     mut see: impl FnMut(Record<'_>) -> Result<(), E>,
 ) -> Result<bool, E> {
-    // A file that was cut off has no end.
+    // A file that was cut off has no end record.
     let options =
         LinearReaderOptions::default().with_skip_end_magic(true).with_record_length_limit(MAX_RECORD);
     let mut reader = LinearReader::new_with_options(options);

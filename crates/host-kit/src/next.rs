@@ -130,7 +130,7 @@ actions! {
 /// Part of a next step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Part {
-    /// Words for all front ends. Commands stand between backticks.
+    /// Words for all front ends. Commands are enclosed in backticks.
     Words(Cow<'static, str>),
     /// Action, which each front end names itself. The command line shows this command instead of the name, if there is one.
     Action(Action, Option<String>),
@@ -198,7 +198,7 @@ impl Next {
         Self(vec![Part::Action(action, Some(command.into()))])
     }
 
-    /// Returns the sentence of a front end, with commands, requests and expressions between backticks.
+    /// Returns the sentence for a front end, with commands, requests and expressions in backticks.
     pub fn sentence(&self, front_end: FrontEnd) -> String {
         let parts = self.0.iter().map(|part| {
             let name = match part {
@@ -208,13 +208,13 @@ impl Next {
                 }
                 Part::Action(action, _) => action.name(front_end),
             };
-            // Some names are words with an expression among them.
+            // Some names are words that contain an expression in backticks.
             if name.contains('`') { name.into() } else { format!("`{name}`").into() }
         });
         parts.collect()
     }
 
-    /// Returns the sentence of a front end without backticks.
+    /// Returns the sentence for a front end without backticks.
     pub fn plain(&self, front_end: FrontEnd) -> String {
         self.sentence(front_end).replace('`', "")
     }

@@ -2,9 +2,8 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// Returns the folder that an environment variable of the XDG Base Directory Specification names, such as
-/// `XDG_CACHE_HOME`, or else `in_home` in the folder that `HOME` names; `None` if neither is set. An empty variable
-/// counts as not set.
+/// Returns the folder in a variable of the XDG Base Directory Specification, such as `XDG_CACHE_HOME`. If it is not
+/// set, returns `in_home` in the folder of `HOME`; `None` if neither is set. An empty variable is treated as not set.
 pub fn user_folder(variable: &str, in_home: &str) -> Option<PathBuf> {
     folder(|name| std::env::var_os(name), variable, in_home)
 }

@@ -44,7 +44,7 @@ pub fn least_ns(rounds: usize, mut work: impl FnMut()) -> f64 {
 mod tests {
     use super::*;
 
-    /// The shortest time counts, and a thread that sleeps takes no processor time.
+    /// The shortest time is returned, and a thread that sleeps uses no processor time.
     #[test]
     fn work_takes_time_and_sleep_does_not() {
         let mut rounds = 0;

@@ -1,5 +1,5 @@
-//! Data of an existing arm, which do not belong to this project: `OPENJTC_DATA` names their directory. Tests that need
-//! the data are skipped if they are missing.
+//! Data of an existing arm, which do not belong to this project. The variable `OPENJTC_DATA` contains their
+//! directory. Tests that need the data are skipped if they are missing.
 
 use std::path::{Path, PathBuf};
 
@@ -15,8 +15,8 @@ pub fn file(name: &str) -> Option<PathBuf> {
     there.then_some(path)
 }
 
-/// Returns positions, velocities and accelerations of a trajectory as on the wire: 19 integers per line, the first is
-/// the time.
+/// Returns positions, velocities and accelerations of a trajectory as they are sent to the controller: 19 integers
+/// per line, of which the first is the time.
 ///
 /// # Panics
 /// If the file has another form.

@@ -17,14 +17,14 @@ struct Flood {
     what: &'static str,
     /// Bytes that each client sends at once.
     bytes: Vec<u8>,
-    /// Bytes that each client sends repeatedly from then on.
+    /// Bytes that each client sends repeatedly after that.
     drip: &'static [u8],
     /// `true` if the clients read the answers.
     reads: bool,
 }
 
-/// Checks that Stops of every kind are answered in every flood. `command` is a request that needs the lease; `stops` are requests that
-/// stop something without a lease.
+/// Checks that Stops of every kind are answered in every flood. `command` is a request that needs the lease; `stops`
+/// are requests that stop something and need no lease.
 pub fn stops_are_answered_in_every_flood(http: &Http, command: &str, stops: &[&str]) {
     for flood in floods(http, command) {
         answered_in(http, &flood, stops);
@@ -89,7 +89,7 @@ fn answered_in(http: &Http, flood: &Flood, stops: &[&str]) {
     let (over, opened) = (AtomicBool::new(false), AtomicUsize::new(0));
     std::thread::scope(|threads| {
         threads.spawn(|| keep_open(http, flood, &opened, &over));
-        // Ends the flood, also if a Stop fails.
+        // Ends the flood even if a Stop fails.
         let _end = End(&over);
         until(format_args!("the flood of {}", flood.what), || opened.load(Ordering::Relaxed) >= CONNECTIONS);
         for n in 0..STOPS {

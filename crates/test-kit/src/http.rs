@@ -141,8 +141,8 @@ fn status(answer: &str) -> u16 {
     answer.split(' ').nth(1).and_then(|code| code.parse().ok()).unwrap_or(0)
 }
 
-/// Checks that all requests of other sites are rejected, and also requests with unknown tokens, except a Stop or a
-/// Pause.
+/// Checks that all requests of other sites are rejected. Requests with unknown tokens are rejected as well, except a
+/// Stop or a Pause.
 pub fn other_sites_are_refused(http: &Http, requests: &[&str]) {
     let own = format!("Host: {}", http.address);
     let bearer = format!("Authorization: Bearer {}", http.operator);
@@ -229,7 +229,7 @@ pub fn tokens_cannot_be_tried_without_end(http: &Http) {
     assert_eq!(http.get("POST /api/stop").0, 200);
 }
 
-/// Checks that a wrong token never blocks a Stop from this computer, in any form and number, and never grants access.
+/// Checks that wrong tokens, in any form and number, never block a Stop from this computer and never grant access.
 pub fn a_wrong_token_keeps_no_stop_away(http: &Http, stops: &[&str]) {
     let host = format!("Host: {}", http.address);
     let evil = "Origin: https://evil.example";

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Longest output that is shown completely, lines.
+/// Longest output that is shown completely, in lines.
 const LINES_MAX: usize = 12;
-/// Lines that are shown of a longer output: at its beginning and at its end.
+/// Number of lines that are shown of a longer output: at its beginning and at its end.
 const SHOWN: (usize, usize) = (5, 4);
-/// Largest number of runs of a case whose output depends on timing, before it counts as changed.
+/// Largest number of runs of a case whose output depends on timing. If no run matches, the case has changed.
 const TRIES: usize = 4;
 
 /// Words whose number is kept, because it identifies an item.
@@ -169,8 +169,8 @@ fn block(title: &str, command: &str, printed: &Printed) -> String {
     text
 }
 
-/// Returns the text without the parts that differ from run to run: tables of figures are left out, and numbers become
-/// `…`, except those of joints and boards and those that are part of a name.
+/// Returns the text without the parts that differ from run to run. Tables of figures are left out. Numbers become
+/// `…`, except numbers of joints and boards and those that are part of a name.
 pub fn blurred(text: &str) -> String {
     let mut out = String::new();
     for line in text.lines().filter(|line| !is_figures(line)) {

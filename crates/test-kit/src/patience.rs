@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 
 /// Time that a test waits on a computer that is never late.
 const TIME: Duration = Duration::from_secs(60);
-/// Longest time that a test waits, on any computer. Blocking reads use it as their timeout.
+/// Longest time that a test waits on any computer. Blocking reads use it as their timeout.
 pub const LONGEST: Duration = Duration::from_secs(300);
 /// Time between two observations.
 const PAUSE: Duration = Duration::from_millis(20);
-/// Seconds that the limit grows for each second that the waiting thread is late.
+/// Seconds that are added to the limit for each second that the waiting thread is late.
 const GROWTH: u32 = 4;
 
 /// Wait of a test. If the computer is late with the waiting thread, it is also late with the programs that the test waits for.
@@ -25,8 +25,8 @@ impl Patience {
         Self { begun: Instant::now(), late: Duration::ZERO }
     }
 
-    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time has passed; `format_args!` is formatted only
-    /// then.
+    /// Sleeps for 20 ms before the next observation. Panics with `missing` when the time has passed; `format_args!`
+    /// is formatted only then.
     #[track_caller]
     pub fn pause(&mut self, missing: impl Display) {
         self.wait(missing, std::thread::sleep);

@@ -31,7 +31,7 @@ pub(super) struct Repeats {
 }
 
 impl Repeats {
-    /// Returns the facts if a line must be written for them.
+    /// Counts a line of this kind and sender. Returns its facts if the line must be written.
     pub(super) fn admit(
         &mut self,
         what: &'static str,

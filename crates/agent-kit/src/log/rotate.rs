@@ -19,7 +19,7 @@ pub(super) trait Target: Write {
 /// Current and previous file, which together stay within a limit.
 pub(super) struct Rotated {
     file: File,
-    /// Names of the current and the previous file; `None`: it is not an ordinary file and is never renamed.
+    /// Paths of the current and the previous file; `None` if it is not an ordinary file, which is never renamed.
     names: Option<(PathBuf, PathBuf)>,
     length: u64,
     limit: u64,

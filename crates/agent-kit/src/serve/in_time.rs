@@ -11,8 +11,8 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time in which a connection may take none of the waiting bytes, and number of bytes that it must take for
-/// each further second. Quickly read bytes do not extend this time.
+/// Longest time in which a connection may take no bytes although some wait. It may wait longer in all if it takes
+/// `TAKES_PER_S` bytes for each further second. Quick reading does not extend the longest time without bytes.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 
@@ -202,7 +202,7 @@ mod tests {
         assert!(!taken(100_000, 1, Duration::from_secs(3600)).1);
     }
 
-    /// A reader that was quick before is closed as soon as one that was not.
+    /// A reader that was quick before, and then takes no bytes, is closed as soon as any other.
     #[test]
     fn bytes_that_were_taken_quickly_give_no_time_to_take_nothing() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().start_paused(true).build();

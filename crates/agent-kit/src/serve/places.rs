@@ -1,4 +1,4 @@
-//! Places for connections: a number for all requests, and further places reserved for Stop and Pause.
+//! Places for connections: a number for all requests, and further places that are reserved for Stop and Pause.
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -7,18 +7,18 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
-/// Largest number of connections from this computer, and again from other computers, so that others cannot block local
-/// clients.
+/// Largest number of connections from this computer. The same number applies to other computers, so that they cannot
+/// block local clients.
 pub(super) const CONNECTIONS_MAX: usize = 256;
-/// Threshold of free places below which a connection serves a single request, which must come at once.
+/// If fewer places than this are free, a connection serves only one request, which must be sent at once.
 const FEW: usize = CONNECTIONS_MAX / 2;
-/// Further connections for Stop and Pause alone, from this computer and from others. When these are in use as well, the
-/// oldest connection without a Stop is closed for a new one, so that idle connections never block a Stop, however many
-/// there are. All connections together stay below the 1024 files that a program may open.
+/// Further connections from this computer for Stop and Pause only; the next constant applies to other computers. When
+/// these are in use as well, the oldest connection without a Stop is closed for a new one. So idle connections never
+/// block a Stop, however many there are. All connections together stay below the 1024 files that a program may open.
 const KEPT_HERE: usize = 192;
 const KEPT_ELSEWHERE: usize = 64;
-/// Time that a local connection has at least to send its request before it is closed for a new one; the new one waits
-/// for this time.
+/// Shortest time that a local connection has to send its request before it is closed for a new one. The new
+/// connection waits for this time.
 const ASKS_WITHIN: Duration = Duration::from_millis(20);
 
 /// Places for connections of one side.
@@ -47,7 +47,7 @@ struct Open {
 /// Place of a connection; it is freed on drop.
 pub(super) struct Place {
     places: Arc<Places>,
-    /// `true` if few places were left when the connection came.
+    /// `true` if few places were left when the connection was accepted.
     pub(super) few: bool,
     kind: Kind,
 }
@@ -175,7 +175,7 @@ mod tests {
             comes.try_recv().ok()
         };
         for number in 0..CONNECTIONS_MAX {
-            // The own place is taken before the others are counted.
+            // `open` takes the place of this connection before it counts the others.
             assert_eq!(open(number, false), Some((number, number + 1 > CONNECTIONS_MAX - FEW, true)));
         }
         for number in 0..10 * KEPT_ELSEWHERE {

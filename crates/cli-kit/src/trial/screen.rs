@@ -1,4 +1,5 @@
-//! Terminal emulation: shows the bytes of a program, with the functions that live views and progress bars use.
+//! Terminal emulation: shows the output of a program. It supports the functions that live views and progress bars
+//! use.
 
 /// Cells of a terminal.
 pub struct Picture {

@@ -57,7 +57,7 @@ impl Terminal {
         let slave = rustix::fs::open(&*name, OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).expect("it opens");
         tcsetwinsize(&slave, Winsize { ws_row: rows, ws_col: columns, ws_xpixel: 0, ws_ypixel: 0 })
             .expect("its size");
-        // A command that also had the user's end would keep the terminal from hanging up.
+        // If the command inherited the user's end, the terminal could not hang up.
         for end in [&master, &slave] {
             fcntl_setfd(end, FdFlags::CLOEXEC).expect("its flags");
         }
@@ -128,7 +128,7 @@ impl Terminal {
         self.bytes.extend_from_slice(bytes);
     }
 
-    /// Hangs up, like a closed window: no process has the other end any more.
+    /// Hangs up, as a closed window does: afterwards no process has the user's end open.
     pub fn hang_up(&mut self) {
         (self.person, self.slave) = (None, None);
         // The reading thread has the last handle.

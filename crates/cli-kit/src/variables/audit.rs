@@ -43,8 +43,8 @@ const PLACES: [&str; 11] = [
 ];
 
 /// Returns all faults of the variables of a command line; empty without faults. `allowed` lists each variable with
-/// the reason why it may exist; `without` lists options, as `update --data`, that name a file and still have no
-/// variable.
+/// the reason why it may exist. `without` lists options that name a file and still have no variable, for example
+/// `update --data`.
 pub fn faults<Cli: CommandFactory>(
     prefix: &str,
     variables: &Variables,
@@ -90,7 +90,7 @@ pub fn faults<Cli: CommandFactory>(
     faults
 }
 
-/// Finds entries of the lists that exist nowhere else.
+/// Finds entries of the two lists that match no option or variable.
 fn lists(
     root: &Command,
     variables: &Variables,
@@ -152,7 +152,7 @@ fn misfit(kind: Kind, arg: &Arg, names_place: bool) -> Option<&'static str> {
     }
 }
 
-/// Returns `true` if two options of one variable are the same option of two commands.
+/// Returns `true` if two options with the same variable are the same option of two commands.
 fn mean_the_same(kind: Kind, one: &Arg, other: &Arg) -> bool {
     let help = |arg: &Arg| arg.get_help().map(ToString::to_string);
     one.get_long() == other.get_long()
@@ -165,7 +165,8 @@ fn value_name(arg: &Arg) -> Option<String> {
     names.first().map(ToString::to_string)
 }
 
-/// Collects all options with the words of their command, `update --data`; a global option once.
+/// Collects all options, each with the words of its command, for example `update --data`. A global option is
+/// collected once.
 fn collect<'a>(command: &'a Command, words: &str, options: &mut Vec<(String, &'a Arg)>) {
     for arg in command.get_arguments().filter(|arg| words.is_empty() || !arg.is_global_set()) {
         if let Some(long) = arg.get_long() {

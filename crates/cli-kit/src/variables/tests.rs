@@ -109,7 +109,8 @@ fn where_a_command_line_is_wrong_the_variable_behind_it_is_named() {
         let typed: Vec<OsString> = words.iter().map(OsString::from).collect();
         VARIABLES.report_error("try", &root, &error, &typed, of(environment))
     };
-    // The parser's own environment is that of the test: the words cause the error, and the variable is found for it.
+    // The test sets no variable of its own process, so clap does not read one. The words cause the error, and the
+    // report finds the variable.
     assert_eq!(lines(&["go", "--sped", "3"], &[("TRY_ACTIVE", "1")]).len(), 1);
     assert!(lines(&["go", "--bus"], &[("TRY_BUS", "x")]).is_empty(), "it is typed");
 }

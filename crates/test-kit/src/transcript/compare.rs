@@ -52,8 +52,8 @@ fn numbers_masked(word: &str) -> String {
     out + rest
 }
 
-/// Returns the length in bytes of the number at the beginning of the text: decimal, with an exponent, or hexadecimal if
-/// it has `0x`, or eight digits with a letter among them.
+/// Returns the length in bytes of the number at the beginning of the text. A number is decimal, perhaps with an
+/// exponent, or hexadecimal. Hexadecimal numbers begin with `0x`, or have eight digits with a letter among them.
 fn number_length(text: &str) -> usize {
     let while_of = |text: &str, of: fn(char) -> bool| text.find(|c| !of(c)).unwrap_or(text.len());
     if let Some(digits) = text.strip_prefix("0x") {

@@ -51,7 +51,7 @@ impl Terminal {
                 }
             }
         });
-        // Both streams in one, as on a screen.
+        // Both streams have one order, as on a screen.
         writeln!(stdin, "exec 2>&1").expect("bash reads");
         Self { child, stdin, lines }
     }
@@ -61,7 +61,8 @@ impl Terminal {
     /// # Panics
     /// If the command does not end.
     pub fn run(&mut self, command: &str) -> (Vec<String>, i32) {
-        // The command has no stdin: it would read what is typed next. The subshell sets `$?` for the next command.
+        // The command gets no stdin, or else it would read the line that is typed next. The subshell sets `$?` for
+        // the next command.
         let typed = format!("{{ {command}\n}} < /dev/null\n__code=$?; echo \"{END}$__code\"; (exit $__code)");
         self.type_line(&typed);
         let mut printed = Vec::new();
@@ -69,7 +70,7 @@ impl Terminal {
             let Some(line) = Patience::begin().receive(&self.lines) else {
                 panic!("`{command}` does not end; it printed\n{}", printed.join("\n"))
             };
-            // The mark may also follow a line without an end.
+            // The mark may follow a line without a line end.
             if let Some((before, code)) = line.split_once(END) {
                 printed.extend(Some(before.to_owned()).filter(|before| !before.is_empty()));
                 return (printed, code.trim().parse().expect("a code"));

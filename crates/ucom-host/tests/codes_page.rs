@@ -1,4 +1,5 @@
-//! Compares the part of docs/codes.md about boards with the words of `ucom explain`. `UPDATE_DOCS=1` writes that part again.
+//! Compares the part of docs/codes.md about boards with the texts of `ucom explain`. `UPDATE_DOCS=1` rewrites that
+//! part.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the kept inputs, on some made by hand, and on random ones.
+//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};

@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the kept inputs, on some made by hand, and on random ones.
+//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,7 +11,8 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// A number, a start and a run, a frame that is too short, and every truncation of this history.
+/// A history with a number, a start and a run, and a frame that is too short. All truncations of this history are run
+/// as well.
 #[test]
 fn a_history() {
     let mut history = Vec::new();

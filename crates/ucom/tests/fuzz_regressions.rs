@@ -1,4 +1,4 @@
-//! The bodies of the fuzz targets over the inputs that are kept, over some made by hand, and over some at random.
+//! Runs the bodies of the fuzz targets on the stored inputs, on some handmade inputs, and on random ones.
 
 use proptest::prelude::*;
 use test_kit::{Target, run_kept_inputs};
@@ -11,7 +11,7 @@ fn kept_inputs() {
     run_kept_inputs(&TARGETS);
 }
 
-/// Every identifier with every length, with the payload bytes that are most different.
+/// Every identifier with every length, with the payload bytes that differ most.
 #[test]
 fn every_frame_with_extreme_payloads() {
     for id in 0..0x800_u16 {

@@ -1,3 +1,3 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of it.
 mod board;
 mod fuzz_regressions;

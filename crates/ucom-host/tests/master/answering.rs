@@ -1,4 +1,4 @@
-//! A member for one test that answers by a rule of its own.
+//! Bus member that answers by a rule. Each test defines its own rule.
 
 use ucom::Frame;
 

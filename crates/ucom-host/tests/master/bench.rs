@@ -1,4 +1,5 @@
-//! A bus in memory and in virtual time: the master on one side, boards or a script on the other, faults in between.
+//! A bus in memory and in virtual time. The master is on one side, boards or a script on the other, and faults can be
+//! set for the frames between them.
 
 use ucom::node::{Node, NodeConfig, Record};
 use ucom::{Frame, Profile};
@@ -8,7 +9,7 @@ use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 pub use super::exit::Exit;
 pub use super::script::Script;
 
-/// Microseconds of a millisecond.
+/// Microseconds in a millisecond.
 pub const MS: u64 = 1000;
 
 /// Participant on the bus other than the master.
@@ -54,9 +55,9 @@ pub enum Fault {
     Doubled,
     /// The frame arrives after the next frame.
     Swapped,
-    /// Delay, ms.
+    /// The frame is delayed by this time in milliseconds.
     Delayed(u64),
-    /// A bit of the data, or of the identifier if the frame has no data.
+    /// One bit of the data is wrong, or one bit of the identifier if the frame has no data.
     Corrupted(u8),
 }
 
@@ -71,20 +72,21 @@ pub struct Bench {
     pub master: Master,
     pub members: Vec<Box<dyn Member>>,
     pub now: u64,
-    /// Every frame that was put on the bus, with the time it was complete.
+    /// Every frame that was put on the bus, with the time at which it was complete.
     pub log: Vec<(u64, From, Frame)>,
     pub events: Vec<(u64, Event)>,
-    /// Frame number and its fault.
+    /// Number of a frame, and its fault.
     pub fault: Option<(usize, Fault)>,
-    /// Beginnings of frames that are lost, and how many of each; `<` is the master, `>` a board.
+    /// Beginnings of frames that are lost, and how many of each are lost. `<` marks a frame of the master, `>` a
+    /// frame of a board.
     pub lose: Vec<(&'static str, u32)>,
-    /// Members that are cut off: no frame reaches them, and none of their frames arrives.
+    /// Members that are disconnected: no frame reaches them, and none of their frames arrives.
     pub cut: Vec<usize>,
     pending_master: Option<Frame>,
     pending: Vec<Option<Frame>>,
     held: Option<(From, Frame)>,
     delayed: Vec<(u64, From, Frame)>,
-    /// The driver is dead, as after the tool was killed.
+    /// The driver does nothing, as if the tool had been killed.
     pub dead: bool,
 }
 
@@ -279,7 +281,7 @@ impl Bench {
         self.times_of(text).len()
     }
 
-    /// Returns the number of frames from any sender that begin with `start`.
+    /// Returns the number of frames, from any sender, that begin with `start`.
     pub fn beginning(&self, start: &str) -> usize {
         self.log.iter().filter(|(.., f)| f.to_string().starts_with(start)).count()
     }
@@ -289,7 +291,7 @@ impl Bench {
     }
 }
 
-/// Returns the frame with one wrong bit, as a gateway sends it that computes a new check.
+/// Returns the frame with one wrong bit. A gateway that computes a new checksum forwards such a frame.
 fn corrupted(frame: &Frame, bit: u8) -> Frame {
     if frame.dlc() == 0 {
         return Frame::new(frame.id() ^ 1 << (bit % 11), &[]).unwrap();
@@ -300,7 +302,7 @@ fn corrupted(frame: &Frame, bit: u8) -> Frame {
     Frame::new(frame.id(), &data).unwrap()
 }
 
-/// The texts of the golden chain.
+/// Input names of the boards of the golden chain.
 pub const CI: [&str; 2] = ["target velocity", "current limit"];
 pub const SO: [&str; 4] = ["pos_soll", "pos_ist", "current", "temperature"];
 pub const PAR: [&str; 3] = ["P", "I", "D"];

@@ -15,8 +15,9 @@ fn has_competing_master(bench: &Bench) -> bool {
     bench.events.iter().any(|(_, e)| matches!(e, Event::CompetingMaster { .. }))
 }
 
-/// D-08: a heartbeat under a board's number before the first intrusive command. The heartbeat is the board's own if the board is started,
-/// and another PC's if it is not. A board that does not answer decides nothing.
+/// D-08: a heartbeat with a board's number arrives before the first intrusive command. If the board is started, the
+/// heartbeat comes from this board; otherwise it comes from another PC. If the board does not answer, the command is
+/// not refused.
 #[test]
 fn d08_whose_heartbeat_is_it() {
     for (status, refused) in [(Some("8B"), false), (Some("AB"), false), (Some("1B"), true), (None, false)] {
@@ -36,8 +37,9 @@ fn d08_whose_heartbeat_is_it() {
     }
 }
 
-/// D-08, D-51: this PC is master and another PC sends heartbeats for a board that is not started. The master reports these and does not
-/// expect more of them. The heartbeats of a board that this PC has started are not taken for those of another PC.
+/// D-08, D-51: this PC is master, and another PC sends heartbeats for a board that is not started. The master reports
+/// these heartbeats and does not expect further ones. It does not attribute heartbeats of a board that this PC has
+/// started to another PC.
 #[test]
 fn d08_d51_heartbeats_of_another_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -54,7 +56,8 @@ fn d08_d51_heartbeats_of_another_pc() {
     assert!(!bench.events.iter().any(|(_, e)| matches!(e, Event::Supervision { .. })), "{:?}", bench.events);
 }
 
-/// D-25: a board that starts its application by itself does not count as a competing master, nor does one that is stopped and started.
+/// D-25: a board that starts its application by itself is not reported as a competing master. A board that is stopped
+/// and started again is not reported either.
 #[test]
 fn d08_d25_no_board_is_mistaken_for_a_pc() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -77,7 +80,8 @@ fn reset(board: u8) -> Request {
     Request::Reset { board: Some(board), force: false }
 }
 
-/// The reset of one board: the board must answer before, and have no number afterwards. The master sends no reset to a missing board.
+/// Resets a single board. The board must answer before the reset, and must have no number afterwards. The master
+/// sends no reset to a board that does not answer.
 #[test]
 fn a_single_reset_is_checked() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -89,7 +93,8 @@ fn a_single_reset_is_checked() {
     assert_eq!((error.exit(), bench.count("004#")), (3, 0));
     assert!(error.hint().contains("ucom scan"), "{}", error.hint());
 
-    // After the loss of any single frame either the reset is done, or the board still has its number and the error reports that.
+    // If any single frame is lost, either the reset is done, or the board still has its number and the error reports
+    // that.
     let mut whole = initialised(&[0x21, 0x42, 0x63]);
     let from = whole.log.len();
     whole.go(reset(2), 10).unwrap();
@@ -109,7 +114,7 @@ fn a_single_reset_is_checked() {
         }
         assert_eq!((bench.board(0).phase(), bench.board(2).phase()), (Phase::Idle, Phase::Idle), "{what}");
     }
-    // The board has reset, but none of its frames arrive any more.
+    // The board has reset, but from now on none of its frames arrive.
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
     bench.lose = vec![("> 482#", 100)];
     let error = bench.go(reset(2), 20).unwrap_err();
@@ -119,7 +124,8 @@ fn a_single_reset_is_checked() {
     );
 }
 
-/// A driver that lags: the master does not take frames that it has not delivered yet for silence, and still sends heartbeats.
+/// The driver delivers frames late. The master does not mistake frames that are still in the driver for silence, and
+/// still sends heartbeats.
 #[test]
 fn d50_a_driver_that_is_behind() {
     let mut master = ucom_host::master::Master::new(Profile::default());

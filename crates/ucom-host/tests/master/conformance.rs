@@ -1,4 +1,4 @@
-//! The conformance tests: boards of this crate pass all of them, and each mistake is found by its own test.
+//! The conformance tests. Boards of this crate pass all of them, and each faulty board fails the test for its fault.
 
 use super::bench::Exit;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -52,7 +52,7 @@ fn boards_of_this_crate_pass_every_test() {
         assert!(failed(&report).is_empty(), "{endian}: {:?}", failed(&report));
         let skipped: Vec<&str> =
             report.tests.iter().filter(|t| matches!(t.verdict, Verdict::Skipped(_))).map(|t| t.id).collect();
-        // No application runs yet when the tests that only send questions come.
+        // At this point of the run no application runs, so these tests of questions are skipped.
         assert_eq!(
             skipped,
             ["D-T10", "D-T11", "D-T10", "D-T11", "D-T10", "D-T11", "D-T19", "D-T20", "D-T21"]
@@ -68,7 +68,7 @@ fn boards_of_this_crate_pass_every_test() {
     }
 }
 
-/// Actions that are not allowed do not happen: the frames of a run without options.
+/// Without options, no actions that need permission are done. The frames of such a run are checked.
 #[test]
 fn without_options_only_harmless_frames_leave() {
     let mut bench = numbered(Bench::chain(&[0x21, 0x42]));
@@ -79,10 +79,11 @@ fn without_options_only_harmless_frames_leave() {
     let mut last = 0;
     for (_, from, frame) in bench.log[before..].iter().filter(|(_, from, _)| *from == From::Master) {
         let function = frame.id() >> 6;
-        // PC_INFO, PC_REPORT, a number that the board already has, dumps; heartbeats continue because of `start`.
+        // PC_INFO, PC_REPORT, a number that the board already has, and dumps. Heartbeats are sent as well, because
+        // `start` has begun them.
         assert!(matches!(function, 8 | 9 | 10 | 22 | 23 | 26), "{from:?} {frame}");
         if function == 10 {
-            // PC_INIT goes only to a board that has just reported that number.
+            // PC_INIT is sent only to a board that has just reported this number.
             assert_eq!(last, u16::from(Function::Info.number()) << 6 | frame.id() & 31, "{frame}");
         }
         if function != 26 {
@@ -108,7 +109,7 @@ fn running_boards_are_left_alone() {
     assert_eq!(refused.exit(), 4, "{refused}");
 }
 
-/// A board with a mistake, which changes what it receives and what it sends.
+/// A board with a fault, which changes the frames that it receives and sends.
 struct Flawed {
     inner: TestNode,
     mistake: Mistake,
@@ -171,7 +172,7 @@ impl Member for Flawed {
     }
 }
 
-/// The first of two boards has the mistake.
+/// Two boards, of which the first has the fault.
 fn with(mistake: Mistake) -> Bench {
     let mut pins = WirePins::chain(2);
     let profile = Profile::default();
@@ -186,7 +187,7 @@ fn with(mistake: Mistake) -> Bench {
     Bench::new(profile, vec![Box::new(first), Box::new(second)])
 }
 
-/// Each mistake is found by its test.
+/// Each fault is found by its test.
 #[test]
 fn each_mistake_is_found_by_its_test() {
     let mistakes: [(&str, Mistake); 17] = [
@@ -204,7 +205,7 @@ fn each_mistake_is_found_by_its_test() {
         (
             "D-T4",
             receives(|_, f| {
-                // The chain must be numbered before, so only the second request is lost.
+                // The chain must be numbered first, so only the second request is lost.
                 static RECEIVED: AtomicUsize = AtomicUsize::new(0);
                 let raised = f.to_string() == "1C1#0202";
                 if raised && RECEIVED.fetch_add(1, Ordering::Relaxed) == 1 { vec![] } else { vec![*f] }
@@ -259,7 +260,7 @@ fn each_mistake_is_found_by_its_test() {
     ];
     for (id, mistake) in mistakes {
         let mut bench = with(mistake);
-        // A chain with a board that does not take its number is numbered by hand.
+        // `init` must give both boards their numbers.
         if bench.go(Request::Init(InitOptions::default()), 60).is_err() {
             panic!("{id}: no numbers");
         }
@@ -269,7 +270,7 @@ fn each_mistake_is_found_by_its_test() {
         let options = ConformanceOptions { only: vec![id.into()], ..all() };
         let report = judged(&mut bench, options);
         assert!(report.failed() > 0, "{id}: {report:?}");
-        // The boards without the mistake pass it.
+        // Boards without a fault pass this test.
         let mut bench = numbered(with(NONE));
         if ["D-T10", "D-T11"].contains(&id) {
             bench.go(Request::Start { board: 1, force: false }, 20).unwrap();

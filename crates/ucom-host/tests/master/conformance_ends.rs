@@ -1,5 +1,5 @@
-//! The conformance tests leave boards as they were found: at their end, after a cancel, and when a board disconnects. Also requests that
-//! they refuse.
+//! The conformance tests leave boards as they found them: at their end, after a cancel, and when a board disconnects.
+//! The requests that they refuse are tested as well.
 
 use super::bench::Exit;
 use ucom::{Function, Status};
@@ -22,7 +22,7 @@ fn info(bench: &mut Bench, board: u8) -> BoardSeen {
     }
 }
 
-/// Three boards with numbers; the second is started, the third starts by itself but is not up.
+/// Three boards with numbers. The second is started; the third starts by itself but its application is not up yet.
 fn chain() -> Bench {
     let mut bench = Bench::chain(&FLASH);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
@@ -32,7 +32,7 @@ fn chain() -> Bench {
     bench
 }
 
-/// Returns what must be as before: a board's flash number and its bits ASTART, MSTART, MCARUN and PROG.
+/// Returns the state that must not change: a board's flash number and its bits ASTART, MSTART, MCARUN and PROG.
 fn state(bench: &mut Bench, board: u8) -> (u16, Status) {
     let seen = info(bench, board).info;
     let bits = Status::ASTART | Status::MSTART | Status::MCARUN | Status::PROG;
@@ -65,8 +65,8 @@ fn report(bench: &mut Bench, id: ProcedureId) -> ConformanceReport {
     }
 }
 
-/// Cancels at moments all over the tests: ASTART, MSTART, MCARUN, PROG and the numbers are as before. The report is complete and names a
-/// board that was erased.
+/// Cancels at moments throughout the tests. ASTART, MSTART, MCARUN, PROG and the numbers must be as before. The
+/// report is complete and lists a board that was erased.
 #[test]
 fn cancelled_tests_leave_the_boards_as_they_were() {
     let mut bench = chain();
@@ -87,7 +87,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let result = bench.wait(id, 200);
         let report = match result {
             Ok(Outcome::Conformance(report)) => report,
-            // Before the first test nothing has changed.
+            // Nothing was changed before the first test.
             Err(Error::Master(MasterError::Cancelled)) => {
                 assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment}");
                 continue;
@@ -104,7 +104,7 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
         let named = report.left.iter().any(|l| l.starts_with("board 1 has no program now"));
         assert_eq!(named, programless, "moment {moment}: {:?}", report.left);
         assert_eq!(report.left.len(), usize::from(named), "moment {moment}: {:?}", report.left);
-        // By now a board that starts by itself is up.
+        // After this time the board that starts by itself is up.
         bench.run(4_000);
         assert_eq!(states(&mut bench, &[1, 2, 3]), before, "moment {moment} {:?}", report.tests.last());
     }
@@ -135,7 +135,8 @@ fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     assert_eq!(states(&mut bench, &[1, 3]), before);
 }
 
-/// A board has no number: a new address assignment could test another board than the named one, so the request is refused.
+/// A board has no number. After a new address assignment another board could have the number of the tested board, so
+/// the request is refused.
 #[test]
 fn address_assignment_is_refused_when_a_board_has_no_number() {
     let mut bench = chain();
@@ -150,7 +151,7 @@ fn address_assignment_is_refused_when_a_board_has_no_number() {
     assert!(!bench.log[from..].iter().any(|(_, who, f)| *who == From::Master && changes(f)));
 }
 
-/// Only the named board is programmed. Its header has its flash number and the image's address.
+/// Programs only the selected board. The header contains its flash number and the address of the image.
 #[test]
 fn programs_the_board_that_is_named_alone() {
     let mut bench = chain();
@@ -178,7 +179,7 @@ fn programs_the_board_that_is_named_alone() {
         }
     }
     assert_eq!((&header[8..12], &header[20..22]), (&[0x40, 0, 1, 0][..], &[0x21, 0][..]));
-    // U-2: any board that runs, even one outside the test.
+    // U-2: the test is refused if any board runs, even one outside the test.
     let run = RunOptions { boards: vec![RunBoard { board: 2, ..Default::default() }], ..Default::default() };
     bench.go(Request::Run(run), 20).unwrap();
     let tested = ConformanceOptions { boards: vec![1], ..options(0x21) };

@@ -4,7 +4,7 @@ use ucom_host::master::conformance::ConformanceReport;
 use ucom_host::master::update::UpdateReport;
 use ucom_host::master::{Diagnose, Error, ErrorKind, InitReport};
 
-/// The exit code of the command, as its contract has it.
+/// Exit code of the command, as its documentation defines it.
 pub trait Exit {
     fn exit(&self) -> u8;
 }

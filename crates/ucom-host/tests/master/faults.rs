@@ -1,5 +1,5 @@
-//! Faults on every single frame of scan, init and process data: the result is success or a named error, never a wrong number and never a
-//! hang. Every wait is bounded in virtual time.
+//! Faults on every single frame of scan, init and process data. The result is success or a specific error, never a
+//! wrong number or an endless wait. Every wait is limited in virtual time.
 
 use ucom_host::master::{InitFinding, InitOptions, Outcome, Request, RunBoard, RunOptions, Setting};
 
@@ -21,7 +21,7 @@ pub fn kinds(at: usize) -> [Fault; 6] {
     ]
 }
 
-/// Checks that no two boards have one number.
+/// Checks that no two boards have the same number.
 fn check_numbers(bench: &mut Bench, what: &str) {
     let numbers: Vec<_> = (0..IDS.len()).filter_map(|i| bench.board(i).number()).collect();
     let mut unique = numbers.clone();
@@ -51,7 +51,8 @@ fn every_frame_of_an_init_disturbed() {
                 complete += 1;
             } else {
                 named += 1;
-                // A single frame that was only lost, doubled or late never leaves a chain incomplete.
+                // If a single frame is only lost, doubled or late, the chain is always complete. Only a corrupted
+                // frame can leave it incomplete.
                 assert!(matches!(fault, Fault::Corrupted(_)), "{what}: {:?}", report.findings);
             }
         }
@@ -82,14 +83,14 @@ fn every_frame_of_a_scan_disturbed() {
             if !matches!(fault, Fault::Corrupted(_)) {
                 assert_eq!(report.boards.len(), 3, "{what}");
             } else if report.boards.len() < 3 {
-                // A request was damaged into a reset: the boards have no numbers, and the scan reports it.
+                // A request was corrupted into a reset, so the boards have no numbers; the scan reports this.
                 assert!(!report.findings.is_empty(), "{what}");
             }
         }
     }
 }
 
-/// From the exloader to running outputs: a description is right or is not accepted.
+/// Faults on every frame from the exloader to running outputs. A description is either correct or rejected.
 #[test]
 fn every_frame_of_a_start_disturbed() {
     let options = RunOptions {

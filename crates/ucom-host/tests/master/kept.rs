@@ -1,4 +1,4 @@
-//! Inputs that the fuzzers found or keep, run with the stable toolchain.
+//! Inputs that the fuzzers found or that the repository stores, run with the stable toolchain.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ fn kept(target: &str, body: fn(&[u8])) {
             }
         }
     }
-    // The random bytes are equal in every run.
+    // The random bytes are the same in every run.
     let mut state = 0x2545_F491_u32;
     let mut next = || {
         state ^= state << 13;

@@ -4,24 +4,25 @@ use ucom::Frame;
 
 use super::bench::{Bench, MS, Member};
 
-/// A board as a table. The board takes every block; the last rule defines the end of the update.
+/// A board as a table. The board accepts every block; the last rule defines the end of the update.
 pub struct Loader {
     /// Program ID and date in `DSP_INFO` before and after the update.
     pub info: [&'static str; 2],
-    /// Flash number that the board sends, by resets so far and whether the transfer was cancelled since.
+    /// Flash number that the board sends. It depends on the number of resets so far, and on whether the transfer was
+    /// cancelled since.
     pub flash: fn(usize, bool) -> &'static str,
-    /// Status of the board when all blocks have come.
+    /// Status of the board after all blocks.
     pub done_status: u8,
     pub blocks: usize,
     pub cancelled: bool,
-    /// Frames of PC_PROG so far in this attempt.
+    /// Number of PC_PROG frames so far in this attempt.
     pub frames: usize,
     pub resets: usize,
-    /// Delay of READY, ms, by block.
+    /// Delay of READY for each block, in milliseconds.
     pub delay: fn(usize) -> u64,
     /// Answer to a block instead of READY; an empty text means no answer.
     pub special: fn(usize, usize) -> Option<&'static str>,
-    /// Frame after which the board sends an error at once and takes no more.
+    /// Number of frames after which the board sends an error at once and accepts no more.
     pub refuses_at: Option<usize>,
     pub out: Vec<(u64, Frame)>,
     pub waiting: bool,

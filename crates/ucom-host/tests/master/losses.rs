@@ -1,4 +1,4 @@
-//! Losses of several chosen frames at once, which a single fault does not cover.
+//! Losses of several chosen frames together. Tests with a single fault do not cover these.
 
 use ucom::Profile;
 use ucom::node::Phase;
@@ -16,8 +16,9 @@ fn running(boards: &[u8], flash_ids: &[u16]) -> Bench {
     bench
 }
 
-/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The frames that still come under the number show that a board
-/// has taken it. Boards that raise their pin by themselves would take the number twice.
+/// D-21, D-24: the acknowledgement and the beginning of DSP_INFO are lost. The later frames with this number show
+/// that a board has accepted it. Without this conclusion, boards that raise their pin by themselves would get the
+/// same number twice.
 #[test]
 fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     let profile = Profile { chain_auto_opinit: true, ..Profile::default() };
@@ -28,7 +29,7 @@ fn d24_any_frame_of_an_answer_means_the_number_is_taken() {
     assert_eq!(numbers, [Some(1), Some(2), Some(3)], "{result:?}");
 }
 
-/// D-46, U-4: PC_XRESET has no answer. The master sends it again while the application still runs.
+/// D-46, U-4: a PC_XRESET gets no answer. The master repeats it while the application still runs.
 #[test]
 fn d46_a_lost_xreset_is_repeated() {
     let mut bench = initialised(&[0x21]);
@@ -39,7 +40,7 @@ fn d46_a_lost_xreset_is_repeated() {
     assert_eq!(report.boards[0].attempts, 1);
 }
 
-/// A board whose answers do not arrive is stopped nevertheless.
+/// A board stops even if its answers do not arrive.
 #[test]
 fn a_stop_does_not_depend_on_answers() {
     for lost in ["> 141#", "> 601#"] {
@@ -53,7 +54,7 @@ fn a_stop_does_not_depend_on_answers() {
     }
 }
 
-/// D-51: the stop of all boards is one frame, which can be lost as well.
+/// D-51: the stop of all boards is a single frame, which may also be lost.
 #[test]
 fn d51_a_lost_stop_is_repeated() {
     let mut bench = running(&[1, 2], &[0x21, 0x42]);

@@ -1,4 +1,5 @@
-//! Boards that were started with force on a bus that cannot carry all inputs: heartbeats keep their time, and inputs are fresh.
+//! Boards that were started with `force` on a bus that cannot carry all inputs. Heartbeats are still sent in time,
+//! and inputs are up to date.
 
 use std::collections::VecDeque;
 
@@ -21,8 +22,8 @@ fn overloaded() -> Bench {
     bench
 }
 
-/// D-34, D-50: inputs that wait are not queued again. A change therefore reaches its board soon, even after a long overload, and
-/// heartbeats keep their time.
+/// D-34, D-50: while a board's inputs wait, they are not queued again. So a change reaches its board soon, even after
+/// a long overload, and heartbeats are sent in time.
 #[test]
 fn d34_d50_inputs_that_wait_are_never_stale() {
     let mut bench = overloaded();
@@ -46,8 +47,8 @@ fn d34_d50_inputs_that_wait_are_never_stale() {
     }
 }
 
-/// D-50: below the master there are more queues, such as a socket's. The master hands them no more inputs than the bus carries; otherwise
-/// heartbeats would wait after inputs in those queues.
+/// D-50: below the master there are more queues, for example that of a socket. The master puts no more inputs into
+/// them than the bus can carry. Otherwise heartbeats would wait behind inputs in those queues.
 #[test]
 fn d50_no_more_inputs_than_the_bus_carries() {
     let mut bench = overloaded();
@@ -63,7 +64,7 @@ fn d50_no_more_inputs_than_the_bus_carries() {
         while let Some(frame) = master.poll(now) {
             queue.push_back((now, frame));
         }
-        // 1 Mbit/s; an idle bus saves nothing.
+        // 1 Mbit/s; time of an idle bus is not carried over.
         spare += MS;
         while let Some((since, next)) = queue.front()
             && spare >= frame_bits(next.dlc())
@@ -84,7 +85,8 @@ fn d50_no_more_inputs_than_the_bus_carries() {
     assert!(longest <= 200 * MS, "a heartbeat waited {longest} µs");
 }
 
-/// D-34: with a driver that sends one frame in 20 ms, at most one package of each board's inputs waits, with the latest values.
+/// D-34: the driver sends only one frame every 20 ms. Then at most one package of each board's inputs waits, and it
+/// has the latest values.
 #[test]
 fn d34_a_slow_driver_has_a_short_queue() {
     let mut bench = overloaded();

@@ -14,7 +14,7 @@ use super::bench::{Bench, image};
 use super::chain::initialised;
 use super::update::options;
 
-/// P-20: the answers of boards with other profiles reveal these, and the probe finds the right profile.
+/// P-20: the answers of boards with other profiles show these profiles, and the probe finds the right one.
 #[test]
 fn p20_probe_finds_the_profile() {
     let others = [
@@ -39,7 +39,7 @@ fn p20_probe_finds_the_profile() {
     ];
     for profile in others {
         let mut bench = Bench::chain_with(&[0x21, 0x42, 0x63], profile);
-        // The tool begins with the defaults.
+        // The tool starts with the default profile.
         bench.master = ucom_host::master::Master::new(Profile::default());
         let probe = Request::Probe(ProbeOptions { init: true, ..Default::default() });
         let Ok(Outcome::Probe(report)) = bench.go(probe, 120) else { panic!() };
@@ -48,7 +48,8 @@ fn p20_probe_finds_the_profile() {
     }
 }
 
-/// D-10: with a wrong byte order the error names the byte order and `probe`, not the wire, the load or the flash numbers.
+/// D-10: if the byte order is wrong, the error mentions the byte order and `probe`, and not the wire, the load or the
+/// flash numbers.
 #[test]
 fn d10_a_wrong_byte_order_is_named() {
     for (boards, here) in [(Endian::Big, Endian::Little), (Endian::Little, Endian::Big)] {
@@ -91,12 +92,12 @@ fn d10_a_wrong_byte_order_is_named() {
         let error = bench.go(Request::Describe { board: 1, fresh: true }, 60).unwrap_err();
         assert!(error.to_string().contains("byte order") && error.hint().contains("ucom probe"), "{error:?}");
     }
-    // A flash number that only by chance equals its swapped form does not count as a wrong byte order.
+    // If a flash number equals its swapped form by chance, the byte order is not reported as wrong.
     let mut bench = Bench::chain(&[0x2121, 0x42]);
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 60), Ok(Outcome::Init(r)) if r.is_ok()));
 }
 
-/// Without `init` only harmless frames leave.
+/// Without `init`, a probe sends only harmless frames.
 #[test]
 fn p20_probe_is_harmless_unless_allowed() {
     let mut bench = initialised(&[0x21]);
@@ -112,7 +113,7 @@ fn p20_probe_is_harmless_unless_allowed() {
     }
 }
 
-/// The checksum of a board's program, and the heartbeats that a running board counts.
+/// The probe finds the checksum of a board's program and the heartbeat mode that a running board accepts.
 #[test]
 fn probe_of_checksum_and_heartbeats() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -128,7 +129,7 @@ fn probe_of_checksum_and_heartbeats() {
     assert!(!bench.board(0).application.running);
 }
 
-/// After any end of a probe the session reads the protocol as before, and no board runs that did not run before.
+/// After any end of a probe the session uses the same profile as before, and no board runs that did not run before.
 #[test]
 fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     let theirs = Profile { prog_checksum: Checksum::Sum16, ..Profile::default() };
@@ -149,7 +150,7 @@ fn a_probe_leaves_the_session_and_the_boards_as_they_were() {
     bench.go(Request::Start { board: 1, force: false }, 20).unwrap();
     bench.go(Request::Probe(alive.clone()), 120).unwrap();
     assert!(!bench.board(0).application.running && bench.board(0).status().has(Status::MSTART));
-    // Cancelled while everything is read raw, and while a control loop runs with other heartbeats.
+    // The probe is cancelled while it reads everything raw, and while a control loop runs with other heartbeats.
     for until in ["<201#", "<541#"] {
         let mut bench = numbered();
         let id = bench.master.start(bench.now, Request::Probe(alive.clone())).unwrap();

@@ -1,4 +1,5 @@
-//! Repair of one board's number (5.4): after any losses, never a success with two boards that have one number.
+//! Repair of one board's number (5.4). After any losses, the repair never succeeds with two boards that have the same
+//! number.
 
 use super::bench::Exit;
 use ucom_host::master::{AddressError, Error, IdentityError, Outcome, Request};
@@ -9,7 +10,7 @@ use super::update::{options, recorded, update};
 
 const FLASH: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
 
-/// A chain of four in which these boards have rebooted; the pins of the other boards are still on.
+/// A chain of four boards, of which these have rebooted; the pins of the other boards are still on.
 fn rebooted(boards: &[u8]) -> Bench {
     let mut bench = initialised(&FLASH);
     for board in boards {
@@ -27,7 +28,8 @@ fn numbers(bench: &mut Bench) -> Vec<u8> {
     (0..FLASH.len()).map(|i| bench.board(i).number().map_or(0, |n| n.number())).collect()
 }
 
-/// Checks that the result of the repair of board 2 is true: a success means that this board has the number and no other board has it.
+/// Checks that the result of the repair of board 2 is correct: after a success this board has the number and no other
+/// board has it.
 fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     let numbers = numbers(bench);
     match result {
@@ -38,19 +40,20 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
         ) => {
             assert_eq!((numbers[1], numbers[3]), (0, 0), "{what}: {result:?}");
         }
-        // The board did not receive the number, or its neighbour keeps its pin on: the error claims nothing.
+        // The board did not receive the number, or the pin of its neighbour is still on. The error does not say
+        // which.
         Err(error) => assert!([1, 3, 4].contains(&error.exit()), "{what}: {result:?}"),
     }
 }
 
-/// D-21: with two boards without a number, each after a raised pin, only the named board takes the number.
+/// D-21: two boards have no number, and the pin before each is on. Only the selected board takes the number.
 #[test]
 fn d21_a_number_goes_to_one_board_only() {
     let mut bench = rebooted(&[2, 4]);
     let result = repair(&mut bench, 2);
     assert!(matches!(&result, Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42), "{result:?}");
     is_sound(&mut bench, &result, "nothing lost");
-    // The pins are on again: the other board gets its number, too. A board without a fault only gets questions.
+    // The pins are on again, so the other board gets its number. A board that has its number gets only questions.
     assert!(repair(&mut bench, 4).is_ok());
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
     let before = (bench.count("281#"), bench.count("1C1#0200"));
@@ -58,7 +61,8 @@ fn d21_a_number_goes_to_one_board_only() {
     assert_eq!((bench.count("281#"), bench.count("1C1#0200")), before);
 }
 
-/// The first board's incoming pin is always active: while it has no number, no other number can be given.
+/// The first board's incoming pin is always active. As long as it has no number, it would take any other number that
+/// is given.
 #[test]
 fn d21_the_first_board_takes_any_number() {
     let mut bench = rebooted(&[1, 3]);
@@ -70,7 +74,7 @@ fn d21_the_first_board_takes_any_number() {
     assert_eq!(numbers(&mut bench), [1, 2, 3, 4]);
 }
 
-/// Every single frame of a repair lost or doubled.
+/// Every single frame of a repair is lost or doubled once.
 #[test]
 fn d21_no_single_fault_gives_a_number_twice() {
     let (from, to) = {
@@ -90,7 +94,8 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Many frames lost at once: those that lower the other board's pin, that board's answers, and those of the named board.
+/// Many frames are lost together: those that lower the pin before the other board, that board's answers, and the
+/// answers of the selected board.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;
@@ -125,7 +130,7 @@ fn u4_an_update_gives_a_number_to_one_board_only() {
     let mut bench = rebooted(&[4]);
     let id = bench.master.start(bench.now, Request::Update(options(&[2], 128))).unwrap();
     bench.until(|b| b.count("042#") > 0);
-    // The other board without a number reboots at the moment of XRESET.
+    // The other board without a number reboots when XRESET is sent.
     let reset = super::bench::frame("002#");
     let now = bench.now;
     bench.members[1].receive(now, &reset);

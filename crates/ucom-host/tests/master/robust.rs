@@ -10,13 +10,14 @@ use super::bench::{Bench, CI, PAR, SO};
 use super::update::{check_program, options, update};
 
 proptest! {
-    /// Random frames at any time during any procedure: no panic, no endless wait, exactly one end.
+    /// Random frames at any time during any procedure. The master never panics or waits without end, and each
+    /// procedure ends exactly once.
     #[test]
     fn any_frames_into_any_procedure(data in prop::collection::vec(any::<u8>(), 0..400)) {
         ucom_host::master::fuzzing::frames(&data);
     }
 
-    /// Likewise with identifiers of boards 1 to 3 and valid lengths, so that answers are followed further.
+    /// As above, with identifiers of boards 1 to 3 and valid lengths, so that more answers are accepted.
     #[test]
     fn likely_frames_into_any_procedure(
         choice: u8,
@@ -32,7 +33,7 @@ proptest! {
     }
 }
 
-/// Init, update and run with boards of other profiles: only the master's profile must change.
+/// Init, update and run with boards that have other profiles. Only the master's profile must be changed.
 #[test]
 fn other_profiles() {
     let profiles = [

@@ -23,7 +23,7 @@ fn running(flash_ids: &[u16], boards: &[u8]) -> Bench {
     bench
 }
 
-/// Vector 13.2: the start order, frame by frame, of board 1 alone.
+/// Vector 13.2: the start of board 1 alone, frame by frame.
 #[test]
 fn start_order() {
     let mut bench = initialised(&[0x21]);
@@ -57,7 +57,7 @@ fn start_order() {
     assert_eq!((board.application.latched_ci.as_slice(), board.application.par[0]), (&[1500, 9][..], 120));
 }
 
-/// D-34: a change is sent at once. D-35: the shadow holds assumed values, and is unknown after a restart.
+/// D-34: a change is sent at once. D-35: the shadow contains assumed values, and is unknown after a restart.
 #[test]
 fn d34_d35_inputs_and_parameters() {
     let mut bench = running(&[0x21], &[1]);
@@ -99,14 +99,15 @@ fn d36_p14_descriptions_are_cached() {
     assert_eq!(bench.count("582#"), 2);
     let alive = bench.times_of("680#");
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))));
-    // A board without a running application: refused, and the error names the command that helps.
+    // A board without a running application: the request is refused, and the error suggests the command that helps.
     let mut bench = initialised(&[0x21]);
     let error = bench.go(Request::Describe { board: 1, fresh: false }, 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::NoApplication { board: 1, valid: true }));
     assert!(error.hint().contains("ucom start 1"));
 }
 
-/// D-36: names that were kept for a board's program but belong to another application are detected before the loop runs.
+/// D-36: the stored names for a board's program belong to another application. The master detects this before the
+/// control loop runs.
 #[test]
 fn d36_kept_names_of_another_application_start_nothing() {
     let mut bench = initialised(&[0x21]);
@@ -123,7 +124,7 @@ fn d36_kept_names_of_another_application_start_nothing() {
     let error = bench.go(Request::Run(options.clone()), 10).unwrap_err();
     assert_eq!(error, Error::Signal(SignalError::StaleNames { board: 1 }));
     assert_eq!((bench.count("341#"), bench.count("541#")), (0, 0), "no inputs, no loop");
-    // Now the names are the board's own.
+    // Now the stored names are those of the board.
     assert!(matches!(bench.go(Request::Run(options), 10), Ok(Outcome::Running(_))));
 }
 
@@ -157,7 +158,7 @@ fn d14_dump_is_accepted_only_if_the_totals_fit() {
     assert!(matches!(read(&[]), (Err(Error::Exchange(ExchangeError::NoAnswer { tries: 3, .. })), 3)));
 }
 
-/// P-6: SO of ten other boards at full rate and DSP_INFO of board 3 in the middle of a dump of board 2.
+/// P-6: board 2 sends a dump. Meanwhile ten other boards send SO at full rate, and board 3 sends DSP_INFO.
 #[test]
 fn p6_nothing_is_mixed_up() {
     let dump = [
@@ -215,7 +216,7 @@ fn d37_flags() {
     assert!(!bench.board(0).application.running);
 }
 
-/// Stops in reverse order: outputs, loop, application. The status goes through AB, 8B, 1B.
+/// A stop does the steps in reverse order: outputs, loop, application. The status changes from AB to 8B to 1B.
 #[test]
 fn stop_in_reverse() {
     let mut bench = running(&[0x21], &[1]);
@@ -234,7 +235,8 @@ fn stop_in_reverse() {
     assert!(!lost, "an application that was stopped on purpose is not lost");
 }
 
-/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat, and the policy's frames leave within 100 ms.
+/// P-15, D-51: a lost board is reported within 3.1 s of its last heartbeat. The frames that `on_lost` requires are
+/// sent within 100 ms.
 #[test]
 fn p15_d51_lost_boards() {
     for (on_lost, frame) in [
@@ -259,11 +261,11 @@ fn p15_d51_lost_boards() {
         assert!((3_000 * MS..=3_100 * MS).contains(&(lost - last)), "{}", lost - last);
         for text in ["600#00000000", "602#00000000"] {
             let times = bench.times_of(text);
-            // Sent three times: one frame can be lost.
+            // The frame is sent three times, because one can be lost.
             assert_eq!(times.len(), 3 * usize::from(frame == Some(text)), "{on_lost:?} {text}");
             assert!(times.iter().all(|at| at - lost <= 100 * MS));
         }
-        // The master stops repeating inputs of the lost board.
+        // The master no longer repeats inputs of the lost board.
         let repeated = bench.log.iter().rfind(|(.., f)| f.id() == 0x342).unwrap().0;
         assert!(repeated <= lost + MS, "{on_lost:?}");
         assert_eq!(bench.board(0).application.running, on_lost != OnLost::StopAll);
@@ -286,7 +288,7 @@ fn only_a_master_stops_boards() {
     assert!(bench.sent().is_empty());
 }
 
-/// D-26: a board that reboots while it runs stops the others, too.
+/// D-26: if a board reboots while it runs, the other boards are stopped as well.
 #[test]
 fn d26_reboot_of_a_running_board() {
     let mut bench = running(&[0x21, 0x42], &[1, 2]);
@@ -297,7 +299,7 @@ fn d26_reboot_of_a_running_board() {
     assert!(bench.events.iter().any(|(_, e)| *e == Event::Supervision { board: 2, change }));
     assert!(!bench.board(0).application.running);
     assert_eq!(bench.count("600#00000000"), 3);
-    // Repair gives it its number back.
+    // A repair gives the board its number again.
     let repair = Request::Repair { board: 2, flash_number: 0x42, force: false };
     assert!(matches!(bench.go(repair, 10), Ok(Outcome::Repaired(seen)) if seen.info.flash_number == 0x42));
     let repair = Request::Repair { board: 2, flash_number: 0x63, force: false };
@@ -311,7 +313,7 @@ fn d26_reboot_of_a_running_board() {
 #[test]
 fn d50_end_of_session() {
     let mut bench = running(&[0x21], &[1]);
-    // Begins at a heartbeat.
+    // Starts at a heartbeat.
     let alive = bench.count("680#");
     bench.until(|b| b.count("680#") != alive);
     bench.master.end_session();
@@ -356,7 +358,7 @@ fn d33_snapshots() {
     assert!((9..=11).contains(&(snapshots.count() + 1)));
 }
 
-/// Only one procedure at a time works with a board. A procedure for another board may run meanwhile.
+/// Only one procedure at a time may work with a board. Meanwhile a procedure for another board may run.
 #[test]
 fn one_procedure_a_board() {
     let mut bench = initialised(&[0x21, 0x42]);

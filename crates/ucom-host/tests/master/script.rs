@@ -1,4 +1,4 @@
-//! A peer as a table of frames.
+//! Bus member that answers by a table of frames.
 
 use std::collections::BTreeMap;
 
@@ -6,10 +6,10 @@ use ucom::Frame;
 
 use super::bench::{MS, Member, frame};
 
-/// A peer that consists of a table of frames.
+/// Bus member that consists of a table of frames.
 #[derive(Default)]
 pub struct Script {
-    /// Answers, and their delays in ms.
+    /// Rules: answers and their delays in milliseconds.
     rules: Vec<Rule>,
     due: BTreeMap<(u64, u64), Frame>,
     serial: u64,
@@ -20,18 +20,18 @@ struct Rule {
     ask: Frame,
     /// Remaining uses of the rule.
     uses: u32,
-    /// Requests that pass before the rule applies.
+    /// Number of requests before the rule applies.
     skip: u32,
     answers: Vec<(u64, Frame)>,
 }
 
 impl Script {
-    /// `answers`: `"ms frame"` or `"frame"`, separated by blanks between entries, e.g. `["441#21", "5:482#42"]`.
+    /// Each of `answers` is `"ms:frame"` or `"frame"`, for example `["441#21", "5:482#42"]`.
     pub fn on(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, u32::MAX, answers)
     }
 
-    /// Answers only the first request.
+    /// Like [`Self::on`], for the first request only.
     pub fn once(self, ask: &str, answers: &[&str]) -> Self {
         self.rule(ask, 0, 1, answers)
     }
@@ -45,7 +45,7 @@ impl Script {
         self
     }
 
-    /// Sends a frame by itself at a time, ms.
+    /// Sends a frame without a request at a time in milliseconds.
     pub fn at(mut self, ms: u64, text: &str) -> Self {
         self.serial += 1;
         self.due.insert((ms * MS, self.serial), frame(text));

@@ -1,4 +1,4 @@
-//! Rows of the acceptance table in which the other side is only a table of frames.
+//! Rows of the acceptance table in which the boards are only a table of frames.
 
 use super::bench::Exit;
 use ucom_host::master::{
@@ -13,7 +13,7 @@ fn golden(boards: usize) -> Script {
     let mut script = Script::default().on("000#", reports).on("240#", reports);
     for (i, flash) in [0x21, 0x42, 0x63].into_iter().enumerate().take(boards) {
         let n = i + 1;
-        // Status 19 first, 1B once OPINIT has been set.
+        // The status is 19 first, and 1B after OPINIT has been set.
         let answer = |status: &str| {
             let numbers = format!("14{n}#{flash:02X}000{n}{status}34126E38");
             [numbers, format!("14{n}#0200"), format!("14{n}#55436F4D32206865"), format!("14{n}#61642070616E")]
@@ -78,7 +78,7 @@ fn p2_init_of_nobody() {
     assert_eq!(report.exit(), 3);
 }
 
-/// P-3: INITACK is lost. The master sends PC_INFO before any repetition of PC_INIT.
+/// P-3: INITACK is lost. The master sends PC_INFO before it repeats PC_INIT.
 #[test]
 fn p3_lost_ack_asks_info_first() {
     let script = Script::default()
@@ -91,12 +91,13 @@ fn p3_lost_ack_asks_info_first() {
     let report = init(&mut bench);
     assert!(report.is_ok(), "{:?}", report.findings);
     assert_eq!(bench.count("281#"), 1, "{:?}", bench.sent());
-    // No board answers at all: between two PC_INIT there is always a PC_INFO.
+    // No board answers at all. Between two PC_INIT there is always a PC_INFO.
     let sent: Vec<String> = bench.sent().into_iter().filter(|t| t == "282#" || t == "202#").collect();
     assert_eq!(sent, ["282#", "202#", "282#", "202#", "282#", "202#"]);
 }
 
-/// P-4, D-24: identifier and data of INITACK disagree: the number is refused, not guessed.
+/// P-4, D-24: identifier and data of INITACK differ. The number is refused; the master does not choose one of the
+/// two.
 #[test]
 fn p4_d24_ack_mismatch_is_refused() {
     for ack in ["0C1#02", "0C2#01"] {
@@ -116,7 +117,7 @@ fn p4_d24_ack_mismatch_is_refused() {
     }
 }
 
-/// P-16, D-26: an unrequested report means "rebooted"; a requested report does not.
+/// P-16, D-26: a report without a request shows a reboot; a requested report does not.
 #[test]
 fn p16_spontaneous_report() {
     let mut bench = Bench::script(golden(1).at(9_000, "441#21"));
@@ -136,7 +137,8 @@ fn p16_spontaneous_report() {
     assert_eq!(*event, expected);
 }
 
-/// P-17, D-08: frames of another master: the command is refused, unless forced. A running board's own heartbeats do not count.
+/// P-17, D-08: another master sends frames: the command is refused, unless forced. Heartbeats of a running board are
+/// not taken for frames of another master.
 #[test]
 fn p17_d08_second_master() {
     for foreign in ["680#", "341#0000000000000000", "240#", "581#"] {
@@ -155,7 +157,7 @@ fn p17_d08_second_master() {
     let mut bench =
         Bench::script(golden(1).at(100, "683#").at(110, "601#01010000").at(120, "381#0000640065006600"));
     assert!(matches!(bench.go(Request::Init(InitOptions::default()), 10), Ok(Outcome::Init(r)) if r.is_ok()));
-    // 600 ms of listening before the first frame.
+    // The master listens for 600 ms before its first frame.
     assert!(bench.log.iter().find(|(_, f, _)| *f == super::bench::From::Master).unwrap().0 >= 600_000);
 }
 
@@ -170,7 +172,7 @@ fn p18_unknown_error_code() {
     assert_eq!(code.number(), 0x2A);
 }
 
-/// D-T21: two boards whose reports look alike: the scan finds more boards than reports.
+/// D-T21: the reports of two boards are equal. The scan finds more boards than reports.
 #[test]
 fn dt21_two_boards_with_one_flash_id() {
     let info = |n: u8, status: &str| vec![format!("14{n}#21000{n}{status}34126E38"), format!("14{n}#0000")];
@@ -189,7 +191,7 @@ fn dt21_two_boards_with_one_flash_id() {
     assert!(report.findings.contains(&same), "{:?}", report.findings);
 }
 
-/// A board reported but was never reached: the init wire after the last board is broken.
+/// A board has sent a report but answers to no number: the init wire after the last board is broken.
 #[test]
 fn init_names_a_broken_wire() {
     let script = Script::default()

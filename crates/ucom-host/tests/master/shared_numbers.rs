@@ -1,4 +1,5 @@
-//! Two boards with one number (D-24): every request to that number fails with a named error, before anything is changed.
+//! Two boards with the same number (D-24): every request to this number fails with a specific error before anything
+//! is changed.
 
 use super::bench::Exit;
 use ucom::{Profile, Status};
@@ -13,14 +14,15 @@ use ucom_sim::memory::WirePins;
 
 use super::bench::{Bench, From, Member, Script, image, node};
 
-/// Two boards that are both wired as the first of the chain.
+/// Two boards that are both wired as the first board of the chain.
 fn strapped(flash: [u16; 2]) -> Bench {
     let board =
         |flash| Box::new(node(flash, WirePins::chain(1).remove(0), Profile::default())) as Box<dyn Member>;
     Bench::new(Profile::default(), flash.map(board).into_iter().collect())
 }
 
-/// Two boards with number 1, given by a PC that has disconnected. `more` holds further frames of that PC, by ms.
+/// Two boards with number 1, which another PC gave them before it disconnected. `more` contains further frames of
+/// that PC by time in milliseconds.
 fn sharing(flash: [u16; 2], more: &[(u64, &str)]) -> Bench {
     let mut bench = strapped(flash);
     let script =
@@ -39,7 +41,7 @@ fn is_shared(error: &Error, flash: [u16; 2]) -> bool {
     *error == shared && error.exit() == 4 && error.code() == "number-shared"
 }
 
-/// Requests that name the board, or change all boards.
+/// Requests for this board, or requests that change all boards.
 fn requests() -> Vec<Request> {
     let (board, force) = (1, false);
     let target = UpdateTarget { board, flash_number: Some(0x21) };
@@ -112,7 +114,7 @@ fn d24_nothing_is_done_to_two_boards_that_cannot_be_told_apart() {
     refuses([0x21, 0x21]);
 }
 
-/// The second answer comes late, after the first has ended.
+/// The second board's answer comes late, after the answer of the first has ended.
 #[test]
 fn d24_the_second_answer_may_come_late() {
     let answers = |ms: u64| {
@@ -133,7 +135,8 @@ fn d24_the_second_answer_may_come_late() {
     }
 }
 
-/// The second board shows only when the board is read back. The error still names it, and the started application is stopped.
+/// The second board answers only when the board is read back. The error still reports it, and the started application
+/// is stopped.
 #[test]
 fn d24_it_is_named_when_it_shows_on_the_way() {
     let one = |flash: &str, status: &str| {
@@ -155,9 +158,9 @@ fn d24_it_is_named_when_it_shows_on_the_way() {
     assert_eq!((bench.count("541#"), bench.count("1C1#8000") > 0), (0, true), "{:?}", bench.sent());
 }
 
-/// A second board takes the number at any step while the first is programmed. The second either sends an error about program data, or is
-/// flashed together with the first. In both cases the report names the reason, no board stays in programming mode, and no success is
-/// claimed.
+/// A second board takes the number at any step while the first is programmed. The second board either sends an error
+/// about program data, or is flashed together with the first. In both cases the report gives the reason, no board
+/// stays in programming mode, and no success is reported.
 #[test]
 fn d24_it_is_named_when_it_shows_in_an_update() {
     let strap = |flash| node(flash, WirePins::chain(1).remove(0), Profile::default());
@@ -219,7 +222,7 @@ fn d24_a_stop_stops_both() {
     assert!(bench.events.iter().any(reported));
 }
 
-/// A request that turns outputs off counts as a stop, too.
+/// A request that turns outputs off is handled like a stop.
 #[test]
 fn d24_outputs_are_turned_off_on_both() {
     let mut bench =
@@ -238,7 +241,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
         Error::Identity(IdentityError::NumberShared { board: 1, found: vec![0x21, 0x42], given_back: true });
     assert_eq!(error, wanted);
     assert!((0..2).all(|i| bench.board(i).number().is_none()));
-    // A chain that was numbered wrongly: the shared number is detected.
+    // A chain was numbered wrongly before; the shared number is detected.
     let mut bench = Bench::chain(&[0x21, 0x42]);
     bench.go(Request::Init(InitOptions::default()), 60).unwrap();
     bench.members[1] = Box::new(node(0x42, WirePins::chain(1).remove(0), Profile::default()));
@@ -247,7 +250,7 @@ fn d24_an_init_leaves_no_number_to_two_boards() {
     assert!(bench.go(Request::Info { board: 1 }, 10).is_err_and(|e| is_shared(&e, [0x21, 0x42])));
 }
 
-/// A scan lists the other findings, and names both boards instead of a board without a number.
+/// A scan lists the other findings. For the shared number it lists both boards instead of a board without a number.
 #[test]
 fn d24_a_scan_names_both() {
     let mut bench = sharing([0x21, 0x42], &[]);
@@ -258,7 +261,7 @@ fn d24_a_scan_names_both() {
     assert!(shared.to_string().contains("flash numbers 0x0021 and 0x0042"), "{shared}");
 }
 
-/// A frame that a gateway doubles, or damages once, does not count as another board.
+/// If a gateway doubles a frame, or corrupts one frame, no second board is reported.
 #[test]
 fn d24_a_doubled_frame_is_no_board() {
     let whole = {

@@ -1,4 +1,4 @@
-//! A run that fails to start leaves every board as it was found.
+//! If a run fails to start, it leaves every board as it found it.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -13,7 +13,7 @@ use super::bench::{Bench, MS};
 use super::chain::initialised;
 
 const IDS: [u16; 4] = [0x21, 0x42, 0x63, 0x04];
-/// Phase and outputs of the boards of [`found`] before the run, in their order.
+/// Phase of the boards of [`found`] before the run, and whether their outputs are active; in the order of the boards.
 const FOUND: [(Phase, bool); 4] =
     [(Phase::Idle, false), (Phase::Ready, false), (Phase::Running, false), (Phase::Running, true)];
 
@@ -37,15 +37,15 @@ fn now_is(bench: &mut Bench) -> [(Phase, bool); 4] {
     [0, 1, 2, 3].map(|i| (bench.board(i).phase(), bench.board(i).application.active))
 }
 
-/// P-19: a start with too much load is refused, and boards that were not started before are not left started. If the descriptions are
-/// known, the master does not even start a board.
+/// P-19: a start with too much load is refused. Boards that were idle before are idle afterwards. If the master knows
+/// the descriptions, it does not even start a board.
 #[test]
 fn p19_a_refusal_leaves_every_board_as_it_was() {
     let mut bench = found(Profile { load_limit: 1, ..Profile::default() });
     let error = bench.go(run(&[1, 2, 3, 4], true, false), 60).unwrap_err();
     assert!(matches!(error, Error::Running(RunningError::Load(_))) && error.exit() == 4, "{error}");
     assert_eq!(now_is(&mut bench), FOUND);
-    // The boards have one program, and its description is known.
+    // All boards have the same program, and its description is known.
     assert_eq!(bench.count("301#"), 0, "nothing was started");
 
     let mut bench = initialised(&IDS);
@@ -58,12 +58,13 @@ fn p19_a_refusal_leaves_every_board_as_it_was() {
         let error = bench.go(Request::Run(options.clone()), 60).unwrap_err();
         assert!(matches!(error, Error::Signal(SignalError::NoSignal { board: 4, .. })), "{error}");
         assert_eq!(now_is(&mut bench), [(Phase::Idle, false); 4]);
-        // Board 4 has the names of board 1, once board 1 has been read.
+        // Board 4 has the names of board 1, which are known after board 1 has been read.
         assert_eq!(bench.count("301#") - before, usize::from(!known));
     }
 }
 
-/// For every board and step: a board does not answer to the step, and the other boards are as they were found.
+/// For every board and step: the board does not answer to this step. Afterwards the other boards are as they were
+/// found.
 #[test]
 fn a_run_that_fails_is_undone() {
     let steps = [("> 14", "PC_INFO"), ("> 60", "flags"), ("> 6C", "initial inputs")];
@@ -78,7 +79,8 @@ fn a_run_that_fails_is_undone() {
             for board in (0..4).filter(|board| *board != silent) {
                 assert_eq!(after[board], FOUND[board], "board {} {what} of {} lost", board + 1, silent + 1);
             }
-            // The state of the silent board could not be read. The board is never left with active outputs if they were safe before.
+            // The state of the silent board could not be read. Its outputs are never left active if they were safe
+            // before.
             assert!(!after[silent].1 || FOUND[silent].1, "{what}: {after:?}");
         }
     }
@@ -109,8 +111,8 @@ fn a_run_that_is_cancelled_is_undone() {
     }
 }
 
-/// D-51: a board is lost while others are still being started. With `StopAll` no further loop is started; with `Report` the start goes
-/// on. In both cases the boards that were idle before are idle again.
+/// D-51: a board is lost while others are still being started. With `StopAll`, no further loop is started; with
+/// `Report`, the start continues. In both cases the boards that were idle before are idle again.
 #[test]
 fn d51_a_board_lost_while_others_start() {
     for on_lost in [OnLost::StopAll, OnLost::Report] {
@@ -148,7 +150,7 @@ fn d51_a_board_lost_while_others_start() {
     }
 }
 
-/// After a failed run none of its work is in progress any more.
+/// After a failed run none of its procedures is still running, so the boards accept new requests.
 #[test]
 fn after_a_failed_run_boards_are_free() {
     let mut bench = initialised(&IDS);

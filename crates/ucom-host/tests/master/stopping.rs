@@ -1,4 +1,5 @@
-//! A stop works on a bus that loses frames and reports errors, and on a board that has only been commanded to start.
+//! A stop works on a bus that loses frames and reports errors, and for a board that has received a start command but
+//! is not up yet.
 
 use super::bench::Exit;
 use ucom::node::Phase;
@@ -16,13 +17,14 @@ fn run(boards: &[u8]) -> Request {
     Request::Run(RunOptions { boards: boards.iter().map(board).collect(), active: true, force: false })
 }
 
-/// Lets board 1 report error 7 (CAN_RECEIVE) again and again from now on, as on a bad bus.
+/// From now on board 1 sends error 7 (CAN_RECEIVE) again and again, as on a bad bus.
 fn bad_bus(bench: &mut Bench) {
     let from = bench.now / MS;
     bench.join(Box::new((0..20_000).step_by(10).fold(Script::default(), |s, ms| s.at(from + ms, "081#07"))));
 }
 
-/// Section 9 (codes 6 to 8: log): an error report together with a lost ADMIN_DATA does not end the attempts.
+/// Section 9 (codes 6 to 8 are only logged): the master still repeats a stop if an error report arrives and
+/// ADMIN_DATA is lost.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     for lost in ["< 601#00000000", "< 601#01000000"] {
@@ -47,7 +49,8 @@ fn an_error_of_a_bad_bus_does_not_end_a_stop() {
     assert_eq!(bench.count("601#00000000"), 3);
 }
 
-/// Section 9, D-30: a start waits for its board although the board reports errors of the bus. Error 11 ends the start at once.
+/// Section 9, D-30: a start still waits for its board if the board reports errors of the bus. Error 11 ends the start
+/// at once.
 #[test]
 fn an_error_of_a_bad_bus_does_not_end_a_start() {
     let mut bench = initialised(&[0x21]);
@@ -65,13 +68,13 @@ fn an_error_of_a_bad_bus_does_not_end_a_start() {
     assert_eq!(bench.count("301#"), 1);
 }
 
-/// A silent board is commanded to stop again and again, at every level.
+/// If a board is silent, every level of stop is repeated.
 #[test]
 fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
         let mut bench = initialised(&[0x21]);
         bench.go(run(&[1]), 30).unwrap();
-        // Three stops wait for an answer and are lost here.
+        // The first three stops for the outputs and all status answers are lost.
         bench.lose = vec![("> 141#", 1000), ("< 601#", 3)];
         let result = bench.go(Request::Stop { board: 1, level, force: true }, 30);
         assert!(result.is_err(), "{level:?}");
@@ -80,7 +83,7 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     }
 }
 
-/// Ctrl-C while a board starts and its status does not show it yet: the board does not count as stopped.
+/// Ctrl-C while a board starts and its status does not show it yet. The board must not be reported as stopped.
 #[test]
 fn a_board_that_is_still_starting_is_stopped() {
     let info = |status: &str| [format!("141#210001{status}34126E38"), "141#0000".to_owned()];
@@ -102,7 +105,7 @@ fn a_board_that_is_still_starting_is_stopped() {
         let result = bench.wait(id, 60);
         assert_eq!(result, Err(Error::Master(MasterError::Cancelled)));
         if !was_run {
-            // The caller of a start must stop the board that it started.
+            // After a cancelled start request, the caller must stop the board.
             bench.go(Request::Stop { board: 1, level: StopLevel::Application, force: true }, 60).unwrap_err();
         }
         let stops = bench.times_of("1C1#8000");
@@ -131,7 +134,8 @@ fn slow_boards_are_idle_after_a_cancelled_run() {
     }
 }
 
-/// A stop of all boards begins with a broadcast, sent three times. A stop of some boards goes only to these.
+/// A stop of all boards begins with a broadcast, which is sent three times. A stop of some boards is sent only to
+/// these.
 #[test]
 fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -152,11 +156,12 @@ fn a_stop_of_all_hangs_on_no_board_and_no_frame() {
     bench.run(100);
     assert_eq!([0, 1, 2].map(|i| bench.board(i).application.running), [false, true, false]);
     assert_eq!(["601#00000000", "603#00000000", "600#00000000"].map(|f| bench.count(f)), [3, 3, 0]);
-    // A stop is the start in reverse.
+    // A stop has the reverse order of the start.
     assert!(bench.times_of("603#00000000")[0] < bench.times_of("601#00000000")[0]);
 }
 
-/// U-2: the master asks twice whether a board runs, because one answer can be lost, and its outputs as well.
+/// U-2: the master asks a board twice whether it runs, because one answer can be lost. Its outputs can be lost as
+/// well.
 #[test]
 fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -167,7 +172,7 @@ fn u2_a_board_whose_answer_is_lost_still_forbids_an_update() {
     assert_eq!(bench.count("041#"), 0);
 }
 
-/// A running board keeps the inputs that another PC set, unless the user sets some.
+/// A running board keeps the inputs that another PC set, unless the user gives new ones.
 #[test]
 fn a_board_that_runs_is_not_given_initial_inputs() {
     for given in [false, true] {

@@ -1,4 +1,4 @@
-//! Firmware updates of the boards of this crate, and of tables of frames.
+//! Firmware updates of boards of this crate, and of boards that are tables of frames.
 
 use super::bench::Exit;
 use ucom::{BoardInfo, Memory};
@@ -29,7 +29,7 @@ pub fn update(bench: &mut Bench, options: UpdateOptions) -> UpdateReport {
     }
 }
 
-/// These options with the flash records that an update with the same image left.
+/// Returns these options with the flash records of an update with the same image.
 pub fn recorded(options: UpdateOptions, report: &UpdateReport) -> UpdateOptions {
     let image = &options.image;
     let record = |info: &BoardInfo| FlashRecord::new(&image.bytes, image.address_words, info);
@@ -42,7 +42,7 @@ pub fn outcomes(report: &UpdateReport) -> Vec<&str> {
     report.boards.iter().map(|b| b.outcome.name()).collect()
 }
 
-/// Checks that a board holds the old program, the new one, or none: never half of one.
+/// Checks that a board has the old program, the new one, or none, and never a part of one.
 pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) {
     let record = bench.board(board).record();
     let bytes = bench.board(board).flash.bytes(Memory::Program).to_vec();
@@ -59,12 +59,13 @@ pub fn check_program(bench: &mut Bench, board: usize, len: usize) -> (u16, u16) 
     }
 }
 
-/// Returns `true` if the board shows the program: it was written, or it was there before and no flash record proves more.
+/// Returns `true` if the board reports the program, either because this update wrote it, or because the board had it
+/// before and the flash record does not prove the whole image.
 fn shows_it(result: &UpdateResult) -> bool {
     matches!(result.outcome, UpdateOutcome::Verified | UpdateOutcome::ProgramUpToDate)
 }
 
-/// Vector 13.4: the golden image, frame by frame, and the read-back.
+/// Vector 13.4: the update with the golden image frame by frame, and the read-back.
 #[test]
 fn golden_update() {
     let mut bench = initialised(&[0x21]);
@@ -79,11 +80,11 @@ fn golden_update() {
         ["2C1#4355010001000000", "2C1#00000000F4010000", "2C1#3F4BC13AFFFFFFFF", "2C1#FFFFFFFFFFFFFFFF"];
     assert_eq!(prog[..4], first);
     assert_eq!((prog[7].as_str(), prog[8].as_str()), ("2C1#FFFFFFFFFFFFDC22", "2C1#0B30557A9FC4E90E"));
-    // OPINIT stays: 1B before and after.
+    // OPINIT does not change: the status is 1B before and after.
     assert_eq!(sent.iter().rfind(|t| t.starts_with("141#2100")).unwrap(), "141#2100011B3F4BC13A");
     assert_eq!(sent.iter().filter(|t| *t == "041#").count(), 1);
     assert_eq!(check_program(&mut bench, 0, 1000), (0x4B3F, DATE));
-    // Again: up to date, and only questions are sent.
+    // A second update finds the board up to date and sends only questions.
     let before = bench.log.len();
     let report = update(&mut bench, recorded(options(&[1], 1000), &report));
     assert_eq!((report.boards[0].outcome, report.boards[0].verified), (UpdateOutcome::UpToDate, true));
@@ -92,7 +93,8 @@ fn golden_update() {
     assert!(master.map(|(.., f)| f.to_string()).all(|t| silent.contains(&t.as_str())));
 }
 
-/// P-7: no frame of a block before READY of the previous block. P-14: heartbeats every 500 ±50 ms meanwhile.
+/// P-7: the first frame of a block is sent only after READY of the previous block. P-14: heartbeats are sent every
+/// 500 ±50 ms meanwhile.
 #[test]
 fn p7_p14_flow_control_and_heartbeats() {
     let mut bench = initialised(&[0x21]);
@@ -116,7 +118,7 @@ fn p7_p14_flow_control_and_heartbeats() {
     assert!(alive.windows(2).all(|w| (450 * MS..=550 * MS).contains(&(w[1] - w[0]))), "{alive:?}");
 }
 
-/// P-8: READY after 0.9 s, erase 8 s: no false timeout.
+/// P-8: READY takes 0.9 s and the erase 8 s. No timeout is reported.
 #[test]
 fn p8_slow_boards_are_waited_for() {
     let mut bench =
@@ -152,7 +154,8 @@ fn p10_success_must_be_read_back() {
     assert_eq!(report.exit(), 5);
 }
 
-/// P-11, U-7: errors 2 and 5 end after one attempt, other errors after three. Each attempt begins with XRESET.
+/// P-11, U-7: errors 2 and 5 end the update after one attempt, other errors after three. Each attempt begins with
+/// XRESET.
 #[test]
 fn p11_attempts_by_error() {
     type Case = (fn(usize, usize) -> Option<&'static str>, usize, u8);
@@ -184,7 +187,8 @@ fn p11_attempts_by_error() {
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::Verified, 2));
 }
 
-/// An error in the middle of a block counts as an answer: no wait for READY, no further attempt.
+/// An error in the middle of a block is an answer to this block: the master does not wait for READY, and makes no
+/// further attempt.
 #[test]
 fn errors_in_the_middle_of_a_block_count() {
     let mut bench = loader(Loader { refuses_at: Some(3), ..Loader::new(34) });
@@ -209,7 +213,8 @@ fn overrun_widens_the_gap() {
     assert!(first.iter().all(|gap| *gap >= 200));
 }
 
-/// P-5, U-1: refused before XRESET if the flash number is not the named one, or the answer has another number.
+/// P-5, U-1: the update is refused before XRESET if the flash number differs from the requested one, or if the answer
+/// has another board number.
 #[test]
 fn p5_the_board_must_be_the_one_that_is_meant() {
     let mut bench = loader(Loader::new(34));
@@ -237,10 +242,10 @@ fn update_of_nobody() {
     );
 }
 
-/// P-12: a cancel in the middle of a block clears the transfer. The board is usable, and the report shows its state.
+/// P-12: a cancel in the middle of a block ends the transfer. The board can be used, and the report shows its state.
 #[test]
 fn p12_cancel() {
-    // Frames of PC_PROG after which the user cancels: in cycle 1, in cycle 2.
+    // Number of PC_PROG frames after which the user cancels: two cases in cycle 1, one in cycle 2.
     for (frames, erased) in [(3, false), (12, false), (3 * 8 + 11, true)] {
         let mut bench = initialised(&[0x21]);
         let id = bench.master.start(bench.now, Request::Update(options(&[1], 128))).unwrap();
@@ -280,7 +285,7 @@ fn p13_killed_tool() {
     }
 }
 
-/// U-2: refused while a board runs, unless forced.
+/// U-2: an update is refused while a board runs, unless forced.
 #[test]
 fn u2_running_boards() {
     let mut bench = initialised(&[0x21, 0x42]);
@@ -294,7 +299,7 @@ fn u2_running_boards() {
     assert_eq!(update(&mut bench, forced).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-3, U-10: an update session skips boards that are done. With `start` the application runs at the end.
+/// U-3, U-10: an update session skips boards that are up to date. With `start`, the application runs at the end.
 #[test]
 fn update_session_skips_and_starts() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -306,7 +311,7 @@ fn update_session_skips_and_starts() {
     assert_eq!(report.exit(), 0);
 }
 
-/// Group update by broadcast: selected boards finish, and the other board keeps its program.
+/// Group update by broadcast: the selected boards get the program, and the other board keeps its program.
 #[test]
 fn group_update() {
     let mut bench = initialised(&[0x21, 0x42, 0x63]);
@@ -347,7 +352,7 @@ fn progress_is_of_both_cycles() {
     assert_eq!(bytes, (1..=34).map(|i| 64 * i).collect::<Vec<u64>>());
 }
 
-/// A fault on one frame of an update: the report names it and is true.
+/// A fault on one frame of an update: the report describes the result correctly.
 #[test]
 fn every_frame_of_an_update_disturbed() {
     let (from, to) = {

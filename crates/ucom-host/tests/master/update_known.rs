@@ -1,4 +1,5 @@
-//! When a board counts as up to date (D-62, U-3): its answer and the flash record together, and cases that neither covers.
+//! Conditions under which a board is up to date (D-62, U-3): its answer and the flash record together, and cases that
+//! neither of them covers.
 
 use super::bench::{Bench, Exit};
 use super::chain::initialised;
@@ -8,12 +9,12 @@ use ucom::{Memory, Profile, Status};
 use ucom_host::master::update::{UpdateImage, UpdateMode, UpdateOptions, UpdateOutcome, UpdateReport};
 use ucom_host::master::{Event, InitOptions, Request};
 
-/// Frames of program data, to a board or to all.
+/// Returns the number of frames of program data, to one board or to all.
 fn data_frames(bench: &Bench) -> usize {
     bench.log.iter().filter(|(.., f)| matches!(f.to_string().get(..3), Some("2C0" | "2C1" | "2C2"))).count()
 }
 
-/// A chain of two boards that have the image of `options`, and options with their records.
+/// Returns a chain of two boards that have the image of `options`, and the options with the records of these boards.
 fn written() -> (Bench, UpdateOptions) {
     let mut bench = initialised(&[0x21, 0x42]);
     let options = UpdateOptions { keep_going: true, ..options(&[1, 2], 128) };
@@ -34,7 +35,8 @@ fn both(outcome: &'static str, verified: bool) -> Vec<(&'static str, bool)> {
     vec![(outcome, verified); 2]
 }
 
-/// D-62: the flash record decides in addition to the board's answer, one by one and as a group. Ten differences between record and image.
+/// D-62: the board's answer alone does not decide; the flash record is needed as well. Tests ten differences between
+/// record and image, one by one and as a group.
 #[test]
 fn d62_the_flash_record_decides() {
     type Change = fn(&mut UpdateOptions);
@@ -68,7 +70,7 @@ fn d62_the_flash_record_decides() {
             let expected = if is_sent { both("verified", true) } else { both("program-up-to-date", false) };
             assert_eq!((boards, code), (expected, if is_sent { 0 } else { 4 }), "{name} {mode:?}");
         }
-        // With the same image at the same address the board answers as after that update.
+        // With the same image at the same address, the board is up to date.
         let (mut bench, mut options) = written();
         options.mode = mode;
         assert_eq!(again(&mut bench, options), (both("up-to-date", true), 0, false), "{mode:?}");
@@ -88,7 +90,7 @@ fn d62_an_accepted_program_is_not_verified() {
     assert!(!bench.board(0).status().has(Status::MSTART));
     let start = UpdateOptions { start: true, ..accepted };
     assert_eq!(again(&mut bench, start.clone()), (both("running", false), 0, false));
-    // A start that fails does not make the program verified either.
+    // If the start fails, the program is not verified either.
     bench
         .go(Request::Stop { board: 1, level: ucom_host::master::StopLevel::Application, force: true }, 20)
         .unwrap();
@@ -116,7 +118,7 @@ fn d62_data_memory_is_written_each_time() {
     }
 }
 
-/// U-3: the same program with another date is up to date, unless the user requires the date.
+/// U-3: a board that has the same program with another date is up to date, unless the user requires the date.
 #[test]
 fn u3_another_date_is_up_to_date() {
     let today = |options: UpdateOptions| UpdateOptions { date: DATE + 1, any_date: true, ..options };
@@ -127,7 +129,7 @@ fn u3_another_date_is_up_to_date() {
     let words = report.outcome_words(&report.boards[0], &Profile::default());
     assert_eq!(words, "up-to-date (flashed 2009-06-01)");
     assert_eq!(again(&mut bench, today(options.clone())), (both("up-to-date", true), 0, false));
-    // Without a record the date proves nothing more.
+    // Without a record, a matching date does not prove the image.
     let unknown = UpdateOptions { records: Default::default(), ..today(options.clone()) };
     assert_eq!(again(&mut bench, unknown.clone()), (both("program-up-to-date", false), 4, false));
     let report = update(&mut bench, unknown);
@@ -136,13 +138,14 @@ fn u3_another_date_is_up_to_date() {
         words.as_deref(),
         Some("same Program ID, flashed 2009-06-01; content and address are not known")
     );
-    // The required date is written.
+    // The program with the required date is written.
     let asked = UpdateOptions { any_date: false, ..today(options) };
     assert_eq!(again(&mut bench, asked), (both("verified", true), 0, true));
     assert_eq!(bench.board(0).record().map(|r| r.date), Some(DATE + 1));
 }
 
-/// D-62: the record is dropped before a board is reset for programming, and written again after the board has been read back.
+/// D-62: the record is removed before a board is reset for programming, and stored again after the board has been
+/// read back.
 #[test]
 fn d62_the_record_ends_before_anything_is_erased() {
     let mut bench = initialised(&[0x21]);

@@ -1,5 +1,5 @@
-//! Updates with unusual plans and headers: memories that each cycle may erase, updates that can be verified, and the report if nothing
-//! can.
+//! Updates with unusual plans and headers: which memories each cycle may erase, which updates can be verified, and
+//! what the report says if an update cannot be verified.
 
 use super::bench::Exit;
 use ucom::profile::{HeaderForm, Plan};
@@ -17,15 +17,15 @@ fn with_plan(prog_plan: Plan) -> Profile {
     Profile { prog_plan, ..Profile::default() }
 }
 
-/// An image of 16 data blocks, and a second image of 64 bytes if the plan takes one.
+/// An image of 16 data blocks, and a second image of 64 bytes if the plan needs one.
 fn two(plan: Plan) -> UpdateOptions {
     let second = UpdateImage { bytes: [9; 64].into(), address_words: 0x20 };
     let second = (plan != Plan::VerifyWrite).then_some(second);
     UpdateOptions { second, ..options(&[1], 1000) }
 }
 
-/// The exit codes by plan: 1 and 3 before an erase, 5 after it. Only `verify-write` and `exloader-app` leave flash unchanged in their
-/// first cycle.
+/// The exit codes of each plan: 1 or 3 before an erase, 5 after it. Only `verify-write` and `exloader-app` do not
+/// change flash in their first cycle.
 #[test]
 fn d40_what_the_first_cycle_may_have_erased() {
     let cases = [
@@ -49,7 +49,7 @@ fn d40_what_the_first_cycle_may_have_erased() {
             assert_eq!(report.exit(), if erased { 5 } else { before }, "{plan}: {report:?}");
             assert_eq!(report.boards[0].outcome, left, "{plan}: {report:?}");
         }
-        // The last block: every plan but `verify-write` has erased by then.
+        // When the error comes with the last block, every plan except `verify-write` has erased flash.
         let board = Loader { special: |_, block| (block == 16).then_some("081#03"), ..Loader::new(blocks) };
         let mut bench = Bench::new(with_plan(plan), vec![Box::new(board)]);
         let expected = if plan == Plan::VerifyWrite { 1 } else { 5 };
@@ -57,7 +57,7 @@ fn d40_what_the_first_cycle_may_have_erased() {
     }
 }
 
-/// Both images reach their memories, and the report has address, length and Program ID of each.
+/// Both images are written to their memories, and the report has address, length and Program ID of each.
 #[test]
 fn d40_two_images_reach_two_memories() {
     for (plan, memory) in [(Plan::ExloaderApp, Memory::Ram), (Plan::PmemXmem, Memory::Data)] {
@@ -78,21 +78,22 @@ fn d40_two_images_reach_two_memories() {
     }
 }
 
-/// Runs a raw update of a board that shows `after` and `done_status` afterwards.
+/// Runs an update with the plan `raw`. Afterwards the board reports `after` and `done_status`.
 fn raw(after: &'static str, done_status: u8, expect_program_id: Option<u16>) -> UpdateReport {
     let board = Loader { info: ["34126E38", after], done_status, ..Loader::new(32) };
     let mut bench = Bench::new(with_plan(Plan::Raw), vec![Box::new(board)]);
     update(&mut bench, UpdateOptions { expect_program_id, ..options(&[1], 1000) })
 }
 
-/// U-10: the plan hides the image's Program ID. The outcome is never `verified`, and the update is done only when the board shows an
-/// application. The report gives the reason, how the program can be verified, and the board's answers before and after.
+/// U-10: with this plan the image's Program ID is unknown. The outcome is never `verified`, and the update is done
+/// only when the board reports an application. The report gives the reason, a way to verify the program, and the
+/// board's answers before and after.
 #[test]
 fn u10_what_cannot_be_verified_says_so() {
     let report = raw("3F4BC13A", 0x1B, None);
     let board = &report.boards[0];
     assert_eq!((board.outcome, &board.failure, report.exit()), (UpdateOutcome::Written, &None, 5));
-    // The exit code is 0 for a user who accepts unverified programs.
+    // For a user who accepts unverified programs the exit code is 0.
     assert_eq!(UpdateReport { accept_unverified: true, ..report.clone() }.exit(), 0);
     assert_eq!((report.unverifiable, report.program_id), (Some(Unverifiable::RawPlan), None));
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
@@ -107,7 +108,8 @@ fn u10_what_cannot_be_verified_says_so() {
     }
 }
 
-/// U-10: the user names a Program ID. The board is verified against it, and an image with another Program ID is refused.
+/// U-10: the user gives a Program ID. The board is verified against it, and an image with another Program ID is
+/// refused.
 #[test]
 fn u10_a_named_program_id_is_verified() {
     let report = raw("3F4BC13A", 0x1B, Some(0x4B3F));
@@ -119,10 +121,10 @@ fn u10_a_named_program_id_is_verified() {
         Some(UpdateFailure::NotVerified { program_id: 0x4B3F, wanted_id: 0x4B40, wanted_date: None, .. })
     ));
     assert_eq!(report.exit(), 5);
-    // The program is there already (U-3), by the board's answer alone (D-62).
+    // The board already has the program (U-3), judged by its answer alone (D-62).
     let report = raw("3F4BC13A", 0x1B, Some(OLD.0));
     assert_eq!((report.boards[0].outcome, report.boards[0].attempts), (UpdateOutcome::ProgramUpToDate, 0));
-    // An image with a known Program ID must have the named one.
+    // If the Program ID of an image is known, it must equal the given one.
     let mut bench = Bench::new(Profile::default(), vec![Box::new(Loader::new(34))]);
     let other = UpdateOptions { expect_program_id: Some(0x4B40), ..options(&[1], 1000) };
     let error = bench.go(Request::Update(other), 60).unwrap_err();
@@ -132,7 +134,8 @@ fn u10_a_named_program_id_is_verified() {
     assert_eq!(update(&mut bench, same).boards[0].outcome, UpdateOutcome::Verified);
 }
 
-/// U-9 needs an expected Program ID: without one a lost DSP_PROGFINISHED does not count as a success.
+/// U-9 needs an expected Program ID. Without one, an update with a lost DSP_PROGFINISHED is not reported as a
+/// success.
 #[test]
 fn u9_not_where_nothing_is_expected() {
     let board = Loader { special: |_, block| (block == 31).then_some(""), ..Loader::new(32) };
@@ -141,7 +144,7 @@ fn u9_not_where_nothing_is_expected() {
     assert_eq!((report.exit(), report.boards[0].attempts), (5, 3), "{report:?}");
 }
 
-/// Boards of this crate without checksums or without headers: written, started, and reported as unverified.
+/// Boards of this crate without checksums or without headers are written and started, and reported as unverified.
 #[test]
 fn boards_without_checksum_or_header() {
     let none = Profile { prog_checksum: Checksum::None, ..Profile::default() };

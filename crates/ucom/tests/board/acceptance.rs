@@ -1,4 +1,5 @@
-//! The acceptance table of the board side, D-T1 to D-T16, D-T20 and D-T21. Rows with words on the wire run in both byte orders.
+//! The acceptance table for boards: D-T1 to D-T16, D-T20 and D-T21. Rows with words on the wire run in both byte
+//! orders.
 
 use ucom::profile::Endian;
 use ucom::{Frame, Profile, Sequence, Status};
@@ -86,7 +87,7 @@ fn d_t6_set_status_is_literal() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T7, D-22: bits that mirror reality cannot be written.
+/// D-T7, D-22: bits that show the state of the board cannot be written.
 #[test]
 fn d_t7_mirror_bits_stay() {
     let mut bus = Bus::initialised();
@@ -94,7 +95,7 @@ fn d_t7_mirror_bits_stay() {
         bus.send(text);
         assert_eq!(bus.status(1), 0x1B, "{text}");
     }
-    // Nor while the loop runs.
+    // They cannot be written while the loop runs either.
     let mut bus = Bus::running();
     for text in ["1C1#2000", "1C1#1010", "1C1#0010"] {
         bus.send(text);
@@ -136,7 +137,8 @@ fn d_t9_start() {
     assert_eq!(bus.status(1), 0x1B);
 }
 
-/// D-T10, D-36, D-12: dimensions, then one string for each. A frame with data does not count as a request.
+/// D-T10, D-36, D-12: the board sends the dimensions, and then one string for each signal. A frame with data is not a
+/// request.
 #[test]
 fn d_t10_io_description() {
     let mut bus = Bus::started();
@@ -151,7 +153,7 @@ fn d_t10_io_description() {
             "581#020004000300 581#0200 581#55436F4D32206865 581#61642070616E 581#0100 581#706F735F736F6C6C"
         )
     );
-    // Counted independently: headers of 2 bytes announce what follows.
+    // Counted independently of the board's code: a header of 2 bytes precedes each string.
     let mut strings = 0;
     let mut rest = received[1..].iter();
     while let Some(header) = rest.next() {
@@ -281,9 +283,9 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(chain(&[("680#", 290), ("041#", 1)]), (0x5D, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#4000", 1)]), (0x19, frames("0C1#01")));
     assert_eq!(chain(&[("680#", 290), ("1C1#0404", 1)]), (0x5D, frames("0C1#01")));
-    // Once for each number: the same number again does not start the application.
+    // The application starts once for each number: the same number again does not start it.
     assert_eq!(chain(&[("680#", 600), ("1C1#8000", 10), ("281#", 10)]).0, 0x59);
-    // Not before its time, and with error 11 if the board has no application.
+    // The application does not start before its time. A board without an application sends error 11.
     let mut bus = Bus::one();
     bus.boards[0].store.autostart = true;
     bus.send("281#");
@@ -316,7 +318,7 @@ fn d_t20_init_while_the_acknowledgement_waits() {
     assert_eq!(bus.boards[1].number(), None);
 }
 
-/// D-T21, D-07: two boards with one flash id send one identifier with the same data.
+/// D-T21, D-07: two boards with the same flash number send the same identifier with the same data.
 #[test]
 fn d_t21_equal_flash_ids_look_like_one_board() {
     let mut bus = Bus::new(&[0x21, 0x121], Profile::default());

@@ -1,4 +1,4 @@
-//! The acceptance table of the board side, D-T17 to D-T19: updates by raw frames.
+//! The acceptance table for boards, D-T17 to D-T19: updates by raw frames.
 
 use ucom::{Frame, Profile, Status};
 
@@ -26,7 +26,7 @@ fn d_t17_update() {
     assert_eq!(bus.ask("301#", 50)[0], frames("501#")[0]);
 }
 
-/// D-T18, D-43, D-41: each mistake once, then silence.
+/// D-T18, D-43, D-41: the board reports each mistake once and is then silent.
 #[test]
 fn d_t18_mistakes_in_a_transfer() {
     let image = image();
@@ -134,7 +134,7 @@ fn d_t18_mistakes_in_a_transfer() {
         let before = bus.errors.len();
         mistake(&mut bus);
         bus.run(5);
-        // Forty frames that were still under way.
+        // Forty frames that the PC had already sent.
         for _ in 0..40 {
             bus.send("2C1#FFFFFFFFFFFFFFFF");
         }
@@ -145,7 +145,7 @@ fn d_t18_mistakes_in_a_transfer() {
     }
 }
 
-/// D-T19, D-46: a group update passes boards that are not in it.
+/// D-T19, D-46: a group update does not change boards that are not in the group.
 #[test]
 fn d_t19_group_update() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());

@@ -20,8 +20,8 @@ fn texts(received: &[Frame]) -> Vec<String> {
     texts
 }
 
-/// D-05: answers on shared identifiers come 2 ms after the request, unasked messages after 1 to 8 ms, and boards do not send all at the
-/// same time.
+/// D-05: answers on shared identifiers come 2 ms after the request, messages without a request after 1 to 8 ms.
+/// Boards do not all send at the same time.
 #[test]
 fn d05_shared_identifiers() {
     let mut delays = std::collections::BTreeSet::new();
@@ -43,7 +43,7 @@ fn d05_shared_identifiers() {
     assert!(delays.len() >= 6, "{delays:?}");
 }
 
-/// D-33: all outputs every 10 ms, ascending, as one snapshot.
+/// D-33: all outputs are sent every 10 ms, in ascending order, as one snapshot.
 #[test]
 fn d33_outputs() {
     let mut bus = Bus::running();
@@ -63,7 +63,7 @@ fn d33_outputs() {
     }
 }
 
-/// D-33: on a bus that cannot take them, outputs are left out and never queued without bound.
+/// D-33: if the bus cannot carry the outputs, they are left out. The queue stays bounded.
 #[test]
 fn d33_outputs_on_a_blocked_bus() {
     let mut bus = Bus::running();
@@ -91,7 +91,7 @@ fn d34_initial_inputs_at_the_start() {
     }
 }
 
-/// D-34: with the latch `last` inputs take effect together.
+/// D-34: with the latch `last`, all inputs take effect together.
 #[test]
 fn d34_latch_last() {
     let profile = Profile { ci_latch: CiLatch::Last, ..Profile::default() };
@@ -135,7 +135,7 @@ fn d38_debug_texts() {
     assert!(bus.boards[0].counters().texts_dropped > 300);
 }
 
-/// D-50: the loss of the PC is reported as a text if texts are requested. The debug flags stay.
+/// D-50: the loss of the PC is reported as a text if texts are requested. The debug flags do not change.
 #[test]
 fn d50_text_when_the_pc_is_lost() {
     let mut bus = Bus::started();
@@ -146,7 +146,7 @@ fn d50_text_when_the_pc_is_lost() {
     assert!(received.contains(&frames("601#00000100")[0]));
 }
 
-/// A board sends its heartbeat every second while the application is up, and only then. D-51 is the reaction of the PC.
+/// A board sends its heartbeat every second as long as the application is up. D-51 is the reaction of the PC.
 #[test]
 fn d51_heartbeat_of_the_board() {
     let mut bus = Bus::started();
@@ -174,7 +174,8 @@ fn d34_error_rate() {
     assert_eq!(bus.boards[0].counters().errors_dropped, 90);
 }
 
-/// D-14: a request during its own answer is answered after that answer. Strings are not mixed.
+/// D-14: a request that arrives during its own answer is answered after that answer. Packages of different strings
+/// are not mixed.
 #[test]
 fn d14_requests_during_their_answers() {
     let mut bus = Bus::started();
@@ -191,7 +192,7 @@ fn d14_requests_during_their_answers() {
     assert_eq!(bus.take(), [one.clone(), one].concat());
 }
 
-/// D-34, D-35: the control loop is stepped at its period while it runs, and only then.
+/// D-34, D-35: the control loop is called at its period while it runs, and at no other time.
 #[test]
 fn d35_control_cycles() {
     let mut bus = Bus::started();
@@ -206,7 +207,7 @@ fn d35_control_cycles() {
     assert_eq!(bus.boards[0].application.steps, steps);
 }
 
-/// The controller causes errors 6 and 8.
+/// The CAN controller causes errors 6 and 8.
 #[test]
 fn controller_troubles_are_reported() {
     let mut bus = Bus::initialised();
@@ -221,7 +222,7 @@ fn controller_troubles_are_reported() {
     assert_eq!(bus.take(), frames("0C1#01 081#06"), "INITACK is sent again");
 }
 
-/// Only the frame that is with the controller can leave it or be given up by it.
+/// `sent` and `not_sent` have an effect only for the frame that is in the CAN controller.
 #[test]
 fn other_frames_than_the_one_on_its_way_are_ignored() {
     let mut bus = Bus::initialised();
@@ -237,13 +238,13 @@ fn other_frames_than_the_one_on_its_way_are_ignored() {
     board.sent(now, &acknowledge);
     assert_eq!(board.poll(now), Some("081#07".parse().unwrap()), "and no DSP_ERROR 6 before it");
     assert_eq!(board.counters().not_sent, 0);
-    // The frame has left now, and does not leave a second time.
+    // The frame has been sent now, and is not sent a second time.
     board.sent(now, &acknowledge);
     board.not_sent(now, &acknowledge);
     assert_eq!((board.poll(now), board.counters().not_sent), (None, 0));
 }
 
-/// D-38: the board does not read texts of a program that is not up yet, and does not drop them.
+/// D-38: while a program is not up yet, the board does not read its texts and does not drop them.
 #[test]
 fn d38_texts_of_a_program_that_is_not_up() {
     let mut bus = Bus::initialised();
@@ -258,7 +259,8 @@ fn d38_texts_of_a_program_that_is_not_up() {
     assert_eq!(bus.boards[0].counters().texts_dropped, 1, "up, and nobody wants it");
 }
 
-/// D-37: a change of the flag enables outputs. Outputs that the program has made safe by itself stay safe when the PC repeats its flags.
+/// D-37: a change of the flag enables outputs. If the program has made its outputs safe, they stay safe when the PC
+/// repeats its flags.
 #[test]
 fn d37_repeated_flags_enable_nothing() {
     let mut bus = Bus::started();
@@ -288,7 +290,7 @@ fn a_program_is_stopped_once() {
     assert_eq!(bus.boards[0].application.started_us, None);
 }
 
-/// D-50: a start while the loop runs does not count as a heartbeat of the PC.
+/// D-50: a start command while the loop runs is not a heartbeat of the PC.
 #[test]
 fn d50_a_repeated_start_is_no_heartbeat() {
     let mut bus = Bus::running();
@@ -320,7 +322,8 @@ fn d14_info_survives_the_application() {
     assert!(received.iter().all(|frame| frame.id() == first.id()));
 }
 
-/// D-14, D-36: a second request during a dump of the inputs is served once, after the dump. Without inputs there is nothing to serve.
+/// D-14, D-36: a second request during a dump of the inputs leads to one further dump after the first. Without inputs
+/// there is no dump.
 #[test]
 fn d14_dump_of_inputs_twice() {
     for (dimension, packages) in [(0, 0), (3, 1), (7, 3)] {

@@ -12,22 +12,22 @@ pub const MS: u64 = 1000;
 pub struct Bus {
     pub boards: Vec<Board>,
     pub now: u64,
-    /// Frames from the boards and their times, since the last `take`.
+    /// Frames from the boards since the last `take`, with their times.
     pub received: Vec<(u64, Frame)>,
     /// Every DSP_ERROR so far.
     pub errors: Vec<Frame>,
-    /// Frames that the bus holds back: their boards wait for `sent`.
+    /// Frames that the bus does not send yet; their boards wait for `sent`.
     pub hold: fn(&Frame) -> bool,
     pub held: Vec<(usize, Frame)>,
-    /// Number of the frame to boards that is lost, counted from 0.
+    /// Number of the frame to the boards that is lost, counted from 0.
     pub lose_to_boards: Option<usize>,
     pub frames_to_boards: usize,
-    /// Number of the frame from boards that is lost, counted from 0; the board saw it leave.
+    /// Number of the frame from the boards that is lost, counted from 0. The board gets `sent` for it.
     pub lose_from_boards: Option<usize>,
     pub frames_from_boards: usize,
 }
 
-/// Returns the worst-case duration of a classic frame at 1 Mbit/s, µs.
+/// Returns the worst-case duration of a classic frame at 1 Mbit/s, in microseconds.
 pub fn duration(frame: &Frame) -> u64 {
     55 + 10 * u64::from(frame.dlc())
 }
@@ -135,11 +135,12 @@ impl Bus {
 
     pub fn run_us(&mut self, us: u64) {
         let end = self.now + us;
-        // Steps that ended without a frame. The limit below is far above the number of reasons to wake up.
+        // Number of steps in a row without a frame. Its limit below is far above the number of reasons to wake up.
         let mut quiet = 0;
         loop {
             let now = self.now;
-            // Arbitration: every board offers a frame, the lowest identifier goes first, the other frames wait.
+            // Arbitration: every board offers a frame. The frame with the lowest identifier is sent first, and the
+            // others wait.
             let mut offers: Vec<(u16, usize, Frame)> = Vec::new();
             for (i, board) in self.boards.iter_mut().enumerate() {
                 if let Some(frame) = board.poll(now) {
@@ -183,7 +184,7 @@ impl Bus {
         self.check();
     }
 
-    /// Lets the held frames leave now.
+    /// Sends the held frames now.
     pub fn release(&mut self) {
         self.hold = |_| false;
         for (i, frame) in std::mem::take(&mut self.held) {
@@ -205,7 +206,7 @@ impl Bus {
         std::mem::take(&mut self.received).into_iter().map(|(_, frame)| frame).collect()
     }
 
-    /// Sends a frame, waits, and returns the frames received since the sending.
+    /// Sends a frame, waits, and returns the frames received since then.
     pub fn ask(&mut self, text: &str, ms: u64) -> Vec<Frame> {
         self.received.clear();
         self.send(text);
@@ -222,7 +223,7 @@ impl Bus {
         BoardInfo::parse(&first.payload(), endian)
     }
 
-    /// Returns the status byte of board `n`, read with PC_INFO.
+    /// Returns the status byte of board `n`, as read with PC_INFO.
     pub fn status(&mut self, n: u8) -> u8 {
         self.info(n).unwrap_or_else(|| panic!("board {n} does not answer")).status.0
     }

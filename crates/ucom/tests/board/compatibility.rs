@@ -1,4 +1,4 @@
-//! Boards that read the description differently, and the effect of their profile keys.
+//! Boards that follow another reading of the protocol description, selected by the keys of their profile.
 
 use ucom::profile::{AliveMode, Broadcast, Endian, ReportMode};
 use ucom::{Profile, Sequence, Status};
@@ -21,7 +21,8 @@ fn d07_report_modes() {
     assert_eq!(bus.ask("240#", 100), frames("401#21 400#42"));
 }
 
-/// Section 5.3: duplicate numbers when a board raises its pin by itself and the PC repeats PC_INIT blindly.
+/// Section 5.3: two boards get the same number if a board raises its pin by itself and the PC repeats PC_INIT without
+/// a check.
 #[test]
 fn d21_auto_pin_and_a_blind_repeat_make_duplicates() {
     let numbers = |auto: bool, blind: bool| {
@@ -59,7 +60,7 @@ fn d23_xreset_forgets_the_number() {
     assert_eq!(bus.status(1), 0x5D);
 }
 
-/// D-10, D-13: the other byte order and the other way to count.
+/// D-10, D-13: the other byte order and the other way to count strings.
 #[test]
 fn d10_d13_words_and_counts() {
     let profile = with(|p| {
@@ -72,7 +73,7 @@ fn d10_d13_words_and_counts() {
     assert_eq!(bus.ask("201#", 20), frames(expected));
 }
 
-/// D-15: the last package without surplus words.
+/// D-15: the last package has no surplus words.
 #[test]
 fn d15_short_last_package() {
     let mut bus = Bus::new(&[0x21], with(|p| p.pd_short_last = true));
@@ -82,7 +83,7 @@ fn d15_short_last_package() {
     assert_eq!(bus.ask("5C1#", 20), frames("6C1#000000000000"));
 }
 
-/// D-04: numbers from 0 with 31 for broadcast; and no broadcast number at all.
+/// D-04: numbers from 0 with 31 as the broadcast number, and a profile without a broadcast number.
 #[test]
 fn d04_other_addresses() {
     let profile = with(|p| {
@@ -104,7 +105,7 @@ fn d04_other_addresses() {
     assert_eq!(bus.ask("241#", 300), frames("441#21"));
 }
 
-/// D-04, D-50: the heartbeat that counts.
+/// D-04, D-50: `alive_mode` selects the heartbeats that keep a board running.
 #[test]
 fn d50_unicast_heartbeat() {
     let runs = |mode, text: &str| {
@@ -127,7 +128,7 @@ fn d50_unicast_heartbeat() {
     assert!(!runs(AliveMode::Broadcast, "682#"));
 }
 
-/// D-12: a board that insists on exact lengths.
+/// D-12: a board that requires exact lengths.
 #[test]
 fn d12_strict_lengths() {
     let mut bus = Bus::new(&[0x21], with(|p| p.dlc_strict = true));
@@ -137,7 +138,7 @@ fn d12_strict_lengths() {
     assert_eq!(bus.ask("201#0000000000000000", 20).len(), 4);
 }
 
-/// D-02: foreign frames are counted and have no effect.
+/// D-02: foreign frames are counted and otherwise ignored.
 #[test]
 fn d02_foreign_frames() {
     let mut bus = Bus::initialised();
@@ -163,7 +164,7 @@ fn d02_foreign_frames() {
     assert_eq!(bus.take(), []);
 }
 
-/// D-04: a board ignores frames that boards send, with any number, and does not even count them.
+/// D-04: a board ignores the frames that boards send, for any number, and does not count them.
 #[test]
 fn d04_boards_do_not_listen_to_boards() {
     let mut bus = Bus::initialised();

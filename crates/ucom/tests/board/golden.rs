@@ -1,4 +1,4 @@
-//! The golden bytes of the protocol page, frame by frame.
+//! The golden bytes of the protocol document, frame by frame.
 
 use ucom::Profile;
 

@@ -22,8 +22,8 @@ impl Random {
     }
 }
 
-/// D-20: any frame at any time. The status byte never contradicts itself, no two boards get one number, outputs are active only while the
-/// loop runs, and boards send only frames of the protocol.
+/// D-20: any frame may arrive at any time. The status byte is always consistent, no two boards get the same number,
+/// outputs are active only while the loop runs, and boards send only frames of the protocol.
 #[test]
 fn d20_a_million_random_frames() {
     let seed = std::env::var("UCOM_SEED").ok().and_then(|text| text.parse().ok()).unwrap_or(2026);
@@ -32,7 +32,7 @@ fn d20_a_million_random_frames() {
     let mut bus = Bus::new(&[0x21, 0x42, 0x63], Profile::default());
     let mut seen = std::collections::BTreeMap::new();
     for i in 0..1_000_000u32 {
-        // Mostly frames with a meaning: random identifiers alone never get a board out of S1.
+        // Most frames have a meaning, because random identifiers alone never take a board out of S1.
         let function = if random.below(8) == 0 { random.below(32) } else { random.below(28) };
         let sequence = if random.below(8) == 0 { random.below(64) } else { random.below(4) };
         let (len, data) = match random.below(3) {

@@ -1,11 +1,12 @@
-//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes during transmission.
+//! Identifiers that the PC and a board share (D-05), and answers of several frames whose text changes while they are
+//! sent.
 
 use proptest::prelude::*;
 use ucom::Profile;
 
 use super::bus::{Bus, MS, frames};
 
-/// Event for a board that has reasons to send its flags or its descriptions.
+/// Event that makes a board send its flags or its descriptions.
 #[derive(Clone, Copy, Debug)]
 enum Act {
     Wait(u64),
@@ -24,7 +25,7 @@ fn acts() -> impl Strategy<Value = Vec<Act>> {
         "1C1#8000",
     ]);
     let short = (0_u64..3_000).prop_map(Act::Wait);
-    // The PC's silence lasts long enough for the board to report the loss by itself.
+    // During this time without a frame of the PC, the board itself may report that the PC is lost.
     let long = (1_490_000_u64..1_512_000).prop_map(Act::Wait);
     let act = prop_oneof![3 => send.prop_map(Act::Send), 4 => short, 1 => long];
     prop::collection::vec(act, 1..40)
@@ -43,14 +44,15 @@ proptest! {
                 Act::Send(text) => {
                     bus.send(text);
                     let id = u16::from_str_radix(&text[..3], 16).unwrap();
-                    // MCA_PC_START is answered by MCA_ADMIN_DATA; the identifier is the PC's own.
+                    // MCA_PC_START is entered under its own identifier, which only the PC uses. Its answer is
+                    // MCA_ADMIN_DATA.
                     asked.push((bus.now, id));
                 }
             }
         }
         bus.run(50);
         for (at, frame) in &bus.received {
-            // The dimensions begin a dump; the remainder of a dump in progress follows at once (D-14).
+            // A dump begins with the dimensions. The remainder of a dump that is being sent follows at once (D-14).
             let begins = frame.id() == 0x601 || (frame.id() == 0x581 && frame.dlc() == 6);
             let start = at - super::bus::duration(frame);
             let last = asked.iter().rfind(|(t, id)| *t <= start && *id == frame.id());
@@ -61,7 +63,7 @@ proptest! {
     }
 }
 
-/// D-14: an answer whose text has become shorter meanwhile ends, and the requests that came after it are served.
+/// D-14: if its text becomes shorter meanwhile, an answer ends. Requests that arrived after it are then answered.
 #[test]
 fn d14_an_answer_ends_when_its_text_changes() {
     let long = "a description of more than one package, so that it can end early".to_owned();
@@ -99,8 +101,8 @@ fn d14_an_answer_ends_when_its_text_changes() {
     }
 }
 
-/// D-06, D-12: a board without a number reports no wrong lengths, even if it is strict, and does not answer. All such boards would send
-/// the report at once with the same identifier.
+/// D-06, D-12: a board without a number reports no wrong lengths, even if it is strict, and does not answer.
+/// Otherwise all such boards would send the report at once with the same identifier.
 #[test]
 fn d06_d12_no_error_without_a_number() {
     let profile = Profile { dlc_strict: true, ..Profile::default() };
@@ -111,7 +113,7 @@ fn d06_d12_no_error_without_a_number() {
         assert_eq!(bus.ask(text, 300), [], "{text}");
         bus.number(1);
         let expected = match text {
-            // The board with a number reports it.
+            // A board with a number reports the wrong length.
             "000#00" | "240#00" | "281#00" | "200#00" | "000#0000000000000000" => "081#07",
             _ => "",
         };

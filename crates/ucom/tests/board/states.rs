@@ -1,11 +1,11 @@
-//! The state table, row by row: each event in each state.
+//! The state table, row by row: each event is tested in each state.
 
 use ucom::node::Phase;
 use ucom::{Frame, Profile, Sequence, Status};
 
 use super::bus::{Bus, blocks, frames, image};
 
-/// The columns of the table. Conditions tell S3x and S4 from their neighbours.
+/// The columns of the table. S3x (`Aborted`) and S4 (`Starting`) are separate columns here.
 const STATES: [Phase; 7] = [
     Phase::Uninitialised,
     Phase::Idle,
@@ -51,12 +51,12 @@ struct Seen {
 
 fn event(phase: Phase, text: &str) -> Seen {
     let mut bus = in_state(phase);
-    // In S6 the outputs go out every 10 ms; they are not answers.
+    // In S6 the board sends the outputs every 10 ms; these are not answers.
     let sent = bus.ask(text, 9).into_iter().filter(|frame| frame.id() != 0x381).collect();
     Seen { phase: bus.boards[0].phase(), sent }
 }
 
-/// Checks a row of the table. `expected` gives for each state the state after the event and the frames sent.
+/// Checks a row of the table. For each state, `expected` gives the state after the event and the frames sent.
 fn row(text: &str, expected: impl Fn(Phase) -> (Phase, &'static str)) {
     for phase in STATES {
         let seen = event(phase, text);
@@ -105,7 +105,7 @@ fn d07_pc_report_in_every_state() {
 fn d24_pc_init_in_every_state() {
     row("281#", |phase| (if phase == Uninitialised { Idle } else { phase }, "0C1#01"));
     row("282#", |phase| if phase == Uninitialised { (Idle, "0C2#02") } else { (phase, "") });
-    // 0 is the broadcast number, not a board.
+    // Number 0 is the broadcast number and never belongs to a board.
     row("280#", |phase| (phase, ""));
     let mut bus = Bus::one();
     bus.boards[0].pins.input.store(false, std::sync::atomic::Ordering::SeqCst);
@@ -145,7 +145,7 @@ fn d22_set_status_prog_in_every_state() {
         Programming | Aborted => (Idle, ""),
         other => (other, ""),
     });
-    // PROG 0→1 ends the silence after an aborted transfer.
+    // PROG 0→1 ends the silence that follows an aborted transfer.
     let mut bus = in_state(Aborted);
     bus.send("1C1#0400");
     bus.send("1C1#0404");
@@ -173,7 +173,7 @@ fn d22_set_status_init_in_every_state() {
         assert_eq!(bus.boards[0].status(), Status(0x11), "{phase:?}");
         assert!(!bus.boards[0].application.active);
     }
-    // 0→1 gives no number.
+    // The change 0→1 gives the board no number.
     row("1C1#0808", |phase| (phase, ""));
 }
 
@@ -187,7 +187,7 @@ fn d43_pc_prog_in_every_state() {
     row("2C0#43550100010000", |phase| if phase == Programming { (Aborted, "081#07") } else { (phase, "") });
 }
 
-/// D-12, D-06: a frame that is too short is reported, unless the board would ignore the message anyway.
+/// D-12, D-06: a frame that is too short is reported, unless the board would ignore this message in any case.
 #[test]
 fn d12_short_frames_in_every_state() {
     row("1C1#02", |phase| (phase, if phase == Uninitialised { "" } else { "081#07" }));
@@ -252,7 +252,7 @@ fn d37_admin_in_every_state() {
         Ready | Running => (Running, "601#01010000"),
         other => (other, ""),
     });
-    // active needs run; the other flags do not.
+    // The flag `active` needs `run`; the other flags do not.
     row("600#00010101", |phase| match phase {
         Ready | Running => (Ready, "601#00000101"),
         other => (other, ""),
@@ -270,7 +270,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
             let taken = application.latched_ci[1] == 7 || application.par[1] == 7;
             assert_eq!(taken, matches!(phase, Ready | Running), "{text} in {phase:?}");
         }
-        // Not by broadcast.
+        // By broadcast they have no effect.
         let mut bus = in_state(phase);
         bus.send("340#010007000000");
         bus.send("3C0#010007000000");
@@ -278,7 +278,7 @@ fn d34_d35_inputs_and_parameters_in_every_state() {
     }
 }
 
-/// D-36: dumps exist only while the application is up, and never by broadcast.
+/// D-36: dumps are sent only while the application is up, and never after a broadcast request.
 #[test]
 fn d36_dumps_in_every_state() {
     for phase in STATES {
@@ -294,7 +294,7 @@ fn d36_dumps_in_every_state() {
     }
 }
 
-/// D-26: a board that reboots by itself reports it, once.
+/// D-26: a board that reboots by itself reports this once.
 #[test]
 fn d26_spontaneous_report() {
     for phase in STATES {
@@ -307,7 +307,7 @@ fn d26_spontaneous_report() {
     }
 }
 
-/// D-21: the pin changes only by PC_SETSTATUS, and falls with the number.
+/// D-21: only PC_SETSTATUS changes the pin. The pin is also switched off when the board loses its number.
 #[test]
 fn d21_pin_of_the_next_board() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());
@@ -322,7 +322,7 @@ fn d21_pin_of_the_next_board() {
     assert!(!out(&bus));
 }
 
-/// D-42, D-43: between the cycles and after a cancelled transfer the board is in a state that the table has.
+/// D-42, D-43: between the cycles and after a cancelled transfer the board is in a state of the table.
 #[test]
 fn d43_cancel_and_again() {
     let mut bus = in_state(Programming);
@@ -342,8 +342,8 @@ fn d43_cancel_and_again() {
     assert_eq!(bus.boards[0].record().unwrap().program_id, 0x4B3F);
 }
 
-/// D-24: an acknowledge that the controller gave up after the number was forgotten is not offered again, and does not keep
-/// the board awake.
+/// D-24: an acknowledge is in the CAN controller when the board's number is removed. If the controller gives it up,
+/// it is not offered again, and the board can sleep.
 #[test]
 fn d24_no_acknowledge_without_a_number() {
     let mut bus = in_state(Idle);
@@ -358,7 +358,8 @@ fn d24_no_acknowledge_without_a_number() {
     assert!(board.next_deadline() > now, "nothing to do");
 }
 
-/// D-24: an acknowledge of before the number was forgotten does not give the board the number that is being taken.
+/// D-24: the board's number is removed while its acknowledge is in the CAN controller. When this acknowledge is sent,
+/// the board does not yet have the new number that it is taking.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

@@ -1,4 +1,5 @@
-//! Exact times of one board: nothing happens a microsecond early, and the board requests a wake-up for that moment.
+//! Exact times of one board: nothing happens a microsecond too early, and the board requests a wake-up for the exact
+//! time.
 
 use ucom::Frame;
 use ucom::node::{Phase, Store};
@@ -25,7 +26,7 @@ fn flush(board: &mut Board, now: u64) -> Vec<Frame> {
     left
 }
 
-/// D-07: a board listens when its boot has ended, not earlier.
+/// D-07: a board accepts frames when its boot has ended, and not earlier.
 #[test]
 fn d07_boot_time() {
     for after in ["power-up", "PC_RESET"] {
@@ -46,7 +47,7 @@ fn d07_boot_time() {
     }
 }
 
-/// A board that does not listen yet reads the state of the busy flash every millisecond.
+/// While the flash is busy, a booting board checks its state every millisecond.
 #[test]
 fn boot_waits_for_the_flash() {
     let (mut board, now) = board(Bus::initialised());
@@ -66,7 +67,7 @@ fn boot_waits_for_the_flash() {
     assert_eq!(board.next_deadline(), u64::MAX, "nothing to do");
 }
 
-/// D-43: frames of a block may be 200 ms apart, not a microsecond more.
+/// D-43: frames of a block may be up to 200 ms apart, and not a microsecond more.
 #[test]
 fn d43_pause_inside_a_block() {
     let (mut board, now) = board(Bus::initialised());
@@ -116,7 +117,7 @@ fn d25_hold_off() {
         assert_eq!(board.phase(), phase, "{}", at - now);
     }
     assert_eq!(board.next_deadline(), start + MS, "the application is asked again");
-    // Without ASTART nothing starts by itself.
+    // Without ASTART the application does not start by itself.
     let (mut board, now) = self::board(Bus::one());
     board.receive(now, &frame("281#"));
     assert_eq!(flush(&mut board, now), frames("0C1#01"));
@@ -124,7 +125,7 @@ fn d25_hold_off() {
     assert_eq!((flush(&mut board, start), board.phase()), (vec![], Phase::Idle));
 }
 
-/// D-33, D-35, D-50, D-51: the beats of a running board, and the stop without the PC's heartbeat.
+/// D-33, D-35, D-50, D-51: the periodic actions of a running board, and its stop when the PC's heartbeat is missing.
 #[test]
 fn d33_d35_d50_d51_beats() {
     let (mut board, start) = board(Bus::started());
@@ -142,33 +143,34 @@ fn d33_d35_d50_d51_beats() {
     assert_eq!(flush(&mut board, now + 2 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 2 * MS), frames("601#01000000"));
     assert_eq!(board.application.steps, 2);
-    // Missed cycles are left out, and the beat stays.
+    // Missed cycles are left out; the later ones keep their times.
     assert_eq!((flush(&mut board, now + 7 * MS + 300), board.application.steps), (vec![], 3));
     assert_eq!(board.next_deadline(), now + 8 * MS);
     assert_eq!(flush(&mut board, now + 10 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 10 * MS).len(), 2, "all outputs");
     assert_eq!(flush(&mut board, now + 20 * MS - 1), []);
     assert_eq!(flush(&mut board, now + 20 * MS).len(), 2);
-    // No frame shows that the PC is present.
+    // No frame from the PC arrives.
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
     board.poll(now + 1500 * MS);
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// D-50: the PC counts as lost 1500 ms after its last heartbeat.
+/// D-50: a board regards the PC as lost 1500 ms after its last heartbeat.
 #[test]
 fn d50_heartbeat_of_the_pc() {
     let (mut board, now) = board(Bus::running());
     board.receive(now, &frame("680#"));
     flush(&mut board, now + 1500 * MS - 1);
     assert_eq!(board.phase(), Phase::Running);
-    // A heartbeat at exactly that time is too late.
+    // A heartbeat after exactly this time is too late.
     board.receive(now + 1500 * MS, &frame("680#"));
     assert_eq!(board.phase(), Phase::Ready);
 }
 
-/// A frame that becomes due while another is with the controller is offered at once when that has left: the board does not sleep.
+/// If a frame becomes due while another is in the CAN controller, it is offered as soon as the other has been sent:
+/// the board does not sleep.
 #[test]
 fn what_waits_goes_when_the_frame_before_has_left() {
     let programming = || {
@@ -216,7 +218,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
         assert!(board.next_deadline() <= now, "{what}: {} at {now}", board.next_deadline());
         assert_eq!(board.poll(now), Some(frame(expected)), "{what}");
     }
-    // The acknowledgement itself, after an error.
+    // The acknowledgement itself waits, and the frame before it is an error.
     let mut bus = Bus::initialised();
     bus.hold = |_| true;
     bus.send("1C1#00");
@@ -238,7 +240,7 @@ fn what_waits_goes_when_the_frame_before_has_left() {
     }
 }
 
-/// D-36: after the last package of a dump the board has nothing to do, for any number of inputs.
+/// D-36: after the last package of a dump the board has nothing to do, whatever the number of inputs.
 #[test]
 fn d36_a_dump_ends_with_its_last_package() {
     for (dimension, packages) in [(0, 0), (1, 1), (2, 1), (3, 1), (4, 2), (6, 2), (7, 3)] {
@@ -269,7 +271,7 @@ fn d14_packages_follow_back_to_back() {
     type Case = (&'static str, fn() -> Bus, &'static str, u16, usize);
     let cases: [Case; 5] = [
         ("info", Bus::initialised, "201#", 0x141, 4),
-        // Dimensions, a name of two packages and nine of one, each with its header.
+        // The dimensions, a name of two packages and nine names of one package, each with its header.
         ("description", Bus::started, "581#", 0x581, 1 + 3 + 2 * 9),
         ("inputs", Bus::started, "5C1#", 0x6C1, 1),
         ("outputs", Bus::running, "", 0x381, 2),
@@ -306,8 +308,8 @@ fn d14_packages_follow_back_to_back() {
     }
 }
 
-/// D-42, D-44: the steps after the last block of an update. Each step is short, and the flash is polled every 500 µs. Reading back goes
-/// on without a pause, 1024 bytes at a time.
+/// D-42, D-44: the steps after the last block of an update. Each step is short. The flash is polled every 500 µs, and
+/// the read-back continues without a pause, 1024 bytes at a time.
 #[test]
 fn d44_steps_after_the_last_block() {
     let mut bus = Bus::initialised();
@@ -333,15 +335,15 @@ fn d44_steps_after_the_last_block() {
         }
     };
     assert_eq!(finished, frame("101#"));
-    // The block is processed and written, three pieces are read back, and the record is begun and done.
+    // The board processes and writes the block, reads three pieces back, and then begins and completes the record.
     assert_eq!(waits, [400, 500, 0, 0, 0, 500, 500]);
 }
 
-/// D-05: the random delays are those of Marsaglia's xorshift32, which has no short cycle; a seed that makes its state 0
-/// counts as 1.
+/// D-05: the random delays come from Marsaglia's xorshift32, which has no short cycle. A seed that would make its
+/// state 0 is replaced by 1.
 #[test]
 fn d05_random_delays() {
-    // The sequence from state 1, as published.
+    // The published sequence from state 1.
     let expected = [270_369, 67_634_689, 2_647_435_461u32, 307_599_695, 2_398_689_233];
     let mixed = 0x21u32.wrapping_mul(0x9E37_79B9);
     for seed in [mixed ^ 1, mixed] {

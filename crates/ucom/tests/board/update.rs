@@ -1,4 +1,5 @@
-//! Updates with faults: power loss at each flash operation, each frame lost once, failing flash; other plans.
+//! Updates with faults: power loss at each flash operation, a loss of each single frame, and flash errors. Also other
+//! plans.
 
 use ucom::node::Phase;
 use ucom::profile::{Endian, HeaderForm, Plan};
@@ -11,7 +12,7 @@ pub fn small() -> Vec<u8> {
     (0..200u32).map(|i| (i * i % 251) as u8).collect()
 }
 
-/// Sends all blocks blindly, waiting for an answer after each block. Returns `true` if FINISHED came.
+/// Sends all blocks and waits for an answer after each one, whatever the answer is. Returns `true` if FINISHED came.
 pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     bus.send("041#");
     bus.run(1);
@@ -26,7 +27,7 @@ pub fn update(bus: &mut Bus, all: &[[u8; 64]]) -> bool {
     finished
 }
 
-/// Checks that the record of a valid application belongs to a whole image: the old one or the new one.
+/// Checks that the record of a valid application belongs to a complete image: the old one or the new one.
 pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     let board = &bus.boards[0];
     let stored = board.flash.bytes(Memory::Program);
@@ -37,7 +38,7 @@ pub fn assert_no_half_image(bus: &Bus, new: &[u8], context: &str) {
     }
 }
 
-/// D-45, D-46: power loss in the middle of each flash operation in turn.
+/// D-45, D-46: the power fails in the middle of a flash operation, for each operation in turn.
 #[test]
 fn d45_power_loss_at_every_flash_operation() {
     let image = small();
@@ -45,7 +46,7 @@ fn d45_power_loss_at_every_flash_operation() {
     let mut whole = Bus::initialised();
     assert!(update(&mut whole, &all));
     let operations = whole.boards[0].flash.operations;
-    // Record cleared, area erased, four blocks, record written.
+    // The record is cleared, the area erased, four blocks and the record written.
     assert_eq!(operations, 7);
     for cut in 0..operations {
         let mut bus = Bus::initialised();
@@ -86,7 +87,7 @@ fn d46_power_loss_in_the_first_cycle() {
     }
 }
 
-/// D-43, D-44: each single frame of an update lost, in both directions.
+/// D-43, D-44: each single frame of an update is lost once, in both directions.
 #[test]
 fn d43_every_frame_lost_once() {
     let image = small();
@@ -99,7 +100,7 @@ fn d43_every_frame_lost_once() {
     for lost in first..whole.frames_to_boards {
         let mut bus = Bus::initialised();
         bus.lose_to_boards = Some(lost);
-        // Without PC_XRESET the board takes no block; without a data frame the checks fail.
+        // Without PC_XRESET the board accepts no block. Without a data frame the checks fail.
         assert!(!update(&mut bus, &all), "lost {}", lost - first);
         bus.run(1000);
         assert_no_half_image(&bus, &image, &format!("lost {}", lost - first));
@@ -108,7 +109,7 @@ fn d43_every_frame_lost_once() {
         // The next attempt succeeds.
         assert!(update(&mut bus, &all), "again after {}", lost - first);
     }
-    // A lost answer does not change what the board did.
+    // A lost answer does not change the board's work.
     for lost in first_answer..whole.frames_from_boards {
         let mut bus = Bus::initialised();
         bus.lose_from_boards = Some(lost);
@@ -118,7 +119,7 @@ fn d43_every_frame_lost_once() {
     }
 }
 
-/// Error 3, and the application that is valid afterwards.
+/// The flash fails: error 3, and the application that is valid afterwards.
 #[test]
 fn d45_failing_flash() {
     let all = blocks(&small(), &Profile::default());
@@ -147,7 +148,7 @@ fn d43_frame_before_ready_has_left() {
     assert_eq!(bus.take(), frames("181# 081#04"));
 }
 
-/// D-44: the flash itself must have the Program ID, not only the received data.
+/// D-44: the Program ID is computed from the flash as well, not only from the received data.
 #[test]
 fn d44_flash_is_read_back() {
     let image = small();
@@ -160,7 +161,7 @@ fn d44_flash_is_read_back() {
     }
 }
 
-/// D-42: READY after the header of cycle 2 waits for the erase; the board answers meanwhile.
+/// D-42: READY after the header of cycle 2 waits for the erase. Meanwhile the board answers other requests.
 #[test]
 fn d42_long_erase_blocks_nothing() {
     let all = blocks(&small(), &Profile::default());
@@ -178,7 +179,7 @@ fn d42_long_erase_blocks_nothing() {
     }
     bus.run(1000);
     assert_eq!(bus.take(), frames("181#"));
-    // A reset in the middle of an erase: the board listens when the flash is done.
+    // The board is reset in the middle of an erase. It accepts frames when the flash is done.
     let mut bus = Bus::initialised();
     bus.boards[0].flash.erase_us = 8_000_000;
     bus.send("041#");
@@ -191,7 +192,7 @@ fn d42_long_erase_blocks_nothing() {
     assert!(!bus.boards[0].has_application());
 }
 
-/// D-40: the plan exloader-app: RAM first, and the flash stays as it is until cycle 2.
+/// D-40: the plan exloader-app writes RAM first. The flash does not change until cycle 2.
 #[test]
 fn d40_exloader_then_application() {
     let profile = Profile { prog_plan: Plan::ExloaderApp, ..Profile::default() };
@@ -222,7 +223,7 @@ pub fn data(image: &[u8]) -> Vec<[u8; 64]> {
     (0..).map_while(|i| ucom::data_block(image, i)).collect()
 }
 
-/// D-40: the plan pmem-xmem: two memories, one application, valid when both are written.
+/// D-40: the plan pmem-xmem writes two memories for one application, which is valid when both are written.
 #[test]
 fn d40_program_then_data_memory() {
     let profile = Profile { prog_plan: Plan::PmemXmem, ..Profile::default() };
@@ -308,7 +309,7 @@ fn d44_update_in_other_profiles() {
     }
 }
 
-/// D-40: the plan raw takes two different files as their headers require; the first is only checked.
+/// D-40: the plan raw accepts two different files, as their headers require; the first is only checked.
 #[test]
 fn d40_raw_takes_two_files() {
     let profile = Profile { prog_plan: Plan::Raw, ..Profile::default() };
@@ -326,7 +327,8 @@ fn d40_raw_takes_two_files() {
     assert_no_half_image(&bus, &two, "");
 }
 
-/// D-43: the checksum detects reordered frames of a block, as adapters with several mailboxes send them.
+/// D-43: the checksum detects reordered frames of a block. CAN adapters with several mailboxes may send frames in
+/// another order.
 #[test]
 fn d43_reordered_frames_are_refused() {
     let image = small();

@@ -1,4 +1,4 @@
-//! Updates of boards that read the description differently, plan by plan.
+//! Updates of boards that follow another reading of the protocol description, plan by plan.
 
 use ucom::node::{Area, Node, NodeConfig};
 use ucom::profile::{HeaderForm, Plan};
@@ -24,7 +24,8 @@ fn headerless_in(flash: MemoryFlash, plan: Plan, headerless_words: u32) -> Bus {
     bus
 }
 
-/// D-40, D-41: without header blocks each plan determines the memories of its cycles and the image whose Program ID counts.
+/// D-40, D-41: without header blocks the plan determines the memories of its cycles, and the image whose Program ID
+/// is recorded.
 #[test]
 fn d41_no_header_in_every_plan() {
     let (one, two) = ([0x5A; 200].to_vec(), small());
@@ -51,7 +52,8 @@ fn d41_no_header_in_every_plan() {
     }
 }
 
-/// D-41: an image without a header has the configured length, limited to that of the area, and starts at the area's start.
+/// D-41: an image without a header has the configured length, limited to the length of the area, and starts at the
+/// start of the area.
 #[test]
 fn d41_no_header_fills_the_area() {
     let image: Vec<u8> = (0..128).collect();
@@ -70,7 +72,7 @@ fn d41_no_header_fills_the_area() {
     }
 }
 
-/// D-44: with the checksum `none` the board takes the number in the header as it is, and shows it.
+/// D-44: with the checksum `none` the board takes the number in the header unchanged, and reports it.
 #[test]
 fn d44_program_id_as_the_header_says() {
     let profile = Profile { prog_checksum: Checksum::None, ..Profile::default() };
@@ -89,12 +91,12 @@ fn d44_program_id_as_the_header_says() {
     assert_eq!(bus.info(1).map(|info| info.program_id), Some(0xC0DE));
 }
 
-/// D-43: PROG 1→0 ends a transfer, but not the silence after an error; PROG 0→1 does.
+/// D-43: PROG 1→0 ends a transfer. Only PROG 0→1 ends the silence after an error.
 #[test]
 fn d43_silence_lasts_until_programming_is_enabled_again() {
     let mut bus = Bus::initialised();
     bus.send("041#");
-    // No header.
+    // This block is not a header.
     assert_eq!(bus.block(&[0; 64], 5), frames("081#05"));
     bus.send("1C1#0400");
     assert_eq!(bus.ask("2C1#0011223344556677", 5), [], "silent although PROG is 0");
@@ -103,7 +105,7 @@ fn d43_silence_lasts_until_programming_is_enabled_again() {
     assert_eq!(bus.block(&all[0], 5), frames("181#"));
 }
 
-/// D-40, D-41: for each plan, headers that a board takes in the first cycle, and the error code for a refused header.
+/// D-40, D-41: headers that a board accepts in the first cycle of each plan, and the error codes for refused headers.
 #[test]
 fn d41_headers_of_the_first_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -136,7 +138,7 @@ fn d41_headers_of_the_first_cycle() {
     }
 }
 
-/// D-40, D-41: likewise for the second cycle, after a good first cycle.
+/// D-40, D-41: headers of the second cycle, after a valid first cycle.
 #[test]
 fn d41_headers_of_the_second_cycle() {
     let (program, data, ram) = (0, 1, 0x10);
@@ -167,7 +169,7 @@ fn d41_headers_of_the_second_cycle() {
     }
 }
 
-/// A board that has taken the first block, and whose READY has not left; the blocks.
+/// A board that has accepted the first block, and whose READY has not been sent yet; and the blocks.
 fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     let all = blocks(&small(), &Profile::default());
     let mut bus = Bus::initialised();
@@ -177,14 +179,14 @@ fn ready_held() -> (Bus, Vec<[u8; 64]>) {
     (bus, all)
 }
 
-/// Delivers the frames of a block, all at one moment.
+/// Delivers all frames of a block at the same time.
 fn receive_at_once(bus: &mut Bus, block: &[u8; 64]) {
     for data in block.chunks_exact(8) {
         bus.boards[0].receive(bus.now, &ucom::Frame::new(0x2C1, data).unwrap());
     }
 }
 
-/// D-43: a READY that the controller gave up frees the block buffer, too, and the PC may send again.
+/// D-43: if the CAN controller gives up READY, the block buffer is free and the PC may send again.
 #[test]
 fn d43_ready_that_was_given_up() {
     let (mut bus, all) = ready_held();
@@ -193,13 +195,13 @@ fn d43_ready_that_was_given_up() {
     let now = bus.now;
     bus.boards[0].not_sent(now, &ready);
     assert_eq!(bus.boards[0].counters().not_sent, 1);
-    // DSP_ERROR 6 follows the next frame that leaves.
+    // DSP_ERROR 6 is sent after the next frame.
     assert_eq!(bus.block(&all[1], 10), frames("181# 081#06"));
     assert_eq!(bus.block(&all[2], 10), frames("181#"));
 }
 
-/// D-43: the READY of a cancelled transfer leaves while the first block of the next transfer is processed. The board takes that block
-/// nevertheless.
+/// D-43: the READY of a cancelled transfer is sent while the first block of the next transfer is processed. The board
+/// still accepts that block.
 #[test]
 fn d43_ready_of_the_transfer_before() {
     let (mut bus, all) = ready_held();
@@ -211,7 +213,7 @@ fn d43_ready_of_the_transfer_before() {
     assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
 }
 
-/// D-42: a block without header is also taken as soon as its time has passed.
+/// D-42: a block of an image without header is accepted as soon as its time has passed.
 #[test]
 fn d42_block_time_without_header() {
     let mut bus = headerless(Plan::VerifyWrite);
@@ -221,7 +223,8 @@ fn d42_block_time_without_header() {
     assert_eq!(board.poll(now + board.config().block_us), "181#".parse().ok());
 }
 
-/// D-23, D-42: a READY that still waits when its transfer is cancelled is not sent: the PC would take it for one of the next transfer.
+/// D-23, D-42: a READY that still waits when its transfer is cancelled is not sent, because the PC would assign it to
+/// the next transfer.
 #[test]
 fn d42_no_ready_of_a_transfer_that_is_no_more() {
     let all = blocks(&small(), &Profile::default());

@@ -1,4 +1,4 @@
-//! Jobs, which take longer than a request: their stages and results.
+//! Jobs: requests that take longer than one HTTP request, with their stages and results.
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -36,7 +36,7 @@ impl Stage {
 /// Result of a job.
 #[derive(Clone, Debug)]
 pub(crate) enum Done {
-    /// Boards of the chain, and unusual observations.
+    /// Boards of the chain, and notes about unusual observations.
     Chain(Vec<BoardSeen>, Vec<String>),
     /// Findings of a doctor.
     Findings(Vec<Finding>),

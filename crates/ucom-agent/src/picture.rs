@@ -1,4 +1,4 @@
-//! Snapshot of the bus for all clients: the boards as last seen.
+//! Snapshot of the bus for all clients, with the last known state of each board.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,7 +25,7 @@ pub(crate) struct Values {
 /// Bus and boards at one time.
 #[derive(Clone)]
 pub(crate) struct Picture {
-    /// Time of the snapshot by the session's clock, µs. The next field is the time by the agent's clock.
+    /// Time of the snapshot by the session's clock, in µs. The next field is the time by the agent's clock.
     pub now_us: u64,
     pub at: Instant,
     pub profile: Profile,
@@ -34,9 +34,9 @@ pub(crate) struct Picture {
     pub controller: Option<Controller>,
     /// `true` if the agent sends heartbeats.
     pub is_master: bool,
-    /// Time when another PC was last seen on the bus, µs.
+    /// Time when another PC last sent a frame on the bus, in µs.
     pub competing_us: Option<u64>,
-    /// Numbers that two boards share, in words.
+    /// Texts about numbers that two boards share.
     pub shared: Vec<String>,
     pub values: BTreeMap<u8, Values>,
 }

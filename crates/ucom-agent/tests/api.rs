@@ -1,4 +1,4 @@
-//! A client that uses only HTTP: numbers, boards, values, control loops, inputs, events, and a Stop.
+//! Tests with a client that uses only HTTP: numbers, boards, values, control loops, inputs, events, and a Stop.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -40,7 +40,7 @@ fn d24_a_chain_is_scanned_numbered_and_listed() {
         .collect();
     let places = config.boards.iter().zip(1..).map(|(board, place)| (place, u64::from(board.flash_id)));
     assert_eq!(found, places.collect::<Vec<_>>(), "{boards}");
-    // A chain that differs from the expected one is an error of the job. The error names the boards on the bus.
+    // If the chain differs from the expected one, the job fails. The error lists the boards on the bus.
     let expected = json!({ "expected": [{ "board": 1, "flash_number": 9 }] });
     let job = served.job("POST /api/init", &key, Some(expected));
     assert_eq!(
@@ -60,7 +60,8 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     assert!(status == 409 && error["next"].as_str().is_some_and(|n| n.contains("start")), "{error}");
     let (status, started) = served.api("POST /api/boards/1/start", Some(&key), None);
     assert_eq!((status, started["state"].as_str()), (200, Some("started")), "{started}");
-    // A value that was neither set nor read is unknown: a client that writes back all values must not write zeros.
+    // A value that was neither set nor read is unknown. Otherwise a client that writes back all values would write
+    // zeros.
     let known = |of: &Value| {
         of["inputs"]
             .as_array()
@@ -76,7 +77,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let (_, values) = served.api("GET /api/boards/1/values", None, None);
     assert_eq!(known(&values).iter().filter(|known| **known).count(), 1, "{values}");
     assert_eq!(value(&values, "inputs", "set_position")["value"], 7.0, "{values}");
-    // Each board runs once, even if it is named several times; its inputs are read then.
+    // Each board runs once, even if the request lists it several times. Its inputs are read at that time.
     let (mut peer, boards) = (served.chain.peer(), [vec![1; 200], vec![2]].concat());
     let job = served.job("POST /api/run", &key, Some(json!({ "boards": boards, "active": true })));
     assert_eq!(job["stage"], "finished", "{job}");
@@ -97,7 +98,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
     let offers: Vec<&str> =
         board["offers"]["inputs"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
     assert!(offers.iter().any(|name| name.starts_with("set_position")), "{offers:?}");
-    // An input by its name moves the axis. Without the signal table words are numbers.
+    // An input set by its name moves the axis. Without the signal table, values are raw words.
     let set = |value: Value| {
         let request = "PUT /api/boards/1/inputs/set_position";
         served.api(request, Some(&key), Some(json!({ "value": value })))
@@ -115,7 +116,7 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         }
         patience.pause(format_args!("the position 1500: {values}"));
     }
-    // Words and texts are also valid values. An invalid value is refused with the valid ones, and changes nothing.
+    // A text with a raw word is also valid. An invalid value is refused with the valid ones, and changes nothing.
     assert_eq!(set(json!("0x05DC")).1["value"], 1500.0);
     for (name, given, status, part) in [
         ("set_positon", json!(1), 422, "set_position"),
@@ -134,14 +135,14 @@ fn a_program_runs_boards_gives_inputs_and_reads_what_they_send() {
         board["offers"]["parameters"][0].as_str().expect("a name").split(' ').next().unwrap_or_default();
     let (status, sent) = served.api(&format!("PUT /api/boards/1/parameters/{name}"), Some(&key), body);
     assert_eq!((status, sent["value"].as_f64()), (200, Some(120.0)), "{sent}");
-    // Outputs off, and one board stopped; the other board goes on.
+    // The outputs are turned off and one board is stopped; the other board still runs.
     let off = served.api("PUT /api/boards/1/outputs", Some(&key), Some(json!({ "active": false })));
     assert_eq!(off.0, 204, "{}", off.1);
     served.board_when(1, "inactive", |board| board["active"] == false);
     let (status, stopped) = served.api("POST /api/boards/1/stop", Some(&key), None);
     assert_eq!((status, stopped["state"].as_str()), (200, Some("exloader")), "{stopped}");
     assert_eq!(served.board(2)["state"], "running");
-    // A reset takes the board's number away.
+    // After a reset the board has no number.
     let (status, reset) = served.api("POST /api/boards/1/reset", Some(&key), None);
     assert_eq!((status, reset["reports"].as_array().map(Vec::len)), (200, Some(1)), "{reset}");
     let (status, error) = served.api("POST /api/boards/1/start", Some(&key), None);
@@ -159,7 +160,7 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let http = served.clone();
         move || http.get("POST /api/stop").0
     });
-    // MCA_ADMIN_DATA to all, with all flags 0, three times, because one frame can be lost.
+    // MCA_ADMIN_DATA to all boards with all flags 0, three times, because one frame can be lost.
     for _ in 0..3 {
         frame(&mut *peer, 0x600, &[0, 0, 0, 0]);
     }
@@ -172,7 +173,7 @@ fn d37_a_stop_needs_no_lease_and_stops_every_board() {
         let board = served.board_when(number, "stopped", |board| board["state"] == "exloader");
         assert_eq!(board["active"], false, "{board}");
     }
-    // After another client's Stop motion requests are refused for a while, then accepted again.
+    // After another client's Stop, motion requests are refused for a while and then accepted again.
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     std::thread::sleep(Duration::from_millis(3100));
@@ -230,7 +231,7 @@ fn d51_a_board_that_dies_is_noticed_in_time_and_so_is_its_return() {
     assert!((1.4..1.6).contains(&(at[1] - at[0])) && at[2] < 6.7, "{at:?}");
 }
 
-/// D-37, D-50: a board that leaves its control loop by itself causes an event, and its values are stale.
+/// D-37, D-50: if a board leaves its control loop by itself, this is an event, and its values are stale.
 #[test]
 fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
     let (served, key) = Served::numbered(1);
@@ -243,7 +244,7 @@ fn d50_a_board_that_misses_its_pc_is_an_event_and_its_values_are_stale() {
     assert_eq!(values["stale"], true, "{values}");
 }
 
-/// D-08: nothing is sent to boards that another PC commands.
+/// D-08: the agent sends nothing to boards that another PC commands.
 #[test]
 fn d08_with_another_master_on_the_bus_commands_are_refused() {
     let mut other = Served::start(1);
@@ -252,7 +253,8 @@ fn d08_with_another_master_on_the_bus_commands_are_refused() {
     let (_, status) = other.api("GET /api/status", None, None);
     assert_eq!(status["competing_master"], true, "{status}");
     let theirs = other.lease("bob", 60.0, "stop");
-    // The status shows the other master all the time, not only at its first frame. A doctor then sends no questions.
+    // The status reports the other master as long as it is present, not only at its first frame. Meanwhile a doctor
+    // sends no questions.
     for _ in 0..40 {
         std::thread::sleep(Duration::from_millis(100));
         let (_, status) = other.api("GET /api/status", None, None);
@@ -315,13 +317,13 @@ fn the_lease_is_asked_for_given_and_its_policy_stops_what_runs() {
     assert_eq!(served.api("POST /api/boards/1/start", Some(&bob), None).0, 409);
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     assert_eq!(served.api("GET /api/status", None, None).1["lease"]["holder"], "bob");
-    // Unless the client chose otherwise, its boards do not continue to run after it disconnects.
+    // By default the boards of a client do not continue to run after it disconnects.
     served.run(&bob, &[1]);
     let last = served.last_event();
     let (number, halt) = served.event(last, "halt", |event| event["kind"] == "halt");
     assert!(halt["by"].as_str().is_some_and(|by| by.contains("bob")), "{halt}");
     served.event(number, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1]));
-    // With the other policy they do.
+    // With the other policy they continue to run.
     let carl = served.lease("carl", 1.0, "continue");
     std::thread::sleep(Duration::from_millis(3100));
     let carl = match served.api("PUT /api/lease", Some(&carl), None).1["held"].as_bool() {
@@ -358,7 +360,7 @@ fn a_stream_has_bus_boards_values_and_events_as_they_come() {
     assert!(last > 3, "{kinds:?}");
 }
 
-/// D-01: numbers are 0 to 31. Other numbers are refused before anything is sent, and the agent goes on.
+/// D-01: numbers are 0 to 31. Other numbers are refused before anything is sent, and the agent continues.
 #[test]
 fn d01_numbers_that_no_board_can_have_are_refused() {
     let (served, key) = Served::numbered(1);
@@ -389,7 +391,8 @@ fn a_bus_that_is_gone_is_named() {
     served.event(0, "lost", |event| event["kind"] == "lost");
 }
 
-/// D-08, D-50: the agent sends heartbeats only for its own commands, so it keeps no board alive whose own PC is lost.
+/// D-08, D-50: the agent sends heartbeats only for its own commands. If another PC is lost, the agent does not keep
+/// that PC's boards alive.
 #[test]
 fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none() {
     let (served, key) = Served::numbered(1);
@@ -418,7 +421,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
         }
         stop();
         is_master(false);
-        // The lease has not lapsed meanwhile.
+        // The lease of this test has not lapsed meanwhile.
         assert_eq!(status()["lease"].is_null(), !lease, "{}", status());
         let beat = |frame: &can_link::CanFrame| frame.id().value() == 0x680 && frame.data().is_empty();
         let (mut peer, begun, mut beats) = (served.chain.peer(), Instant::now(), 0);
@@ -430,7 +433,7 @@ fn d50_heartbeats_end_with_the_lease_and_what_was_started_and_a_stop_begins_none
     }
 }
 
-/// A disk that does not answer delays neither a Stop nor heartbeats, nor a question.
+/// A disk that does not answer delays no Stop, heartbeat or question.
 #[cfg(unix)]
 #[test]
 fn a_stop_does_not_wait_for_the_disk_with_the_names() {

@@ -1,4 +1,4 @@
-//! Clients that use up all connections, in a separate program because these are many.
+//! Clients that use up all connections. These tests are a separate program because they open many connections.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

@@ -1,4 +1,4 @@
-//! A request made before a Stop moves nothing after it, for any delay and any client that stopped.
+//! A request made before a Stop moves nothing after it, whatever its delay and whichever client requested the Stop.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -8,7 +8,7 @@ use std::time::Duration;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Longer than the hold-off of three seconds after another client's Stop.
+/// Time longer than the hold-off of three seconds after another client's Stop.
 const CALM: Duration = Duration::from_millis(3_300);
 
 fn last_halt(served: &Served) -> u64 {
@@ -24,13 +24,13 @@ fn stop(served: &Served, key: Option<&str>) -> u64 {
     number
 }
 
-/// Checks that the request was refused, with the name of the client that stopped the boards.
+/// Checks that the request was refused with the name of the client that requested the Stop.
 fn is_stopped((status, error): (u16, Value), by: &str) {
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
     assert!(error["message"].as_str().is_some_and(|text| text.starts_with(by)), "{error}");
 }
 
-/// Begins a request without its body.
+/// Sends the head of a request, without its body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let (address, token, length) = (served.address, &served.tokens.operator, body.len());
     let mut socket = TcpStream::connect(address).expect("it listens");
@@ -88,7 +88,7 @@ fn a_body_that_arrives_behind_a_stop_starts_nothing() {
         json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true }).to_string();
     let late = [("POST /api/run", &run), ("POST /api/updates", &update)]
         .map(|(request, body)| (begin(&served, request, &key, body), body));
-    // This also holds after the client's own Stop, which causes no hold-off.
+    // A request is also refused after the client's own Stop, which causes no hold-off.
     stop(&served, Some(&key));
     let last = served.last_event();
     for (socket, body) in late {
@@ -120,7 +120,7 @@ fn stops_that_no_agent_has_counted_are_refused_with_what_it_has() {
         let (status, error) = served.api(&format!("{request}?asked_after=7"), Some(&key), body.clone());
         let found = (status, &error["value"], &error["limit"]);
         assert_eq!(found, (400, &json!(7.0), &json!(1.0)), "{request}: {error}");
-        // Each of these is refused after a Stop as well, for any client that stopped.
+        // Each of these requests is refused after a Stop, whichever client requested it.
         is_stopped(served.api(&format!("{request}?asked_after=0"), Some(&key), body), "anna");
     }
     nothing_runs(&served);
@@ -147,14 +147,15 @@ fn an_input_behind_ones_own_stop_is_refused_and_what_ends_something_is_not() {
     let (_, error) =
         served.api(&format!("PUT /api/boards/1/outputs?asked_after={before}"), Some(&key), Some(off));
     assert_ne!(error["code"], "stopped", "{error}");
-    // The client's own Stop causes no hold-off for a request that names this Stop, or none.
+    // After the client's own Stop there is no hold-off for a request that gives the number of this Stop, or no
+    // number.
     let job =
         served.begin(&format!("POST /api/run?asked_after={halt}"), &key, Some(json!({ "boards": [1] })));
     assert_eq!(served.over(job)["stage"], "finished");
     assert_eq!(set("", 700).0, 200);
 }
 
-/// Every status carries its time, so a client can detect late messages even if they come steadily.
+/// Every status carries its time, so a client can detect that messages are old even if they arrive regularly.
 #[test]
 fn each_status_has_the_time_when_it_was_made() {
     let served = Served::start(1);

@@ -1,4 +1,4 @@
-//! Effect on a client's requests of a Stop, of the end of its lease, of its disconnection and of other clients.
+//! Effects of a Stop, of the end of the lease, of a disconnection and of other clients on a client's requests.
 use crate::common;
 
 use std::io::Write as _;
@@ -37,7 +37,8 @@ fn idle(served: &Served, lasts_s: f64, policy: &str, key: &str) -> String {
     served.lease("bob", lasts_s, policy)
 }
 
-/// Another client reads the leases during the job without effect. The lapse ends the job, and all boards are stopped.
+/// Another client reads the leases during the job; this has no effect. The lapse of the lease ends the job, and all
+/// boards are stopped.
 #[test]
 fn a_run_whose_client_dies_meanwhile_is_stopped() {
     let (served, key) = Served::numbered(6);
@@ -74,7 +75,7 @@ fn a_run_that_cannot_be_taken_back_counts_as_started() {
     assert_eq!(over["stage"], "cancelled", "{over}");
     let mut peer = served.chain.peer();
     let mut served = served;
-    // The board counts as started: the agent does not end without a Stop for it.
+    // The board is still listed as started, so the agent does not end without a Stop for it.
     let ending = std::thread::spawn(move || {
         served.end();
         served
@@ -103,7 +104,7 @@ fn a_lease_lapses_in_the_middle_of_an_update() {
     assert_eq!(stopped["not_stopped"], json!([]), "{stopped}");
 }
 
-/// A request of a client that has lost the lease is not carried out under the lease of another client.
+/// If a client has lost the lease, its waiting request is not carried out under the lease of another client.
 #[test]
 fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let (served, key) = Served::numbered(1);
@@ -116,7 +117,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     let on = json!({ "active": true });
     let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), Some(on));
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
-    // Nor does a board lose its number.
+    // The board keeps its number as well.
     let (status, error) = reset.join().expect("it is answered");
     assert_eq!((status, error["code"].as_str()), (409, Some("late")), "{error}");
     let board = served.board(1);
@@ -124,7 +125,7 @@ fn what_waits_when_the_lease_lapses_does_not_move_anything() {
     others.into_iter().for_each(|other| other.join().expect("it is answered"));
 }
 
-/// A request of a disconnected client moves nothing any more. A request that ends motion is carried out.
+/// A waiting request of a disconnected client moves nothing. A request that ends motion is carried out.
 #[test]
 fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     let (served, key) = Served::numbered(2);
@@ -152,7 +153,7 @@ fn what_waits_for_a_program_that_has_gone_does_not_move_anything() {
     assert_eq!(served.board(1)["active"], false);
 }
 
-/// The client's own Stop does not shorten the hold-off after another client's Stop.
+/// A later Stop of the client itself does not shorten the hold-off after another client's Stop.
 #[test]
 fn the_calm_of_a_stop_lasts_behind_another_one() {
     let (served, key) = Served::numbered(1);
@@ -162,7 +163,7 @@ fn the_calm_of_a_stop_lasts_behind_another_one() {
     }
     let (status, error) = served.api("POST /api/run", Some(&key), Some(json!({ "boards": [1] })));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
-    // An update is not begun after it either.
+    // During this hold-off an update is refused as well.
     let body = json!({ "boards": [{ "board": 1 }], "image": "AAAA", "format": "bin", "start": true });
     let (status, error) = served.api("POST /api/updates", Some(&key), Some(body));
     assert_eq!((status, error["code"].as_str()), (409, Some("stopped")), "{error}");
@@ -191,7 +192,7 @@ fn a_job_that_waits_is_cancelled_and_one_that_is_refused_never_was() {
     assert_eq!(ended, [(Some(job), Some("cancelled")), (Some(job + 1), Some("finished"))]);
 }
 
-/// A board that is silent during a Stop does not count as stopped.
+/// A board that is silent during a Stop is not reported as stopped.
 #[test]
 fn a_board_that_is_silent_at_a_stop_is_named_and_still_counts() {
     let (served, key) = Served::numbered(2);
@@ -228,7 +229,7 @@ fn questions_keep_no_command_waiting() {
         let (status, error) = served.api("PUT /api/boards/1/outputs", Some(&key), body);
         assert_eq!(status, 204, "{error}");
     }
-    // A command waits at most for the one question in progress.
+    // A command waits at most for the one question that is being done.
     assert!(begun.elapsed() < Duration::from_secs(3), "{:?}", begun.elapsed());
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
@@ -299,7 +300,8 @@ fn d34_an_input_of_a_board_without_power_is_no_success() {
     assert_eq!(status, 409, "{error}");
 }
 
-/// A client cannot release its lease while its run begins: outputs would be enabled later without a lease holder.
+/// A client cannot release its lease while its run begins. Otherwise outputs would be enabled later without a lease
+/// holder.
 #[test]
 fn the_lease_is_not_let_go_while_a_run_begins() {
     let (served, key) = Served::numbered(1);
@@ -316,7 +318,8 @@ fn heartbeats_end(served: &Served) {
     until("the end of the heartbeats", || served.api("GET /api/status", None, None).1["is_master"] == false);
 }
 
-/// D-50: read-only requests do not keep the heartbeats going, at any rate. Boards without a lease holder become safe.
+/// D-50: read-only requests do not keep the heartbeats going, however often they come. Boards without a lease holder
+/// become safe.
 #[test]
 fn d50_questions_do_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -338,7 +341,7 @@ fn d50_questions_do_not_keep_the_heartbeats_going() {
     viewers.into_iter().for_each(|viewer| viewer.join().expect("it is answered"));
 }
 
-/// A run that was begun and undone does not count as started.
+/// After a run was begun and undone, its boards are not listed as started.
 #[test]
 fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     let (served, key) = Served::numbered(2);
@@ -350,7 +353,8 @@ fn a_run_that_was_cancelled_and_taken_back_does_not_count_as_started() {
     heartbeats_end(&served);
 }
 
-/// D-50: another PC has started the loop of a board. A stop of that loop by this agent does not make the board this agent's.
+/// D-50: another PC has started the loop of a board. If this agent stops that loop, it does not treat the board as
+/// its own.
 #[test]
 fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     let (served, key) = Served::numbered(1);
@@ -358,7 +362,7 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     for (id, awaited) in [(0x301, 0x501), (0x541, 0x601)] {
         let id = can_link::Id::standard(id).expect("11 bits");
         peer.send(&can_link::CanFrame::classic(id, &[]).expect("no data")).expect("the bus is there");
-        // Any data are accepted.
+        // The data of the frame are not compared.
         frame_when(&mut *peer, &format!("{awaited:03X}"), |frame| frame.id().value() == awaited);
     }
     let (status, error) = served.api("POST /api/boards/1/stop?level=loop", Some(&key), None);
@@ -366,7 +370,8 @@ fn d50_a_stopped_loop_of_another_pc_does_not_keep_the_heartbeats_going() {
     served.board_when(1, "started", |board| board["state"] == "started");
     assert_eq!(served.api("DELETE /api/lease", Some(&key), None).0, 204);
     heartbeats_end(&served);
-    // A board that this agent has started still counts. The other PC must have been silent for a while (D-08).
+    // The agent still sends heartbeats for a board that it has started. The other PC must have been silent for a
+    // while (D-08).
     std::thread::sleep(Duration::from_millis(1_500));
     let key = served.lease("anna", 60.0, "continue");
     served.run(&key, &[1]);

@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, which needs one link step: each file here is a module of it.
+//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of it.
 mod api;
 mod attacks;
 mod common;

@@ -1,4 +1,4 @@
-//! Firmware by HTTP: upload, write, read back.
+//! Firmware updates by HTTP: upload, write, read back.
 use crate::common;
 
 use std::time::Duration;
@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use common::Served;
 use serde_json::{Value, json};
 
-/// Returns the image of the page's golden update in base64; its Program ID is 0x4B3F.
+/// Returns the image of the golden update in the protocol document, in base64. Its Program ID is 0x4B3F.
 fn golden(bytes: usize) -> String {
     STANDARD.encode((0..bytes).map(|i| (37 * i + 11) as u8).collect::<Vec<u8>>())
 }
@@ -17,7 +17,7 @@ fn request(boards: Value, bytes: usize) -> Value {
     json!({ "boards": boards, "image": golden(bytes), "format": "bin", "date": "2009-06-01" })
 }
 
-/// D-44, D-45: after an update the board shows the checksum of the image and its date.
+/// D-44, D-45: after an update the board reports the checksum of the image and its date.
 #[test]
 fn d44_an_image_is_uploaded_written_and_read_back() {
     let (served, key) = Served::numbered(2);
@@ -25,7 +25,7 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     let flash = before["flash_number"].as_u64().expect("a number");
     let body = request(json!([{ "board": 2, "flash_number": flash }]), 1000);
     let number = served.begin("POST /api/updates", &key, Some(body.clone()));
-    // Only one update at a time, and no other command meanwhile.
+    // Only one update may run at a time, and no other command is accepted meanwhile.
     let (status, busy) = served.api("POST /api/updates", Some(&key), Some(body.clone()));
     assert_eq!((status, busy["code"].as_str()), (409, Some("busy")), "{busy}");
     assert_eq!(served.api("POST /api/boards/1/start", Some(&key), None).0, 409);
@@ -50,7 +50,7 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
     let progress: Vec<&&Value> = all.iter().filter(|event| event["kind"] == "progress").collect();
     let bytes: Vec<u64> = progress.iter().filter_map(|event| event["bytes"].as_u64()).collect();
     assert!(bytes.len() > 2 && bytes.is_sorted() && bytes.last() == Some(&2176), "{bytes:?}");
-    // Progress does not push other events out: within a cycle there are at most five events per second.
+    // Progress does not crowd out other events: within a cycle there are at most five events per second.
     let times: Vec<(f64, &Value)> = entries
         .iter()
         .filter(|entry| entry["event"]["kind"] == "progress" && entry["event"]["bytes"] != 2176)
@@ -58,13 +58,13 @@ fn d44_an_image_is_uploaded_written_and_read_back() {
         .collect();
     assert!(times.windows(2).all(|w| w[0].1 != w[1].1 || w[1].0 - w[0].0 > 0.1), "{times:?}");
     assert_eq!(all.last().map(|event| &event["outcome"]), Some(&json!("finished")));
-    // An update with the same image is up to date.
+    // A board is up to date after a second update with the same image.
     let job = served.job("POST /api/updates", &key, Some(body));
     assert_eq!(job["update"]["boards"][0]["outcome"], "up-to-date", "{job}");
 }
 
-/// D-62: the same bytes at another address are written, and a program that the agent has no record of is not called verified. U-3:
-/// without a date the board keeps its date.
+/// D-62: the same bytes at another address are written. A program for which the agent has no record is not reported
+/// as verified. U-3: without a date, the board keeps its date.
 #[test]
 fn d62_what_the_agent_wrote_is_what_it_knows() {
     let (served, key) = Served::numbered(1);
@@ -91,7 +91,7 @@ fn d62_what_the_agent_wrote_is_what_it_knows() {
     assert_eq!(update(again), is("verified", true, "finished"));
 }
 
-/// D-46: raw bytes are requested, but the file holds records: no job is begun.
+/// D-46: the request says that the file is raw binary, but the file contains records. No job is begun.
 #[test]
 fn d46_records_are_no_raw_bytes() {
     let (served, key) = Served::numbered(1);
@@ -138,7 +138,8 @@ fn d46_the_wrong_board_and_what_is_no_image_are_refused() {
     );
 }
 
-/// Boards whose update is refused, or only a dry run, continue to run. These boards are still stopped when the lease lapses.
+/// Boards continue to run if their update is refused or is only a dry run. When the lease lapses, these boards are
+/// still stopped.
 #[test]
 fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     let (served, key) = Served::numbered(2);
@@ -154,7 +155,7 @@ fn boards_whose_update_is_refused_are_still_stopped_at_the_lapse() {
     served.event(last, "stopped", |event| event["kind"] == "stopped" && event["boards"] == json!([1, 2]));
 }
 
-/// D-46: a Stop is on the bus during an update and does not end it. The lease holder can cancel the update.
+/// D-46: a Stop is sent during an update and does not end the update. The lease holder can cancel the update.
 #[test]
 fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     let (served, key) = Served::numbered(1);
@@ -174,7 +175,7 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
         "{job}"
     );
     served.event(last, "stopped", |event| event["kind"] == "stopped");
-    // Another image, whose update is cancelled.
+    // The update with another image is cancelled.
     let last = served.last_event();
     let number = served.begin("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 60_000)));
     served.event(last, "progress", progress);
@@ -187,9 +188,8 @@ fn d46_a_stop_does_not_end_an_update_and_a_cancel_does() {
     );
     std::thread::sleep(Duration::from_millis(100));
     assert_eq!(served.api(&format!("DELETE /api/jobs/{number}"), Some(&key), None).0, 409);
-    // No memory was erased, so the board has its old program. After an update that was begun, the agent no longer knows the flash content
-    // (D-62).
-    // (D-62).
+    // No memory was erased, so the board has its old program. After an update that was begun, the agent no longer
+    // knows the flash content (D-62).
     let job = served.job("POST /api/updates", &key, Some(request(json!([{ "board": 1 }]), 1000)));
     assert_eq!(job["update"]["boards"][0]["outcome"], "program-up-to-date", "{job}");
 }

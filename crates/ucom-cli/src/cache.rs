@@ -1,4 +1,4 @@
-//! Cache of board information and signal words (D-11), in the folder that the command line names.
+//! Cache of board information and signal words (D-11), in the folder that the command line gives.
 
 use cli_kit::Failure;
 use host_kit::user_folder;
@@ -13,7 +13,7 @@ use crate::args::{CacheArgs, LinkArgs};
 const SIGNAL_TABLE: &str = "ucom-edges.toml";
 
 impl LinkArgs {
-    /// Loads the signal table; without a file an empty one.
+    /// Loads the signal table; an empty one if there is no file.
     pub fn signal_table(&self) -> Result<SignalTable, Failure> {
         let here = Path::new(SIGNAL_TABLE);
         let path = match &self.edges {
@@ -31,7 +31,7 @@ impl CacheArgs {
         Cache::new(self.directory(), self.fresh)
     }
 
-    /// Returns the folder of the cache; `None` without one.
+    /// Returns the folder of the cache; `None` if there is none.
     fn directory(&self) -> Option<PathBuf> {
         self.cache.clone().or_else(|| Some(user_folder("XDG_CACHE_HOME", ".cache")?.join("ucom")))
     }

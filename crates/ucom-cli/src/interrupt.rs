@@ -1,5 +1,5 @@
-//! Ctrl-C: the first one cancels, and started steps are completed; the second one ends the process at once, and prints
-//! the remaining steps and their command.
+//! Ctrl-C: the first one cancels the command, which completes the steps that it has started. The second one ends the
+//! process at once, and prints the remaining steps and their command.
 
 use std::io::Write;
 use std::time::Duration;

@@ -1,4 +1,5 @@
-//! The `ucom` command: parses, calls the libraries, prints. Results go to stdout, progress and logs to stderr.
+//! The `ucom` command: parses the command line, calls the libraries, and prints. Results go to stdout, progress and
+//! logs to stderr.
 #![forbid(unsafe_code)]
 
 mod args;
@@ -38,7 +39,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             let exit = exit::of(failure.kind);
             if !failure.is_shown() {
-                // Output already waits in stdout without a reader, so the failure is printed without JSON.
+                // If stdout is blocked by earlier output, the failure is printed on stderr without JSON.
                 let out = if cli_kit::stdout_is_stuck() { Output::new("ucom", false) } else { out };
                 print_within(PRINT_TIMEOUT, move || out.failure(&failure));
             }

@@ -26,7 +26,7 @@ impl Operator for Console {
 }
 
 impl LinkArgs {
-    /// Returns the profile; without a file the defaults.
+    /// Returns the profile; the defaults if no file is given.
     pub fn profile(&self) -> Result<Profile, Failure> {
         let Some(path) = &self.profile else { return Ok(Profile::default()) };
         let text =
@@ -54,7 +54,7 @@ impl LinkArgs {
         self.session_with(self.profile()?)
     }
 
-    /// Like [`Self::session`], with another profile than the command line's.
+    /// Like [`Self::session`], with a profile other than the command line's.
     pub fn session_with(&self, profile: Profile) -> Result<Driver, Failure> {
         let cleanup = CleanupList::default();
         let console = Console { stop: listen(&cleanup)?, notes: Lines::stderr()? };
@@ -62,7 +62,7 @@ impl LinkArgs {
     }
 }
 
-/// Returns the numbers shared by two boards, as `--json` lists them.
+/// Returns the numbers that two boards share, in the form of `--json`.
 pub fn shared_numbers(master: &Master) -> Vec<Value> {
     let value = |e: &Error| {
         let Error::Identity(IdentityError::NumberShared { board, found, .. }) = e else { return Value::Null };

@@ -1,11 +1,11 @@
-//! Controllers that go bus-off and recover: boards and clients of `ucom sim`.
+//! CAN controllers of `ucom sim` that go bus-off and recover: those of boards and those of clients.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::Sim;
 
-/// ISO 11898-1: bus-off boards recover when the wire is intact again, and so does a client.
+/// ISO 11898-1: when the wire is intact again, bus-off boards recover, and so does a client.
 #[test]
 fn bus_off_is_not_for_ever() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
@@ -21,8 +21,8 @@ fn bus_off_is_not_for_ever() {
     assert_eq!(boards["boards"].as_array().unwrap().len(), 3, "{boards}");
 }
 
-/// A client is told of its own bus-off, not only the simulator's stderr: as an error frame, and as a message of `ucom`
-/// with the next step.
+/// A client learns of its own bus-off from an error frame, and `ucom` prints a message with the next step. It is not
+/// only printed on the simulator's stderr.
 #[test]
 fn the_bus_off_controller_is_named() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

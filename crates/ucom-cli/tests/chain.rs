@@ -36,7 +36,7 @@ fn p1_scan_only_asks() {
     assert!(of_pc.is_empty(), "{of_pc:?}");
 }
 
-/// P-2: chains of 0, 1 and 31 boards; the inventory is written, compared, and kept if it differs.
+/// P-2: chains of 0, 1 and 31 boards. The inventory is written, compared, and kept if it differs.
 #[test]
 fn p2_init_of_chains_and_their_inventory() {
     let sim = Sim::start(&["--boards", "0"]);
@@ -60,7 +60,7 @@ fn p2_init_of_chains_and_their_inventory() {
     assert_eq!(first["flash_date"], "2008-03-14");
     let inventory = std::fs::read_to_string(sim.path("inventory.toml")).unwrap();
     assert!(inventory.contains("flash_number = 0x0023"), "{inventory}");
-    // Two boards were swapped.
+    // The inventory looks as if two boards had been swapped.
     std::fs::write(sim.path("inventory.toml"), inventory.replace("0x0023", "0x0055")).unwrap();
     let output = sim.ucom(&["--json", "init"]).ends(1);
     let text = output.json()["findings"][0].as_str().unwrap().to_owned();
@@ -68,7 +68,7 @@ fn p2_init_of_chains_and_their_inventory() {
     sim.ucom(&["init", "--renew"]).ends(0);
 }
 
-/// D-24, 5.4: a broken wire is named with its place.
+/// D-24, 5.4: a broken wire is reported with its place.
 #[test]
 fn a_broken_init_wire_is_reported_with_its_place() {
     let mut sim = Sim::start(&["--boards", "4"]);
@@ -79,7 +79,7 @@ fn a_broken_init_wire_is_reported_with_its_place() {
     assert!(text.contains("after position 2") && text.contains("0x23") && text.contains("0x31"), "{text}");
 }
 
-/// D-T21: two boards with one flash id appear as one report and two boards.
+/// D-T21: two boards with the same flash number send one report but are found as two boards.
 #[test]
 fn d07_equal_flash_ids_are_found_out() {
     let sim = Sim::start(&["--boards", "3", "--flash-ids", "0x21,0x22,0x22"]);
@@ -114,13 +114,13 @@ fn names_inputs_and_motion() {
     let io = sim.json(&["io", "1"], 0);
     assert_eq!(io["boards"][0]["ci"][0], "set_position [0.01 deg]");
     assert_eq!(io["boards"][0]["initial_ci"], json!([0, 1000, 900]));
-    // Inputs move outputs, under supervision.
+    // Inputs move outputs under supervision.
     let so = sim.json(&["ci", "1", "set_position=1500", "--for", "1.5"], 0);
     let position = so["so"]["position"].as_i64().unwrap();
     assert!((1450..1550).contains(&position), "{so}");
     let status = sim.json(&["status", "1"], 0);
     assert_eq!(status["boards"][0]["state"], "started", "the loop was stopped");
-    // D-35: written values are only assumed.
+    // D-35: the written values are only assumed.
     let par = sim.json(&["par", "1", "kp=150"], 0);
     assert_eq!(
         (par["par"][0]["assumed"].clone(), par["par"][1]["assumed"].clone()),
@@ -136,17 +136,18 @@ fn names_inputs_and_motion() {
     );
 }
 
-/// P-17, D-08, D-50: while a PC runs the boards, a second PC is refused. After the loss of the first PC the boards become safe.
+/// P-17, D-08, D-50: while one PC runs the boards, a second PC is refused. When the first PC is lost, the boards
+/// become safe.
 #[test]
 fn p17_one_master_at_a_time_and_none_is_safe() {
     let sim = Sim::numbered(&["--boards", "2"]);
     let run = sim.spawn(&["--json", "run", "1", "--active", "--ci", "1.set_position=1000"]);
     let mut peer = sim.peer();
     peer.wait("601#01010000");
-    // Listening is allowed: the names are requested before the loop runs, or known.
+    // Listening is allowed: the names were requested before the loop ran, or are known.
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["position"].is_i64(), "{so}");
-    // Requests for identity are allowed, too: the running PC interprets the answers correctly.
+    // Requests for identity are allowed as well, because the running PC interprets the answers correctly.
     let scan = sim.json(&["scan"], 0);
     assert_eq!(
         (scan["boards"][0]["state"].as_str(), scan["boards"][1]["state"].as_str()),
@@ -157,7 +158,7 @@ fn p17_one_master_at_a_time_and_none_is_safe() {
     let so = sim.json(&["so", "1", "--count", "1"], 0);
     assert!(so["so"]["current"].is_i64(), "the board still runs: {so}");
     sim.ucom(&["ci", "1", "set_position=5"]).ends(4);
-    // kill -9: no stop is sent, and the board itself must stop.
+    // After kill -9 no stop is sent, and the board itself must stop.
     ended_by(run, "-KILL");
     peer.wait("601#00000000");
     let status = sim.json(&["status", "1"], 0);
@@ -225,7 +226,7 @@ fn recordings_are_replayed_with_their_timing_and_without_intrusive_frames() {
     }
 }
 
-/// P-20: the probe measures a board that reads the protocol differently.
+/// P-20: the probe measures the profile of a board with another byte order.
 #[test]
 fn p20_probe_finds_big_endian_boards() {
     let chain = tempfile::tempdir().unwrap();
@@ -240,7 +241,8 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// Ctrl-C while a board moves stops it at once; the board's own supervision is only for a dead PC.
+/// Ctrl-C while a board moves stops it at once. The test does not wait for the board's own supervision, which is for
+/// a dead PC.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -249,7 +251,7 @@ fn an_interrupted_motion_is_stopped() {
     peer.wait("601#01010000");
     peer.wait("381#");
     signal(&moving, "-INT");
-    // Run = 0 of the PC, before the board's own timeout of 1.5 s.
+    // The PC sends run = 0 before the board's own timeout of 1.5 s.
     let since = std::time::Instant::now();
     peer.wait("601#00000000");
     assert!(since.elapsed() < std::time::Duration::from_millis(1000), "{:?}", since.elapsed());
@@ -257,7 +259,7 @@ fn an_interrupted_motion_is_stopped() {
     assert_eq!(output.code, 0, "{}", output.err);
 }
 
-/// D-15, D-34: an input that is set while our loop does not run is sent alone. Other inputs are not written.
+/// D-15, D-34: if this PC does not run the control loop, an input is sent alone and the other inputs are not written.
 #[test]
 fn d34_an_input_leaves_its_neighbours_alone() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -267,7 +269,7 @@ fn d34_an_input_leaves_its_neighbours_alone() {
     assert_eq!(peer.wait("341#"), "341#0000DC05");
 }
 
-/// D-36: boards with the same image, Program ID and date are not moved by the names of another such board.
+/// D-36: two boards have the same image, Program ID and date. The names of one are not used to move the other.
 #[test]
 fn d36_one_image_on_boards_that_differ() {
     let sim = Sim::numbered(&[]);
@@ -279,7 +281,7 @@ fn d36_one_image_on_boards_that_differ() {
     let other = io(&["--json", "io", "7"]);
     assert_ne!(first["ci"], other["ci"], "the simulator's boards differ");
     assert_eq!(other, io(&["--json", "io", "7", "--fresh"]));
-    // Files of another chain with the same program, date and board.
+    // Puts the names of another board into the cache file of a board with the same program and date.
     let kept = |board: &str| {
         let info = sim.json(&["info", board], 0)["boards"][0].clone();
         let end = format!("-{:04X}.json", info["flash_number"].as_u64().unwrap());
@@ -295,7 +297,7 @@ fn d36_one_image_on_boards_that_differ() {
     sim.ucom(&["ci", "7", &format!("{name}=1"), "--for", "0.5"]).ends(0);
 }
 
-/// A missing board among several stops the command before any change, and completed changes are reported.
+/// If one of several boards is missing, the command stops before any change. Completed changes are reported.
 #[test]
 fn several_boards_are_changed_only_when_all_answer() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -310,7 +312,7 @@ fn several_boards_are_changed_only_when_all_answer() {
     }
     let received = peer.all(100);
     assert!(!received.iter().any(|f| ["041", "1C1", "301"].contains(&&f[..3])), "{received:?}");
-    // The number is lost, and no status is shown that was not received.
+    // The board has lost its number, and no status is shown that was not received.
     let output = sim.ucom(&["status", "1", "--clear", "INIT"]).ends(0);
     assert!(output.out.contains("forgotten its number") && !output.out.contains("0x"), "{}", output.out);
     sim.ucom(&["init"]).ends(0);
@@ -321,7 +323,8 @@ fn several_boards_are_changed_only_when_all_answer() {
     assert!(output["error"]["hint"].as_str().unwrap().contains("ucom start 2"), "{output}");
 }
 
-/// D-T21: two boards with one flash number report at the same moment with the same bits: one frame for two boards.
+/// D-T21: two boards with the same flash number report at the same moment with the same bits. This gives one frame on
+/// the bus.
 #[test]
 fn d_t21_reports_that_are_alike_are_one_frame() {
     let sim = Sim::start(&["--boards", "2", "--flash-ids", "0x21,0x21"]);
@@ -336,7 +339,8 @@ fn d_t21_reports_that_are_alike_are_one_frame() {
     assert!(output.out.contains("more boards than reports"), "{}", output.out);
 }
 
-/// Single frames are sent unchanged. Frames that change boards need a confirmation, and then all are sent or none.
+/// Single frames are sent unchanged. Frames that change boards need a confirmation; then either all frames are sent
+/// or none.
 #[test]
 fn single_frames_can_be_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -354,7 +358,7 @@ fn single_frames_can_be_sent() {
     sim.ucom(&["send", "xyz"]).ends(2);
 }
 
-/// A name that is given twice is an error, because it is ambiguous.
+/// A name that the user gives twice is an error, because it is ambiguous.
 #[test]
 fn a_name_given_twice_is_refused() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -30,7 +30,7 @@ fn simulated_boards_conform() {
         assert_eq!(output["passed"], 2, "{output}");
         ucom(&["conformance", "--only", "D-T99"]).ends(2);
         ucom(&["conformance", "1", "--init"]).ends(2);
-        // Exactly one board must be named, and it must be the intended one.
+        // The user must select exactly one board, and it must be the intended one.
         let image = dir.path().join("image.bin");
         std::fs::write(&image, [0xA5; 256]).unwrap();
         let image = image.to_str().unwrap();
@@ -41,7 +41,7 @@ fn simulated_boards_conform() {
     }
 }
 
-/// Commands that change boards are refused while a control loop runs, and no option overrides that.
+/// The conformance tests that change boards are refused while a control loop runs, and no option overrides that.
 #[test]
 fn running_loops_are_stopped_first() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -64,7 +64,7 @@ fn d22_raw_status_sets_bits_outside_the_mask() {
         json!([{ "number": 1, "before": 0x1B, "expected": 0x5B, "after": 0x5B, "as_expected": true }])
     );
     assert_eq!(peer.wait("1C1#"), "1C1#0040");
-    // A single broadcast frame.
+    // This is a single broadcast frame.
     sim.ucom(&["status", "all", "--raw", "40:00"]).ends(0);
     let sent: Vec<String> = peer.all(100).into_iter().filter(|f| f.starts_with("1C")).collect();
     assert_eq!(sent, ["1C0#4000"]);

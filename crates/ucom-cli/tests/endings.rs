@@ -1,4 +1,4 @@
-//! Ends of commands: blocked readers, a second Ctrl-C, losses, and the state after a failed start.
+//! Ends of commands: blocked readers, a second Ctrl-C, lost boards, and the state after a failed start.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,8 +12,8 @@ use common::{Sim, ended_by};
 use serde_json::json;
 use test_kit::patience::until;
 
-/// D-50: stdout has no reader, and its pipe is full from the start. Heartbeats are sent, boards keep running and are
-/// stopped at the end, and the lost output is reported.
+/// D-50: stdout has no reader, and its pipe is full from the start. Heartbeats are still sent, boards keep running
+/// and are stopped at the end, and the lost output is reported.
 #[test]
 fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -44,7 +44,7 @@ fn d50_a_blocked_stdout_does_not_stop_heartbeats() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// A blocked reader does not keep `so` from receiving Ctrl-C; a reader that has disconnected ends it.
+/// If the reader of `so` is blocked, Ctrl-C still works. If the reader has disconnected, `so` ends.
 #[test]
 fn outputs_that_nobody_reads() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -81,7 +81,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
         let child = sim.spawn(words);
         peer.wait(wait_for);
         std::thread::sleep(Duration::from_millis(100));
-        // The boards no longer answer: the clean-up takes time.
+        // The boards no longer answer, so the clean-up takes time.
         sim.signal("-STOP");
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
@@ -96,7 +96,7 @@ fn a_second_ctrl_c_ends_at_once_and_prints_what_is_left() {
     }
 }
 
-/// Signals that come almost together count as one, and one signal cancels in the normal order.
+/// Signals that come almost together are treated as one signal, which cancels in the normal order.
 #[test]
 fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -107,11 +107,11 @@ fn ctrl_c_and_a_wrapper_s_signal_are_one() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// D-51: a board that is lost while others are being started counts as lost.
+/// D-51: a board that is lost while others are being started is reported as lost.
 #[test]
 fn d51_losses_during_the_start_count() {
     let sim = Sim::numbered(&["--boards", "3"]);
-    // Boards send a heartbeat a second; this PC has a shorter timeout.
+    // Boards send a heartbeat each second, and this PC has a shorter timeout.
     let profile = sim.file("p.toml", b"alive.dsp_period = 20\nalive.dsp_lost = 40\n");
     let words = ["--json", "--profile", &profile, "run", "all", "--on-lost", "report", "--for", "0.01"];
     let output = sim.ucom(&words).ends(5);
@@ -135,7 +135,7 @@ fn d37_outputs_are_made_safe_although_a_board_is_silent() {
     assert!(output.err.contains("board 1: "), "{}", output.err);
 }
 
-/// P-19: a refusal or a failure leaves applications in their earlier state.
+/// P-19: after a refusal or a failure, applications are in their earlier state.
 #[test]
 fn p19_a_refused_run_leaves_nothing_started() {
     let sim = Sim::numbered(&["--boards", "3"]);
@@ -169,8 +169,8 @@ fn a_reset_of_nobody_is_refused() {
     sim.ucom(&["info", "1"]).ends(0);
 }
 
-/// D-26, D-51: a board that has rebooted during the run counts as lost and is not reported as stopped. The exit code is 5, and the
-/// board's number is named.
+/// D-26, D-51: a board that has rebooted during the run is reported as lost and not as stopped. The exit code is 5,
+/// and the message contains the board's number.
 #[test]
 fn d26_a_board_that_reboots_under_way_fails_the_run() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -189,7 +189,7 @@ fn d26_a_board_that_reboots_under_way_fails_the_run() {
     assert_eq!(sim.status_byte("1"), 0x1B);
 }
 
-/// Like the test above, if every board answers in the end: an unrequested report is still a failure.
+/// Like the test above, but every board answers at the end: an unrequested report is still a failure.
 #[test]
 fn d26_a_reboot_counts_even_if_the_board_answers() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -203,7 +203,7 @@ fn d26_a_reboot_counts_even_if_the_board_answers() {
     assert!(output.err.contains("a board has rebooted"), "{}", output.err);
 }
 
-/// A silent board does not keep others from being stopped: the stop is broadcast before any request.
+/// A silent board does not delay the stop of other boards, because the stop is broadcast before any request.
 #[test]
 fn a_stop_of_all_does_not_hang_on_one_board() {
     let mut sim = Sim::numbered(&["--boards", "3"]);
@@ -232,7 +232,7 @@ fn a_stop_of_all_does_not_hang_on_one_board() {
     ended_by(run, "-INT").ends(5);
 }
 
-/// Ctrl-C while a board is started only to read its names: the board does not stay started.
+/// Ctrl-C while a board is started only to read its names. Afterwards the board is not started.
 #[test]
 fn a_start_for_names_that_is_cancelled_is_undone() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -248,7 +248,7 @@ fn a_start_for_names_that_is_cancelled_is_undone() {
     }
 }
 
-/// Without a reader of stderr and with a full pipe, the second Ctrl-C ends the process nevertheless, and so does a failure.
+/// If stderr has no reader and its pipe is full, the second Ctrl-C still ends the process. A failure ends it as well.
 #[test]
 fn a_blocked_stderr_does_not_keep_the_process() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -274,7 +274,8 @@ fn a_blocked_stderr_does_not_keep_the_process() {
     }
 }
 
-/// A command that acts on boards completes, and ends with exit code 5 if its result was lost. A command that only prints ends at once.
+/// A command that acts on boards completes, and ends with exit code 5 if its result was lost. A command that only
+/// prints ends at once.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_lost_result_of_what_acts_is_a_fault() {
@@ -292,7 +293,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
         let mut command = sim.command();
         let child = command.args(words).stdin(Stdio::piped()).stdout(full()).stderr(Stdio::piped()).spawn();
         let child = child.unwrap();
-        // A frame for the output is on the bus.
+        // By now a frame that the command prints is on the bus.
         std::thread::sleep(Duration::from_millis(300));
         peer.send("641#0000");
         let output = ended(child).ends(code);
@@ -313,7 +314,7 @@ fn a_lost_result_of_what_acts_is_a_fault() {
     }
 }
 
-/// The second Ctrl-C ends every command in the same way: with exit code 5 and the remaining steps.
+/// The second Ctrl-C ends every command in the same way, with exit code 5 and the list of remaining steps.
 #[test]
 fn a_second_ctrl_c_is_the_same_everywhere() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -326,7 +327,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         &["replay", &log],
         &["sim", "--listen", "127.0.0.1:0"],
     ] {
-        // No reader of the output, and a full pipe: the first signal is received without effect.
+        // The output has no reader and its pipe is full, so the first signal has no visible effect.
         let (_reader, mut writer) = std::io::pipe().unwrap();
         writer.write_all(&[b'\n'; 65_536]).unwrap();
         let mut command = sim.command();
@@ -339,7 +340,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
         signal(&child, "-INT");
         std::thread::sleep(Duration::from_millis(300));
         let output = ended_by(child, "-INT");
-        // A process that could obey the first signal has ended by itself.
+        // A process that could react to the first signal has ended by itself.
         let alike = output.code == 5 && output.err.contains("ended at once; nothing was changed");
         assert!(
             alike || (words[0] == "replay" && output.code == 0),
@@ -350,7 +351,7 @@ fn a_second_ctrl_c_is_the_same_everywhere() {
     }
 }
 
-/// A decoder that waits for its stdin still receives Ctrl-C; earlier input is decoded.
+/// A decoder that waits for its stdin still reacts to Ctrl-C; earlier input is decoded.
 #[test]
 fn a_decoder_of_stdin_hears_ctrl_c() {
     let sim = Sim::start(&["--boards", "0"]);

@@ -1,4 +1,4 @@
-//! A closed terminal (SIGHUP) and `kill` (SIGTERM) end commands like Ctrl-C.
+//! A closed terminal (SIGHUP) and `kill` (SIGTERM) end commands in the same way as Ctrl-C.
 #![cfg(unix)]
 
 use crate::common;
@@ -33,7 +33,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // Long enough for a whole snapshot on a loaded computer: without a snapshot the loop has shown no values.
+        // Long enough for a complete snapshot on a loaded computer. Without a snapshot the command ends with an
+        // error.
         peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");
@@ -63,7 +64,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
     }
 }
 
-/// A recorder that is killed loses at most one second in each format. The missing remainder is reported if the format shows it.
+/// A recorder that is killed loses at most one second in each format. If the format shows that the end is missing,
+/// this is reported.
 #[test]
 fn a_killed_recorder_leaves_what_was_recorded() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -75,7 +77,7 @@ fn a_killed_recorder_leaves_what_was_recorded() {
         std::thread::sleep(Duration::from_millis(3_300));
         ended_by(child, "-KILL");
         let output = sim.ucom(&["decode", &file]).ends(0);
-        // Two packages at least every 10 ms, for more than a second.
+        // At least two packages every 10 ms, for more than a second.
         let frames = output.out.lines().count();
         assert!(frames > 200, "{ending}: {frames} frames; {}", output.err);
         assert!(ending != "mcap" || output.err.contains("broken off"), "{ending}: {}", output.err);

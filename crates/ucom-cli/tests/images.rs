@@ -1,11 +1,11 @@
-//! Accepted firmware: records, raw bytes in a `.bin`, and other files only on request.
+//! Accepted firmware files: records, raw binary in a `.bin` file, and other files only on request.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, image};
 
-/// A text file is refused with the place of the error before any frame is sent; images and targets are shown.
+/// A text file is refused with the position of the error before any frame is sent. The images and targets are shown.
 #[test]
 fn d40_a_text_is_never_flashed() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -39,7 +39,8 @@ fn d40_a_text_is_never_flashed() {
     assert!(output.err.contains("good.hex: Intel HEX, 4 bytes"), "{}", output.err);
 }
 
-/// No hint about a damaged record file leads to its characters on the board, and `--raw` does not either.
+/// No hint about a damaged record file leads the user to write its characters to the board, and `--raw` does not
+/// write them either.
 #[test]
 fn d46_raw_does_not_flash_records() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -77,7 +78,8 @@ fn d46_raw_does_not_flash_records() {
     assert!(peer.all(50).is_empty(), "nothing was sent");
 }
 
-/// A correct count record ends a file of S-records; gaps are filled on request, and the hint names the option.
+/// A count record with the right number ends a file of S-records. Gaps are filled on request, and the hint contains
+/// the option.
 #[test]
 fn count_records_and_gaps() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);
@@ -99,8 +101,8 @@ fn count_records_and_gaps() {
     assert!(output.contains("gap of 12 bytes at word address 0x2 filled with FF"), "{output}");
 }
 
-/// S-records of the boards' tool chain count words, those of other tools count bytes. The unit follows from the records, or from
-/// `--addresses`.
+/// The boards' tool chain writes S-record addresses in words, other tools in bytes. The unit follows from the
+/// records, or from `--addresses`.
 #[test]
 fn s_records_count_words_or_bytes() {
     let sim = Sim::numbered(&["--boards", "1", "--flash-ids", "0x21"]);

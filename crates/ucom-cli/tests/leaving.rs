@@ -1,5 +1,5 @@
-//! Boards that leave their control loop while `ucom run` supervises them (D-37): reported at once, as an event of
-//! `--json`, by outdated values, and by exit code 5.
+//! Boards leave their control loop while `ucom run` supervises them (D-37). The command reports this at once, as an
+//! event of `--json`, by outdated values, and by exit code 5.
 
 use crate::common;
 
@@ -62,7 +62,7 @@ fn of(board: u8, name: &str) -> impl Fn(&Value) -> bool {
     move |event| event["event"] == name && event["board"] == board
 }
 
-/// The board misses the PC's heartbeats (D-50) and leaves its loop, while the other one continues.
+/// One board misses the PC's heartbeats (D-50) and leaves its loop, while the other board continues.
 #[test]
 fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -74,7 +74,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!(so["stale"], true, "{so}");
     let so = run.until(of(2, "so"));
     assert_eq!(so["stale"], false, "{so}");
-    // The age of old values grows, and they never get a new time.
+    // The age of old values grows, and their time does not change.
     let (first, second) = (run.until(of(1, "so")), run.until(of(1, "so")));
     assert_eq!((first["time_s"].clone(), &second["stale"]), (second["time_s"].clone(), &Value::Bool(true)));
     assert!(second["age_s"].as_f64() > first["age_s"].as_f64(), "{first} {second}");
@@ -86,7 +86,7 @@ fn d37_a_board_that_misses_the_pc_is_named_and_its_values_are_stale() {
     assert_eq!([0, 1].map(|i| status["boards"][i]["status_byte"].as_u64()), [Some(0x1B); 2], "stopped");
 }
 
-/// Another PC stops all boards: each is named, without `--json` as text.
+/// Another PC stops all boards. Each of them is reported; without `--json` as text.
 #[test]
 fn d37_boards_that_another_pc_stops_are_named() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -105,14 +105,14 @@ fn d37_boards_that_another_pc_stops_are_named() {
     sim.peer().wait("382#");
     std::thread::sleep(Duration::from_millis(300));
     sim.peer().send("600#00000000");
-    // At once, while the run continues.
+    // The report comes at once, while the run continues.
     assert!(lines.any(|line| line.contains("board 2 has left its control loop by itself")));
     assert!(child.try_wait().unwrap().is_none());
     signal(&child, "-INT");
     assert_eq!(child.wait().unwrap().code(), Some(5));
 }
 
-/// Boards that stay silent are stopped by policy, and no board is left to supervise: the run ends by itself.
+/// Boards that stay silent are stopped by policy. Then no board is left to supervise, and the run ends by itself.
 #[test]
 fn d51_a_run_without_boards_ends_by_itself() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -125,7 +125,7 @@ fn d51_a_run_without_boards_ends_by_itself() {
     assert!(err.contains("no board is in its control loop any more: the run ends"), "{err}");
 }
 
-/// Section 8: a board whose heartbeats are late, lost and back again makes an event each.
+/// Section 8: if a board's heartbeats are late, lost and back again, each change is an event.
 #[test]
 fn p15_late_lost_and_back_are_events() {
     let mut sim = Sim::numbered(&["--boards", "2"]);

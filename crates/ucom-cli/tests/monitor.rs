@@ -1,4 +1,4 @@
-//! `ucom monitor` at a terminal, from its start to its end, and its lines for other readers.
+//! `ucom monitor` on a terminal from its start to its end, and its lines for other outputs.
 #![cfg(unix)]
 
 use crate::common;
@@ -48,7 +48,7 @@ fn the_view_shows_boards_and_its_stop_key_stops() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// A board that falls silent while it runs is named first.
+/// A board that becomes silent while it runs is listed first.
 #[test]
 fn d51_a_board_that_falls_silent_leads_the_view() {
     let mut sim = Sim::numbered(&["--boards", "2"]);
@@ -67,7 +67,7 @@ fn d51_a_board_that_falls_silent_leads_the_view() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// The view ends with its terminal, and line output ends with its reader.
+/// The view ends when its terminal closes, and line output ends when its reader disconnects.
 #[test]
 fn it_ends_when_nobody_looks_any_more() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -1,12 +1,12 @@
-//! `--overwrite` overwrites a file and skips no check of the bus; `--force` skips a check of the bus and overwrites no
-//! file.
+//! `--overwrite` overwrites a file and skips no check of the bus. `--force` skips a check of the bus and overwrites
+//! no file.
 #![cfg(unix)]
 
 use crate::common;
 
 use common::{Sim, ended_by, ucom};
 
-/// The hint of the file check, followed while boards run, resets no board.
+/// A user who follows the hint of the file check while boards run resets no board.
 #[test]
 fn writing_over_a_file_never_resets_a_running_chain() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -62,7 +62,8 @@ fn force_writes_over_no_file() {
     }
 }
 
-/// `record` has no check of the bus: its `--force` of older scripts means `--overwrite`, and no help shows it.
+/// `record` has no check of the bus. Its `--force` of older scripts means `--overwrite`, and the help does not list
+/// it.
 #[test]
 fn record_takes_force_for_overwrite() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -20,7 +20,7 @@ fn started() -> (Sim, String) {
     (sim, table)
 }
 
-/// D-11: values are in the units of the signal table, both ways; the raw word is always accepted.
+/// D-11: values are read and shown in the units of the signal table; the raw word is always accepted.
 #[test]
 fn d11_values_have_the_units_of_the_signal_table() {
     let (sim, table) = started();
@@ -34,7 +34,7 @@ fn d11_values_have_the_units_of_the_signal_table() {
         refused["error"]["message"],
         "board 1: CI `set_position`: 61 deg is outside -60.00..60.00 deg"
     );
-    // Without the table it would be the word 61, that is 0.61 degrees.
+    // Without the table this value would be the word 61, which is 0.61 degrees.
     let bare = ucom(&["ci", "1", "set_position=61"]).ends(4).json();
     let message = bare["error"]["message"].as_str().unwrap();
     assert!(message.contains("the unit is missing: `61deg`"), "{bare}");
@@ -54,7 +54,8 @@ fn d11_values_have_the_units_of_the_signal_table() {
     for words in [["par", "1", "kd=2mA s/deg"], ["ci", "1", "set_position=1deg"]] {
         assert!(ucom(&words).ends(0).err.contains("has no SO `nobody`"), "{words:?}");
     }
-    // Scaled without a unit: without the table a bare number would be the raw word.
+    // This signal has a scale and no unit. A bare number is refused, because without the table it would be the raw
+    // word.
     let output = ucom(&["par", "1", "min_position=2"]).ends(4).json();
     assert!(output["error"]["message"].as_str().unwrap().contains("names no unit"), "{output}");
     ucom(&["par", "1", "min_position=0x0004"]).ends(0);
@@ -64,12 +65,12 @@ fn d11_values_have_the_units_of_the_signal_table() {
     assert!(dbc.err.contains("has no SO `nobody`"), "{}", dbc.err);
     let dbc = dbc.out;
     assert!(dbc.contains("set_position m0 : 16|16@1- (0.01,0) [-60|60] \"deg\""), "{dbc}");
-    // An invalid table is reported with the place of the error.
+    // An invalid table is reported with the position of the error.
     let wrong = sim.file("wrong.toml", b"[[program]]\nprogram_id = 1\npar.kp = { scales = 1 }\n");
     assert!(sim.ucom(&["--edges", &wrong, "io", "1"]).ends(2).err.contains("line 3"));
 }
 
-/// D-11: with a table values need units; a program that is not in the table accepts only raw words.
+/// D-11: with a table, values need units. If the program is not in the table, only raw words are accepted.
 #[test]
 fn d11_a_table_without_the_program_refuses_bare_numbers() {
     let (sim, _) = started();
@@ -107,7 +108,8 @@ fn files_are_not_written_over() {
     }
 }
 
-/// An unwritable place is detected before any frame is sent, and a file created for no result is removed.
+/// If a file cannot be written, this is detected before any frame is sent. If there is no result, the file created
+/// for it is removed.
 #[test]
 fn outputs_are_opened_before_anything_is_sent() {
     let (sim, _) = started();
@@ -125,14 +127,15 @@ fn outputs_are_opened_before_anything_is_sent() {
         assert!(output.err.contains("nothing was sent"), "{words:?}: {}", output.err);
     }
     assert_eq!(peer.all(100), [""; 0]);
-    // Board 9 does not exist: the files opened for it are removed.
+    // Board 9 does not exist, so the files opened for it are removed.
     let file = sim.path("new");
     sim.ucom(&["par", "9", "--save", &file]).ends(3);
     sim.ucom(&["dbc", "9", "--out", &file]).ends(3);
     assert!(!std::path::Path::new(&file).exists());
 }
 
-/// D-35: parameters have no answer, so the application must still answer afterwards. Otherwise the value is unknown.
+/// D-35: the board does not answer parameters, so the command checks that the application still answers afterwards.
+/// Otherwise the value is unknown.
 #[test]
 fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     let (mut sim, _) = started();
@@ -143,7 +146,7 @@ fn d35_a_board_that_stops_answering_while_it_is_written_to_is_a_fault() {
     assert!(message.contains("written before: board 1"), "{output}");
 }
 
-/// D-35: earlier written values are remembered, and never shown as the current ones.
+/// D-35: values that were written earlier are remembered, and never shown as the current ones.
 #[test]
 fn d35_a_parameter_is_assumed_once_and_then_only_remembered() {
     let (sim, _) = started();
@@ -168,7 +171,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     let checked = sim.json(&["par", "--apply", &file, "--dry-run"], 0);
     assert_eq!(checked["written"], false);
     let apply = |text: &str| sim.ucom(&["par", "--apply", &sim.file("bad.yaml", text.as_bytes())]);
-    // The error is in the second board: the first one gets no parameters either.
+    // The error is in the second board, so the first board gets no parameters either.
     let end = good.rfind("kp: 0x0078").unwrap();
     let of_second = |with: &str| format!("{}{with}{}", &good[..end], &good[end + 10..]);
     let output = apply(&of_second("kq: 1")).ends(4);
@@ -190,7 +193,7 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert!(apply(&good.replace("board: 2", "board: 7")).ends(4).err.contains("board 7: it does not answer"));
     assert!(apply(&of_second("kp: [1")).ends(2).err.contains("line"));
     assert!(apply(&of_second("kp: x")).ends(2).err.contains("board 2, `kp`"));
-    // A signal by number without quotation marks is a comment.
+    // Without quotation marks, a signal selected by its number is a comment.
     let empty = "boards:\n  - board: 1\n    flash_number: 0x21\n    program_id: any\n    par:\n      #0: 5\n";
     assert!(apply(empty).ends(2).err.contains("no value in it"));
     sim.ucom(&["par", "3", "--apply", &file]).ends(2);
@@ -205,12 +208,12 @@ fn a_file_is_applied_whole_or_not_at_all() {
     assert_eq!(written, ["3C1#00007800", "3C2#00007800"]);
 }
 
-/// Section 7: initial inputs, then those of the file, its parameters, and only then the loop. The command line
-/// overrides the file.
+/// Section 7: the board first gets the initial inputs, then the inputs and parameters of the file, and only then the
+/// loop is started. Values on the command line override the file.
 #[test]
 fn a_run_takes_parameters_and_first_inputs_from_a_file() {
     let (sim, _) = started();
-    // The names are known from now on.
+    // From now on the names are known.
     sim.ucom(&["io", "1"]).ends(0);
     sim.ucom(&["stop", "all"]).ends(0);
     let file = |value: &str| {
@@ -251,7 +254,7 @@ fn pages_and_templates() {
     assert_eq!(io["boards"][0]["edges"]["so"][0]["scale"], 0.01);
 }
 
-/// A board of the file that does not answer must not be left out, for any selection of boards.
+/// If a board of the file does not answer, a run of all boards is refused.
 #[test]
 fn a_run_of_all_boards_misses_those_of_the_file() {
     let (sim, _) = started();
@@ -263,6 +266,6 @@ fn a_run_of_all_boards_misses_those_of_the_file() {
     let output = sim.json(&["run", "all", "--params", &file, "--for", "0.2"], 4);
     assert!(output["error"]["message"].as_str().unwrap().contains("31"), "{output}");
     assert!(!peer.all(100).iter().any(|f| ["341", "3C1", "541"].contains(&&f[..3])));
-    // Named boards are those of the command line.
+    // If the command line lists boards, only these are run.
     sim.ucom(&["run", "1", "--params", &file, "--for", "0.2"]).ends(0);
 }

@@ -1,4 +1,4 @@
-//! `ucom repair` against `ucom sim`: one board gets its number back, the others keep theirs.
+//! `ucom repair` against `ucom sim`: one board gets its number back, and the others keep theirs.
 #![cfg(unix)]
 
 use crate::common;
@@ -22,7 +22,8 @@ fn rebooted() -> Sim {
     }
 }
 
-/// 5.4: pin off three times, number, identity, pin on and read back; the flash number comes from the inventory.
+/// 5.4: the pin is switched off three times; the board gets its number, its identity is read, the pin is switched on
+/// and read back. The flash number comes from the inventory.
 #[test]
 fn d21_a_board_gets_its_number_back() {
     let sim = rebooted();
@@ -34,7 +35,7 @@ fn d21_a_board_gets_its_number_back() {
     assert_eq!(sent, ["1C2#0200", "1C2#0200", "1C2#0200", "282#", "1C2#0202"]);
     let all = sim.json(&["scan"], 0);
     assert_eq!(all["boards"].as_array().unwrap().len(), 3, "{all}");
-    // A board with its number is unchanged, and so are its neighbours.
+    // A board that has its number is not changed, and its neighbours are not changed either.
     let output = sim.ucom(&["repair", "2"]).ends(0);
     assert!(output.out.contains("board 2 has its number"), "{}", output.out);
     assert_eq!(sim.json(&["scan"], 0)["boards"], all["boards"]);
@@ -46,7 +47,7 @@ fn repairs_that_are_refused() {
     let sim = rebooted();
     let output = sim.json(&["repair", "1", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
-    // The board that would take the number is not the intended one: it does not keep the number.
+    // The board that would take the number is not the intended one, so it does not keep the number.
     let output = sim.json(&["repair", "2", "--flash-id", "0x77"], 4);
     assert_eq!(output["error"]["code"], "wrong-board", "{output}");
     assert_eq!(sim.json(&["scan"], 0)["boards"].as_array().unwrap().len(), 2);
@@ -54,7 +55,7 @@ fn repairs_that_are_refused() {
     assert!(output.err.contains("--flash-id"), "{}", output.err);
     sim.ucom(&["repair", "2", "--inventory", "/nowhere.toml"]).ends(2);
     sim.ucom(&["repair", "2"]).ends(0);
-    // All boards have their numbers: none takes this one.
+    // All boards have their numbers, so none of them takes this one.
     let output = sim.json(&["repair", "9", "--flash-id", "0x77"], 3);
     assert_eq!(output["error"]["code"], "no-answer", "{output}");
 }

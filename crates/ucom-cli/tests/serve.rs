@@ -60,13 +60,13 @@ fn an_agent_of_a_simulated_chain_is_marked_as_such_and_ends_with_a_signal() {
     assert_eq!(code, Some(0), "{err}");
     assert!(err.contains("operator's token, new in") && err.contains("`cat "), "{err}");
     assert!(!err.contains(&http(&ready).operator) && !err.contains("#token="), "{err}");
-    // The tokens stay.
+    // The tokens are the same in the next start.
     let (child, again) = serve(dir.path(), &["--sim"]);
     assert_eq!(http(&again).operator, http(&ready).operator);
     signal(&child, "-INT");
     let (code, err) = over(child);
     assert_eq!((code, err.contains("token")), (Some(0), false), "{err}");
-    // The link is requested, and the reader of the output may keep it.
+    // The user requests the link. It is still not printed, because the reader of the output may store it.
     let (child, again) = serve(dir.path(), &["--sim", "--link"]);
     signal(&child, "-INT");
     let (code, err) = over(child);
@@ -89,7 +89,7 @@ fn the_link_with_the_token_is_printed_on_a_terminal() {
     assert_eq!(terminal.ends(&mut child), 0);
 }
 
-/// Boards that the agent has started stop with it, and the loss of the bus ends the agent.
+/// When the agent ends, it stops the boards that it has started. The loss of the bus ends the agent.
 #[test]
 fn what_an_agent_has_started_is_stopped_with_it() {
     let sim = Sim::numbered(&["--boards", "2"]);

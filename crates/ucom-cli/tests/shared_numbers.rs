@@ -1,4 +1,4 @@
-//! Two boards with one number: every command reports it and changes no board, `stop` stops both.
+//! Two boards with the same number: every command reports this and changes no board, and `stop` stops both.
 #![cfg(unix)]
 
 use crate::common;
@@ -12,7 +12,8 @@ fn sharing() -> Sim {
     sim
 }
 
-/// D-24: exit code 4, both flash numbers, the next command; only requests and heartbeats are sent.
+/// D-24: the exit code is 4, and the message contains both flash numbers and the next command. Only requests and
+/// heartbeats are sent.
 #[test]
 fn d24_every_command_names_it_and_changes_nothing() {
     let sim = sharing();
@@ -55,7 +56,7 @@ fn d24_every_command_names_it_and_changes_nothing() {
         doctor.contains("✗ two boards answer to number 1") && !doctor.contains("init wire behind"),
         "{doctor}"
     );
-    // After a new numbering there is no error.
+    // After `init` has given new numbers, there is no error.
     sim.ucom(&["init"]).ends(0);
     sim.ucom(&["info", "all"]).ends(0);
 }

@@ -1,11 +1,11 @@
-//! Silent boards and buses: the request, the place, the reason and the next command are always reported.
+//! Silent boards and buses. The report always contains the request, the place, the reason and the next command.
 
 use crate::common;
 
 use cli_kit::trial::ended;
 use common::Sim;
 
-/// A recorder of a silent bus reports it once, to users only; with frames it reports nothing.
+/// A recorder of a silent bus reports this once, only to users. It does not report it if frames arrive.
 #[test]
 fn a_recorder_of_a_silent_bus_reports_it_once() {
     let sim = Sim::start(&["--boards", "2"]);
@@ -22,7 +22,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     let recorded = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
     let its = recorded.clone();
     let ask = std::thread::spawn(move || {
-        // Wait until the recorder is on the bus and has its frame, on any machine.
+        // Sends frames until the recorder has one, because a slow computer starts it late.
         while !its.load(std::sync::atomic::Ordering::Relaxed) {
             peer.send("240#");
             std::thread::sleep(std::time::Duration::from_millis(25));
@@ -34,7 +34,7 @@ fn a_recorder_of_a_silent_bus_reports_it_once() {
     assert!(!output.err.contains("nothing has come"), "{}", output.err);
 }
 
-/// Each board without names is reported, with its cause and its next command.
+/// Each board without names is reported with the cause and the next command.
 #[test]
 fn every_board_without_names_is_reported() {
     let sim = Sim::start(&["--boards", "3"]);

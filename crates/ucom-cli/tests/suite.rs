@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, to link only once: each file here is a module of it.
+//! All tests of the crate in one program, so that it is linked only once. Each file in this folder is a module of it.
 mod bus_off;
 mod chain;
 mod common;

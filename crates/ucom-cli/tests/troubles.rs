@@ -1,5 +1,5 @@
-//! The part of docs/troubles.md about `ucom`: the real program runs each case against `ucom sim`. `UPDATE_DOCS=1`
-//! writes it again.
+//! The part of docs/troubles.md about `ucom`. The real program runs each case against `ucom sim`. `UPDATE_DOCS=1`
+//! rewrites that part.
 #![cfg(target_os = "linux")]
 
 use crate::common;
@@ -13,7 +13,7 @@ use cli_kit::trial::signal;
 use common::Sim;
 use test_kit::page::{Page, Printed, blurred};
 
-/// The bus as the page names it.
+/// Name of the bus on the page.
 const BUS: &str = "socketcand:localhost:29536/can0";
 
 #[test]
@@ -27,7 +27,7 @@ fn the_page_of_troubles_has_what_ucom_prints() {
     page.finish();
 }
 
-/// Commands of a user at this chain, with both streams in one, as on a terminal.
+/// Commands of a user for this chain, with both streams in one, as on a terminal.
 trait Desk {
     fn shell(&self, shown: &str) -> Command;
     fn seen(&self, code: Option<i32>, text: &str) -> Printed;
@@ -49,7 +49,7 @@ impl Desk for Sim {
         }
         let address = self.url.split(['/']).next().unwrap().trim_start_matches("socketcand:").to_owned();
         let real = shown.replace("localhost:29536", &address);
-        // The command replaces the shell, so that a signal reaches it.
+        // The command replaces the shell, so it receives signals directly.
         shell
             .args(["-c", &format!("exec 2>&1\nexec {real}")])
             .current_dir(self.dir.path())
@@ -96,7 +96,7 @@ fn of_a_moment(printed: Printed) -> Printed {
     Printed { code: printed.code, text: blurred(&text) }
 }
 
-/// Boards with their numbers.
+/// Starts a simulated chain with numbered boards.
 fn numbered(options: &[&str]) -> Sim {
     let sim = Sim::numbered(options);
     sim.file("image.bin", &common::image(60_000, 7));
@@ -175,7 +175,7 @@ fn running(page: &mut Page) {
         let mut sim = numbered(&["--boards", "2"]);
         let child = sim.start(run);
         sim.peer().wait("382#");
-        // Time for the start to end.
+        // Time for the start to complete.
         std::thread::sleep(Duration::from_millis(1_000));
         sim.fault("power-loss board=1");
         result_last(of_a_moment(sim.all_of(child)))

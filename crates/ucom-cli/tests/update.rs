@@ -14,7 +14,7 @@ fn program_id(sim: &Sim, board: &str) -> serde_json::Value {
     sim.json(&["info", board], 0)["boards"][0]["program_id"].clone()
 }
 
-/// U-1 to U-10 on 60 KiB: verified, then up to date; the golden Program ID of 13.3.
+/// U-1 to U-10 with 60 KiB: the board is verified, then up to date. The Program ID is the golden one of 13.3.
 #[test]
 fn d46_update_is_verified_and_then_up_to_date() {
     let sim = chain("2");
@@ -35,7 +35,7 @@ fn d46_update_is_verified_and_then_up_to_date() {
     assert_eq!((update["outcome"].as_str(), update["program_id"].as_u64()), (Some("running"), Some(0x4B3F)));
 }
 
-/// D-41: with `--name-target` the header names the board, else it is for any board.
+/// D-41: with `--name-target` the header is for this board only, otherwise for any board.
 #[test]
 fn d41_the_header_names_the_board_if_wanted() {
     let sim = Sim::numbered(&["--boards", "2", "--flash-ids", "0x21,0x42"]);
@@ -52,25 +52,25 @@ fn d41_the_header_names_the_board_if_wanted() {
     }
 }
 
-/// Exit codes 2 and 4: no board is changed.
+/// Exit codes 2 and 4, with which no board is changed.
 #[test]
 fn d46_refusals_change_nothing() {
     let sim = chain("3");
     let file = sim.file("app.bin", &image(2000, 2));
     let before = program_id(&sim, "1");
-    // Another board than the intended one.
+    // The board is not the intended one.
     let update = sim.json(&["update", "1", &file, "--flash-id", "0x77"], 4);
     assert_eq!(update["boards"][0]["outcome"], "not-started", "{update}");
     assert!(update["boards"][0]["error"]["message"].as_str().unwrap().contains("0x0021"), "{update}");
     sim.ucom(&["update", "1-2", &file, "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &sim.file("half.hex", b":10000000"), "--flash-id", "0x21"]).ends(2);
     sim.ucom(&["update", "1", &file, "--date", "yesterday"]).ends(2);
-    // A list needs the identity of each board.
+    // For a list, the identity of each board is needed.
     let output = sim.ucom(&["--json", "update", "all", &file, "--inventory", "/nowhere.toml"]).ends(4);
     assert_eq!(output.json()["error"]["code"], "no-inventory");
     let dry = sim.json(&["update", "all", &file, "--dry-run"], 0);
     assert_eq!((dry["dry_run"].as_bool(), dry["boards"].as_array().unwrap().len()), (Some(true), 3));
-    // Refused while a board runs.
+    // The update is refused while a board runs.
     let run = sim.spawn(&["--json", "run", "3"]);
     sim.peer().wait("603#01000000");
     sim.ucom(&["update", "1", &file]).ends(4);
@@ -80,11 +80,11 @@ fn d46_refusals_change_nothing() {
     sim.ucom(&["update", "9", &file, "--flash-id", "0x77"]).ends(3);
 }
 
-/// Exit code 1: the board reported an error before the erase; 5: after it.
+/// Exit code 1 if the board reported an error before the erase, 5 if after it.
 #[test]
 fn d46_errors_before_and_after_the_erase() {
     let mut sim = chain("2");
-    // An image beyond the application area.
+    // The image is larger than the application area.
     let file = sim.file("large.bin", &image(100 * 1024, 3));
     let before = program_id(&sim, "1");
     let update = sim.json(&["update", "1", &file], 1);
@@ -96,8 +96,8 @@ fn d46_errors_before_and_after_the_erase() {
     assert_eq!(update["boards"][0]["attempts"], 3, "P-11: exactly three attempts: {update}");
 }
 
-/// An update session: all boards of the inventory, one fails, the others succeed; the next run does only the remaining
-/// one.
+/// An update session for all boards of the inventory: one board fails and the others succeed. The next run updates
+/// only the remaining one.
 #[test]
 fn an_update_session_goes_on_and_is_resumed() {
     let mut sim = chain("3");
@@ -106,10 +106,10 @@ fn an_update_session_goes_on_and_is_resumed() {
     sim.ucom(&["update", "1-3", &file]).ends(3);
     let infos = sim.json(&["scan"], 0);
     assert_eq!(infos["boards"].as_array().unwrap().len(), 2);
-    // Board 2 comes back after a power cycle: without a number, and repaired by the update itself or by an init.
+    // Board 2 comes back without a number after a power cycle. The update itself or `init` gives it a number again.
     drop(sim);
     let sim = chain("3");
-    // With a fixed date: at midnight the two runs would have different dates, and U-3 compares dates, too.
+    // The date is fixed because U-3 also compares dates, and at midnight the two runs would have different dates.
     let file = file_in(&sim);
     let update = |boards| sim.json(&["update", boards, &file, "--date", "2009-06-01"], 0);
     assert_eq!(update("1,3")["boards"][1]["outcome"], "verified");
@@ -121,14 +121,15 @@ fn file_in(sim: &Sim) -> String {
     sim.file("session.bin", &image(4000, 6))
 }
 
-/// P-12: Ctrl-C in the middle of a block: SETSTATUS(04,00) is sent, the exit code after the erase is 5, and the board is usable.
+/// P-12: Ctrl-C in the middle of a block. SETSTATUS(04,00) is sent, the exit code after the erase is 5, and the board
+/// can be used.
 #[test]
 fn p12_cancel_leaves_the_board_usable() {
     let sim = chain("1");
     let file = sim.file("app.bin", &image(60 * 1024, 7));
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &file]);
-    // In the second cycle: the first cycle has 961 blocks with a READY each.
+    // This is in the second cycle, because the first cycle has 961 blocks with a READY each.
     peer.wait_for(1200, "181#");
     signal(&update, "-INT");
     peer.wait("1C1#0400");
@@ -148,14 +149,14 @@ fn p13_a_killed_update_is_recovered_by_the_next() {
     let update = sim.spawn(&["update", "1", &file]);
     peer.wait_for(1100, "181#");
     ended_by(update, "-KILL");
-    // Frames that the killed process has passed to its adapter are still sent, on a busy machine for some time. Until then another PC is
-    // on the bus.
+    // Frames that the killed process has passed to its adapter are still sent, for some time on a busy computer.
+    // Until they end, the next command would find another PC on the bus.
     while !peer.all(1000).is_empty() {}
     let update = sim.json(&["update", "1", &file], 0);
     assert_eq!(update["outcome"], "verified", "{update}");
 }
 
-/// Power loss of the board in the second cycle: it comes up without an application, an init and an update repair it.
+/// The board loses power in the second cycle. It comes up without an application, and `init` and an update repair it.
 #[test]
 fn d46_power_loss_in_mid_update() {
     let mut sim = chain("2");
@@ -168,11 +169,11 @@ fn d46_power_loss_in_mid_update() {
     assert!(["verified", "up-to-date"].contains(&update["outcome"].as_str().unwrap()), "{update}");
 }
 
-/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, with boards that are done. Before the erase the
-/// code is 3.
+/// D-46: if the bus fails after the erase, the exit code is 5 and the report is complete, including boards that are
+/// done. Before the erase the code is 3.
 #[test]
 fn d46_a_bus_that_fails_leaves_the_report() {
-    // READYs of board 2 before the simulator is killed; the first cycle has 961.
+    // Number of READYs of board 2 before the simulator is killed; the first cycle has 961.
     for (blocks, code, outcome) in [(300, 3, "not-started"), (1200, 5, "incomplete")] {
         let sim = chain("2");
         let file = sim.file("app.bin", &image(60 * 1024, 11));
@@ -191,7 +192,7 @@ fn d46_a_bus_that_fails_leaves_the_report() {
     }
 }
 
-/// Like the test above, as text: outcome, cause and next step.
+/// Like the test above, with text output: outcome, cause and next step.
 #[test]
 fn d46_a_bus_that_fails_is_told_in_words() {
     let sim = chain("1");
@@ -226,7 +227,7 @@ fn p12_cancelled_before_the_erase() {
     assert_eq!(program_id(&sim, "1"), before);
 }
 
-/// D-08: a dry run checks for another PC, too.
+/// D-08: a dry run also checks for another PC.
 #[test]
 fn d08_a_dry_run_sees_another_pc() {
     let mut sim = chain("1");
@@ -237,7 +238,7 @@ fn d08_a_dry_run_sees_another_pc() {
     assert_eq!(report["boards"][0]["error"]["code"], "foreign-master", "{report}");
 }
 
-/// A single transfer serves several boards. The board outside the group keeps its program.
+/// A group update is a single transfer for several boards. A board outside the group keeps its program.
 #[test]
 fn d46_a_group_is_one_transfer() {
     let sim = chain("4");
@@ -253,7 +254,8 @@ fn d46_a_group_is_one_transfer() {
     assert_eq!(program_id(&sim, "3"), before);
 }
 
-/// Two images: each goes to the target of the profile's plan, and the report has both. Wrong combinations are refused.
+/// Two images: each is written to the target of the profile's plan, and the report has both. Wrong combinations are
+/// refused.
 #[test]
 fn d40_two_images_by_plan() {
     let files = tempfile::tempdir().unwrap();
@@ -302,7 +304,8 @@ fn d40_two_images_by_plan() {
     }
 }
 
-/// U-10 with raw files: written, not verified, and reported so; verified against a named Program ID.
+/// U-10 with raw files: the program is written and reported as not verified. If the user gives a Program ID, the
+/// program is verified against it.
 #[test]
 fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -310,7 +313,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     let profile = profile.path().to_str().unwrap();
     let sim = Sim::start(&["--boards", "1", "--profile", profile]);
     sim.ucom(&["--profile", profile, "init"]).ends(0);
-    // Output of a tool chain: header and data of each cycle in separate files.
+    // A tool chain has written header and data of each cycle into separate files.
     let golden = golden();
     let cycle = |cycle, date| {
         let header = ucom::Header {
@@ -341,7 +344,7 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
         (&false.into(), &serde_json::Value::Null)
     );
     assert!(report["unverifiable"]["hint"].as_str().unwrap().contains("--expect-program-id"), "{report}");
-    // No answer of the board covers the second file: it is written each time (D-62).
+    // The board's answer does not cover the second file, so it is written each time (D-62).
     let report = with(&["--expect-program-id", "0x4B3F"]).ends(0).json();
     assert_eq!((&report["outcome"], &report["boards"][0]["verified"]), (&"verified".into(), &true.into()));
     let report = with(&["--expect-program-id", "0x4B3F", "--force"]).ends(0).json();
@@ -350,7 +353,8 @@ fn u10_raw_files_are_verified_when_their_program_id_is_named() {
     assert_eq!(report["boards"][0]["error"]["code"], "not-verified", "{report}");
 }
 
-/// `all` includes the inventory: boards that have lost their numbers are reported as missing, not skipped.
+/// `all` includes the boards of the inventory: boards that have lost their numbers are reported as missing, not
+/// skipped.
 #[test]
 fn all_is_the_inventory_too() {
     let sim = chain("4");
@@ -362,7 +366,7 @@ fn all_is_the_inventory_too() {
     assert_eq!(outcomes(&report), ["verified", "not-started", "verified", "not-started"], "{report}");
     assert_eq!(report["boards"][1]["error"]["code"], "no-answer", "{report}");
     assert!(output.err.contains("has no number"), "{}", output.err);
-    // Commands for the connected boards name the missing ones.
+    // Commands for the connected boards list the missing ones.
     let output = sim.ucom(&["start", "all"]).ends(0);
     assert!(
         output.err.contains("0x42") || output.err.matches("has no number").count() == 2,
@@ -371,7 +375,7 @@ fn all_is_the_inventory_too() {
     );
 }
 
-/// Ctrl-C during the identification: no board was erased, exit code 4, outcome `cancelled`.
+/// Ctrl-C during the identification: no board was erased, the exit code is 4, the outcome `cancelled`.
 #[test]
 fn p12_cancelled_while_it_scans() {
     let sim = chain("2");
@@ -387,7 +391,8 @@ fn p12_cancelled_while_it_scans() {
     assert_eq!(report["boards"].as_array().unwrap().len(), 2, "{report}");
 }
 
-/// An image with a known Program ID must have the named one: otherwise it is refused before any frame is sent.
+/// If the Program ID of an image is known and differs from the given one, the update is refused before any frame is
+/// sent.
 #[test]
 fn a_named_program_id_is_compared_with_the_image() {
     let sim = chain("1");

@@ -1,4 +1,4 @@
-//! `ucom update` of boards that already show the program: the record in the inventory decides (D-62, U-3).
+//! `ucom update` of boards that already have the program: the record in the inventory decides (D-62, U-3).
 #![cfg(unix)]
 
 use crate::common;
@@ -24,7 +24,7 @@ fn of(report: &Value) -> (&str, bool) {
     (board["outcome"].as_str().unwrap(), board["verified"].as_bool().unwrap())
 }
 
-/// D-62: data memory is written each time, because the board cannot show it.
+/// D-62: data memory is written each time, because the board cannot report its content.
 #[test]
 fn d62_data_memory_is_never_taken_as_proven() {
     let profile = tempfile::NamedTempFile::new().unwrap();
@@ -41,7 +41,8 @@ fn d62_data_memory_is_never_taken_as_proven() {
     }
 }
 
-/// D-62: the same bytes at another address are written. Without a record no frame is sent, and no board is verified.
+/// D-62: the same bytes at another address are written. If there is no record, no frame is sent and no board is
+/// verified.
 #[test]
 fn d62_another_address_is_written() {
     let sim = Sim::numbered(&["--boards", "2"]);
@@ -56,12 +57,12 @@ fn d62_another_address_is_written() {
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
     let text = sim.ucom(&["update", "1", &high]).ends(0).out;
     assert!(text.contains("same Program ID and date"), "{text}");
-    // The boards get new numbers: the record stays with its board.
+    // The boards get new numbers, and each record stays with its board.
     let kept = std::fs::read_to_string(&path).unwrap();
     assert!(kept.contains("# cabinet 3") && kept.contains("address = 0x200"), "{kept}");
     sim.ucom(&["init"]).ends(0);
     assert_eq!(of(&sim.json(&["update", "1", &high], 0)), ("up-to-date", true));
-    // Without the record.
+    // The record is removed.
     std::fs::write(&path, &commented).unwrap();
     let mut peer = sim.peer();
     for (more, code) in [(&[][..], 4), (&["--unverified"], 0), (&["--dry-run"], 4)] {
@@ -73,7 +74,7 @@ fn d62_another_address_is_written() {
     let text = sim.ucom(&["update", "1", &high]).ends(4).out;
     assert!(text.contains("--rewrite") && !text.contains("--force"), "{text}");
     assert_eq!(of(&sim.json(&["update", "1", &high, "--rewrite"], 0)), ("verified", true));
-    // Without an inventory.
+    // The inventory does not exist.
     let nowhere = sim.path("nowhere.toml");
     let words = ["update", "1", &high, "--inventory", &nowhere];
     assert_eq!(of(&sim.json(&words, 4)), ("program-up-to-date", false));
@@ -89,7 +90,7 @@ fn d62_a_killed_update_leaves_no_record() {
     assert!(kept());
     let mut peer = sim.peer();
     let update = sim.spawn(&["update", "1", &sim.file("next.bin", &image(60 * 1024, 2))]);
-    // This is the first block of the first cycle. The erase begins only with the second cycle.
+    // This READY is for the first block of the first cycle. The erase begins only with the second cycle.
     peer.wait("181#");
     ended_by(update, "-KILL");
     assert!(!kept());
@@ -106,7 +107,7 @@ fn d62_a_record_that_cannot_be_removed_ends_the_update() {
     let shown = sim.json(&["info", "1"], 0)["boards"][0]["program_id"].clone();
     let mut peer = sim.peer();
     let update = sim.spawn(&["--json", "update", "1", &next]);
-    // The inventory has been read, and the check for another PC has not started.
+    // The inventory has been read, and the check for another PC has not begun.
     peer.wait("201#");
     std::fs::remove_file(sim.path("inventory.toml")).unwrap();
     let output = ended(update).ends(4);

@@ -1,5 +1,5 @@
-//! Environment variables: no variable moves, resets, numbers, programs or overrides a check; variables in effect are
-//! shown.
+//! Environment variables: no variable moves, resets, numbers or programs a board or overrides a check. Variables in
+//! effect are shown.
 #![cfg(unix)]
 
 use crate::common;
@@ -14,7 +14,7 @@ fn with(sim: &Sim, (name, value): (&str, &str), words: &[&str]) -> CommandOutput
     run(command, words, "")
 }
 
-/// Checks that none of these frames resets, numbers, programs, starts or moves a board: `ucom send` accepts them
+/// Checks that none of these frames resets, numbers, programs, starts or moves a board: `ucom send` must accept them
 /// without `--intrusive`.
 fn only_questions(frames: &[String]) {
     let words: Vec<&str> = frames.iter().map(String::as_str).collect();
@@ -28,7 +28,7 @@ fn only_questions(frames: &[String]) {
 fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let sim = Sim::numbered(&["--boards", "2"]);
     sim.ucom(&["start", "1"]).ends(0);
-    // Names are known from now on, so that the commands send the same requests.
+    // From now on the names are known, so the commands send the same requests.
     sim.ucom(&["io", "all"]);
     let file = sim.file("bus.log", b"(1.000000) can0 201#\n(1.010000) can0 000#\n");
     let parameters =
@@ -37,7 +37,7 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     let before = (sim.status_byte("1"), sim.status_byte("2"));
     let mut peer = sim.peer();
     for (variable, value, words, code) in [
-        // The variable moved the board when it was exported for `ucom record`.
+        // Earlier this variable, exported for `ucom record`, would have moved the board.
         ("UCOM_FOR", "2", &["ci", "1", "set_position=1500"][..], 0),
         ("UCOM_FORCE", "1", &["ci", "1", "set_position=1500"], 0),
         ("UCOM_SET", "ASTART", &["status", "2"], 0),
@@ -53,8 +53,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
         let output = with(&sim, (variable, value), words).ends(code);
         let line = format!("{variable}={value} is ignored: `ucom");
         assert_eq!(output.err.matches(&line).count(), 1, "{variable} {words:?}: {}", output.err);
-        // Heartbeats; `ci` also asks if the control loop runs, and writes its input: without the loop the board does
-        // not move.
+        // Excludes heartbeats and the frames of `ci`, which asks whether the control loop runs and writes its input.
+        // Without the loop the board does not move.
         let of_ci = |f: &String| {
             f == "601#00000000" || ["680#", "681#", "341#"].iter().any(|start| f.starts_with(start))
         };
@@ -65,7 +65,8 @@ fn no_variable_moves_resets_numbers_or_overrules_a_check() {
     }
 }
 
-/// A variable that limited a command, or set what it sends, is refused: without it the command would do something else.
+/// A variable that limited a command, or set what it sends, is refused, because without it the command would do
+/// something else.
 #[test]
 fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -94,7 +95,7 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
         assert!(error["hint"].as_str().unwrap().starts_with("type --"), "{error}");
         assert_eq!(peer.all(50), [""; 0], "{words:?}");
     }
-    // A typed option counts, and the variable has no effect. `stop` is never refused.
+    // If the user types the option, the variable has no effect. `stop` is never refused.
     with(&sim, ("UCOM_COUNT", "x"), &["monitor", "--count", "1"]).ends(0);
     with(&sim, ("UCOM_CONTROL_ONLY", "1"), &["stop", "all"]).ends(0);
 }
@@ -130,7 +131,7 @@ fn on_off_variables_take_eight_words_and_nothing_else() {
     }
 }
 
-/// A variable in effect is shown in one line of stderr, if the option is not typed and the command uses it.
+/// A variable in effect is shown in one line of stderr if the option is not typed and the command uses it.
 #[test]
 fn a_variable_in_effect_is_shown() {
     let sim = Sim::numbered(&["--boards", "1"]);
@@ -144,7 +145,7 @@ fn a_variable_in_effect_is_shown() {
     let programs = sim.ucom(&["--json", "scan"]).ends(0);
     assert!(programs.json()["boards"].is_array());
     assert_eq!(programs.events()[0]["text"], shown.trim_end(), "{}", programs.err);
-    // No byte of a value controls the terminal.
+    // A value of a variable cannot control the terminal.
     let odd = with(&sim, ("UCOM_EDGES", "a\u{1b}[2J\n.toml"), &["io", "1"]).err;
     assert!(odd.lines().next().unwrap().contains(r"UCOM_EDGES=a\u{1b}[2J\n.toml"), "{odd}");
 }

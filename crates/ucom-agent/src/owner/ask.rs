@@ -13,10 +13,11 @@ use super::shared::{CANCELLED, STOPPED, Shared};
 use crate::happening::Happening;
 use crate::jobs::{Done, Job, Stage};
 
-/// Longest wait for a turn; after it the request is refused, because its HTTP request times out after ten seconds.
+/// Longest wait for a turn. Then the request is refused, because its HTTP request times out after ten seconds.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Largest numbers of waiting commands, and of waiting questions without the lease; questions do not block commands.
+/// Largest numbers of waiting commands, and of waiting questions without the lease. They are separate, so questions
+/// do not block commands.
 const WAITING_MAX: usize = 32;
 const QUESTIONS_MAX: usize = 8;
 
@@ -35,7 +36,7 @@ pub(crate) struct Asked {
     pub moves: bool,
 }
 
-/// What the agent knows about a request in the queue.
+/// Data of the agent about a request in the queue.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tag {
     /// Number of its job.
@@ -69,8 +70,8 @@ impl Shared {
         Ok(place)
     }
 
-    /// Returns the device for a request whose turn has come, or the reason why the request is not done: a Stop came before, or its
-    /// client has lost the lease.
+    /// Returns the device for a request whose turn has come. Otherwise returns the reason why the request is not
+    /// done: a Stop came before its turn, or its client has lost the lease.
     fn turn<'a>(
         &self,
         hands: Result<&'a mut Hands, Refused>,
@@ -86,7 +87,7 @@ impl Shared {
             self.too_late(asked).or_else(|| (asked.halt < self.queue.stops()).then(|| self.stopped()))
         });
         if late.is_some() {
-            // Before its client learns of it.
+            // The request must be marked as done before its client learns of the refusal.
             self.queue.done();
         }
         late.map_or(Ok(hands), Err)
@@ -105,11 +106,11 @@ impl Shared {
         let own = self.clone();
         let act = move |hands: Result<&mut Hands, Refused>| {
             let hands = own.turn(hands, asked);
-            // A request of a client that has given up must not move boards later.
+            // If the client of a request has given up, the request must not move boards later.
             if answer.is_closed() && !only_ends {
                 return;
             }
-            // Its answer would be too late, even if it ran.
+            // The answer would come too late even if the request were done now.
             let hands = hands.and_then(|hands| match begun.elapsed() > PATIENCE && !only_ends {
                 true => {
                     // Before its client learns of it.
@@ -154,7 +155,7 @@ impl Shared {
                 Ok((done, error)) => (Some(done), error),
                 Err(error) => (None, Some(error)),
             };
-            // Results from before a cancellation are kept.
+            // If the job was cancelled, results from before the cancellation are kept.
             let stage = match &error {
                 None => Stage::Finished,
                 Some(error) if error.code == CANCELLED || error.code == STOPPED => Stage::Cancelled,
@@ -167,7 +168,7 @@ impl Shared {
         Ok(job)
     }
 
-    /// Cancels a job, which still undoes its steps on the boards. Returns `false` if it has ended.
+    /// Cancels a job. The job still undoes its steps on the boards. Returns `false` if it has ended.
     pub fn cancel_job(&self, number: u64) -> bool {
         self.queue.cancel(|tag| tag.job == Some(number))
     }
@@ -192,7 +193,7 @@ fn gone() -> Problem {
     .kind(ErrorKind::NoLink)
 }
 
-/// Job that has not ended; if this is dropped because of a fault of the agent, the job ends as failed.
+/// Job that has not ended. If this is dropped because of a fault of the agent, the job ends as failed.
 struct Unfinished {
     shared: Arc<Shared>,
     number: u64,

@@ -1,4 +1,4 @@
-//! Work on the bus: turns, one after the other, and the knowledge about boards that results from them.
+//! Work on the bus: one turn after the other, and the resulting knowledge about the boards.
 use std::cell::RefCell;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
@@ -21,7 +21,7 @@ use crate::picture::Values;
 const TURN: Duration = Duration::from_millis(5);
 /// Listening time before the first question, because another PC may be master of the bus (D-08).
 const LISTEN: Duration = Duration::from_millis(600);
-/// Time for which a board that returned no names is not asked again by requests without the lease.
+/// After a board has returned no names, requests without the lease do not ask it again for this time.
 const LEFT_ALONE: Duration = Duration::from_secs(3);
 
 /// Session of the bus, with its data.
@@ -77,7 +77,7 @@ impl Hands {
             {
                 self.serve_one(turn);
                 self.turn()?;
-                // Also if questions arrive without pause.
+                // Called here as well, because questions may arrive without a pause.
                 self.rest();
             }
             self.rest();
@@ -112,20 +112,21 @@ impl Hands {
 
     /// Does one request.
     fn serve_one(&mut self, turn: owner::Turn<Self, Tag>) {
-        // Questions in the background must not keep a board busy.
+        // Background questions must not keep a board busy.
         self.quiet();
         self.local.borrow_mut().job = turn.tag.job;
         turn.run(self);
         self.local.borrow_mut().job = None;
-        // Requests that were abandoned or not begun have not called `settle`.
+        // Requests that were abandoned or never begun have not called `settle`.
         self.shared.queue.done();
     }
 
-    /// Returns the problem for an error of the session; a Stop or the agent's end takes precedence if it was the cause.
+    /// Returns the problem for an error of the session. If a Stop or the agent's end caused the error, returns that
+    /// problem instead.
     pub fn problem(&self, error: &SessionError) -> Problem {
         if !error.is_cancelled() {
             let kind = match (error.kind(), error) {
-                // Agent and bus are available, only the board is not.
+                // The agent and the bus are available; only the board is not.
                 (
                     ErrorKind::NoLink,
                     SessionError::Procedure(_) | SessionError::NoBoards | SessionError::NoNumbers { .. },

@@ -27,7 +27,7 @@ pub struct Config {
     pub signals: SignalTable,
     /// Cache for the names of values.
     pub cache: Cache,
-    /// List of clean-up steps that are open if the process ends now, for the code that ends it.
+    /// List of clean-up steps that would remain if the process ended now. The code that ends the process prints them.
     pub cleanup: CleanupList,
     /// Inventory file with the images that updates wrote to boards; `None`: the agent keeps these records while it
     /// runs.
@@ -47,7 +47,7 @@ impl Owner {
     ///
     /// The URL is invalid, or the bus cannot be opened.
     pub fn open(url: &str, config: Config) -> Result<Self, SessionError> {
-        // Heartbeats and Stops of its thread must not wait for the disk.
+        // The thread sends heartbeats and Stops, so it must not wait for the disk.
         let config = Config { cache: config.cache.in_memory(), ..config };
         let bus = can_link::open(url).map_err(|e| SessionError::Open(Box::new(e)))?;
         let link = Link::on(Box::new(Prompt(bus)), url);
@@ -57,7 +57,7 @@ impl Owner {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Returns a function that returns the reason why the bus was lost, if it was.
+    /// Returns a function that gives the reason why the bus was lost; `None` if it was not lost.
     pub fn lost(&self) -> impl Fn() -> Option<String> + Send + use<> {
         let shared = self.shared.clone();
         move || shared.lost()

@@ -1,4 +1,4 @@
-//! Operator of the session: publishes events of the bus and snapshots, also in the middle of a procedure.
+//! Operator of the session: publishes snapshots and events of the bus, even in the middle of a procedure.
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
@@ -16,7 +16,7 @@ use crate::picture::{Picture, Values};
 
 /// Interval between snapshots.
 const PICTURE: Duration = Duration::from_millis(40);
-/// Silence after which another PC counts as disconnected, µs.
+/// After this time without a frame, another PC is regarded as disconnected; in µs.
 const COMPETING_US: u64 = 3_000_000;
 
 /// Time for which a Stop is repeated, µs.
@@ -27,16 +27,16 @@ const PROGRESS_US: u64 = 200_000;
 /// Job, boards, attempt and cycle of an update.
 type Step = (u64, Vec<u8>, u32, u32);
 
-/// State of the owner's thread, also in the middle of a procedure.
+/// State of the owner's thread, accessible in the middle of a procedure.
 #[derive(Default)]
 pub(super) struct Local {
     /// Boards that returned no names to a request without the lease: time and reason.
     pub nameless: BTreeMap<u8, (Instant, Problem)>,
     pub states: BTreeMap<u8, &'static str>,
-    /// Number of Stops that were sent; the next field is the time of the last one.
+    /// Number of Stops that were sent. The next field is the time of the last one.
     pub halts_sent: u64,
     pub halted_us: Option<u64>,
-    /// Job, boards, attempt and cycle of the last progress event, and its time, µs.
+    /// Job, boards, attempt and cycle of the last progress event, and its time in µs.
     pub progress: Option<(Step, u64)>,
     /// `true` if the Stop at the agent's end was sent.
     pub end_sent: bool,
@@ -79,7 +79,7 @@ impl Operator for Hand {
         let job = local.job;
         let mut write = Vec::new();
         match event {
-            // The snapshot contains it.
+            // The snapshot already contains it.
             Event::Snapshot { .. } => {}
             Event::Supervision { board, change } => {
                 let (board, change) = match change {
@@ -129,20 +129,22 @@ impl Operator for Hand {
     }
 
     fn turned(&self, master: &mut Master, link: &mut Link) {
-        // In each turn, so that a running or waiting request never prevents the lapse of a lease.
+        // This check is made in each turn, so a running or waiting request never prevents the lapse of a lease.
         drop(self.shared.leases());
         let mut local = self.local.borrow_mut();
         local.now_us = link.now_us();
         self.shared.show_halts();
         let halts = self.shared.halts();
-        // A Stop during the repetitions of an earlier one is sent after them, so that many Stops do not fill the bus.
+        // A Stop that arrives while an earlier one is being repeated is sent after the repetitions, so many Stops do
+        // not fill the bus.
         let repeated = local.halted_us.is_some_and(|at| local.now_us.saturating_sub(at) < SERIES_US);
         if local.halts_sent < halts && !repeated {
             (local.halts_sent, local.halted_us) = (halts, Some(local.now_us));
             master.stop_at_once(local.now_us, None);
         }
         if self.shared.has_ended() && !local.end_sent {
-            // A running request may still undo steps on boards that do not answer: the boards are stopped first.
+            // The boards are stopped first, because a running request may still try to undo steps on boards that do
+            // not answer.
             local.end_sent = true;
             let started: Vec<u8> = self.held.borrow().started().iter().copied().collect();
             master.stop_at_once(local.now_us, Some(&started));
@@ -167,7 +169,7 @@ impl Hand {
         }
         local.states = states;
         let held = self.held.borrow();
-        // Another application has other names.
+        // If a board has another application, its known names are invalid.
         let is_its = |(number, known): &(&u8, &Arc<Known>)| {
             let info = boards.get(**number).and_then(|board| board.info);
             info.is_none_or(|info| DescriptionKey::of(&info) == DescriptionKey::of(&known.info))

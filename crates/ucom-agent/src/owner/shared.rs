@@ -19,14 +19,14 @@ use crate::picture::Picture;
 /// Hold-off after a Stop of another client.
 const CALM: Duration = Duration::from_secs(3);
 
-/// Time within which several Stops become one event.
+/// Stops within this time are reported as one event.
 const TOGETHER: Duration = Duration::from_millis(100);
 
 /// Error codes of a cancelled request, and of a request that a Stop has ended.
 pub(super) const CANCELLED: &str = "cancelled";
 pub(super) const STOPPED: &str = "stopped";
 
-/// Stop: its requester, with a lease or without, and its time.
+/// Stop: its requester, its client if it has a lease key, and its time.
 #[derive(Clone)]
 struct Halt {
     by: String,
@@ -34,14 +34,14 @@ struct Halt {
     at: Instant,
 }
 
-/// Requesters of the last Stops, which the queue counts.
+/// Requesters of the last Stops. The queue counts the Stops.
 #[derive(Default)]
 struct Halts {
-    /// Time of the last event; the next field is the number of Stops since then.
+    /// Time of the last event. The next field is the number of Stops since then.
     shown: Option<Instant>,
     more: u64,
     last: Option<Halt>,
-    /// Last Stop of a client other than the client of `last`.
+    /// Last Stop by a client other than the requester of `last`.
     last_by_another: Option<Halt>,
 }
 
@@ -80,7 +80,7 @@ pub(crate) struct Shared {
     leases: Mutex<Leases<Policy>>,
     /// Lease holder at the last check.
     holder: Mutex<Option<String>>,
-    /// `true` from before the first frame to a started board until all started boards are stopped.
+    /// `true` from before the first frame to a started board until all started boards have been stopped.
     pub(super) runs: Arc<AtomicBool>,
 }
 
@@ -136,7 +136,8 @@ impl Shared {
             }
         };
         let number = {
-            // Under one lock: who sees the number of a Stop also sees its requester.
+            // Counter and requester change under one lock, so a thread that reads the number of a Stop also reads its
+            // requester.
             let mut halts = lock(&self.halts);
             halts.add(by, client);
             self.queue.stop_alike(Tag::default(), Box::new(act))
@@ -157,7 +158,8 @@ impl Shared {
         self.queue.has(|tag| tag.moves_for(client))
     }
 
-    /// Returns a new request of this client. A request that may move boards names the last Stop before it in `after`.
+    /// Returns a new request of this client. For a request that may move boards, `after` is the number of the last
+    /// Stop that the client knew.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Checks after a Stop: each board is asked after the frames of the Stop were sent.
+//! Check after a Stop: each board is asked after the frames of the Stop have been sent.
 use std::collections::BTreeSet;
 
 use ucom::Status;
@@ -9,8 +9,8 @@ use super::Hands;
 use crate::happening::Happening;
 
 impl Hands {
-    /// Asks each board after a Stop and stops its application: boards that answer, and boards that may run but do not
-    /// answer.
+    /// After a Stop, asks each board and stops its application. This covers boards that answer, and boards that may
+    /// run but do not answer.
     pub(super) fn see_to_stop(&mut self) {
         let was_master = self.driver.master.is_master();
         let mut wanted = self.may_run();
@@ -35,11 +35,11 @@ impl Hands {
             }
             Err(error) => not_stopped.push(error.to_string()),
         }
-        // The other boards count as started until they are stopped.
+        // The other boards are still listed as started until they have been stopped.
         confirmed.iter().for_each(|board| self.runs_no_more(Some(*board)));
         if !was_master {
-            // A Stop makes no agent the master. A board without a confirmation becomes safe without heartbeats, unless
-            // the master sends its own.
+            // A Stop does not make the agent the master. A board that has not confirmed the Stop becomes safe without
+            // heartbeats, unless the master sends its own.
             self.driver.master.end_session();
         }
         let boards = confirmed.into_iter().collect();

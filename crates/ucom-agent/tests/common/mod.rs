@@ -56,7 +56,7 @@ impl Chain {
     pub fn fault(&self, line: &str) {
         let (begun, begins) = channel();
         self.faults.send((line.into(), begun)).expect("it goes on");
-        // The channel carries no message: this wait ends when the other side drops its sender.
+        // The channel carries no message. This wait ends when the other side drops its sender.
         begins.recv().unwrap_or_default();
     }
 
@@ -142,7 +142,7 @@ impl Served {
         Self { chain, tokens, log: log_path, http, ended, thread: Some(thread), _dir: dir }
     }
 
-    /// Starts an agent with a numbered chain. Also returns the key of the lease, which is held.
+    /// Starts an agent with a numbered chain, and takes the lease. Returns the lease key as well.
     pub fn numbered(boards: usize) -> (Self, String) {
         Self::numbered_as(boards, Config::default())
     }

@@ -10,7 +10,7 @@ use crate::args::{ActArgs, Boards, BoardsArgs, LinkArgs, ResetArgs, StatusArgs, 
 use crate::session::shared_numbers;
 use crate::shape::{bits, board_table, board_value, info_value};
 
-/// Shows the reports of boards about themselves.
+/// Shows the information that boards report about themselves.
 pub fn info(args: &BoardsArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let profile = driver.master.profile();
@@ -52,8 +52,8 @@ pub fn status(args: &StatusArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     Ok(())
 }
 
-/// Sends one PC_SETSTATUS with these two bytes to each board, or one to all, and shows the result next to the result
-/// that the rules require.
+/// Sends one PC_SETSTATUS with these two bytes to each board, or one to all boards. Shows the actual result next to
+/// the result that the rules require.
 fn raw_status(
     args: &StatusArgs,
     (mask, value): (u8, u8),
@@ -177,7 +177,8 @@ pub fn stop(args: &StopArgs, link: &LinkArgs, out: &Output) -> Result<(), Failur
     let profile = driver.master.profile();
     let level = if args.control_only { StopLevel::Loop } else { StopLevel::Application };
     let Stopped { boards: all, failed } = driver.stop_each(&args.boards, level)?;
-    // Only reported, and only now: both boards with such a number got the stop command.
+    // The shared numbers are only reported, and only now, because both boards with such a number received the stop
+    // command.
     let shared = shared_numbers(&driver.master);
     for error in driver.master.shared_numbers() {
         driver.note(format!("{error}; both were commanded to stop\n  {}", error.hint()));

@@ -43,12 +43,12 @@ pub fn scan(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         if unnumbered > 0 {
             text += &format!("without a number: {}\nnext: ucom init\n", unnumbered_ids(&report.findings));
         }
-        // The error at the end of the command reports these findings.
+        // The error at the end of the command reports these findings, so they are not noted here.
         let reported = |f: &&ScanFinding| is_unnumbered(f) || f.error().is_some();
         text + &lines(&report.findings.iter().filter(|f| !reported(f)).collect::<Vec<_>>())
     });
     match shared {
-        // stdout already has it.
+        // stdout already contains the result.
         Some(failure) => {
             out.note(format!("{}\n  {}", failure.message, failure.next));
             Err(Failure::shown(failure.kind))

@@ -1,4 +1,4 @@
-//! `ucom conformance`: the acceptance tests of the board side, against connected boards.
+//! `ucom conformance`: runs the acceptance tests for boards on the connected boards.
 
 use std::path::Path;
 
@@ -15,9 +15,9 @@ use ucom_host::session::SessionError;
 
 use crate::args::{Boards, ConformanceArgs, LinkArgs};
 
-/// 2026-01-01: a fixed date for programs of tests, different from those of the boards.
+/// Returns 2026-01-01, a fixed date for test programs that differs from the dates of the boards.
 fn date(profile: &Profile) -> u16 {
-    // If the date is a plain number, any number will do.
+    // If the profile's date is a plain number, any number is valid.
     profile.prog_date.encode(2026, 1, 1).unwrap_or(0x5C21)
 }
 
@@ -63,7 +63,7 @@ pub fn conformance(args: &ConformanceArgs, link: &LinkArgs, out: &Output) -> Res
     }
 }
 
-/// Returns the image for one board, which must be the intended one.
+/// Returns the image for one board, after the check that it is the intended board.
 fn program(
     args: &ConformanceArgs,
     path: &Path,

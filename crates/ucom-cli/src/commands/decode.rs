@@ -1,4 +1,4 @@
-//! `ucom decode`: frames as text, from a recording, stdin or the live bus.
+//! `ucom decode`: prints frames as text, from a recording, stdin or the live bus.
 
 use std::io::BufRead;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -20,7 +20,7 @@ const READ_AHEAD: usize = 64;
 /// Period of checks for Ctrl-C while stdin is idle.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Decodes to the end, or until Ctrl-C. Exit code 2 if a file contains no frame.
+/// Decodes to the end of the input, or until Ctrl-C. The exit code is 2 if a file contains no frame.
 pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let left = args.count.unwrap_or(u64::MAX);
     if args.live {
@@ -35,7 +35,7 @@ pub fn decode(args: &DecodeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         let recording = Recording::read(&args.file)
             .map_err(|e| Failure::usage(e).next("forms are candump -L, FZI-CAN 1.2 and MCAP"))?;
         report_broken_off(&recording, &args.file, out);
-        // The recorder's profile is used, unless another is requested.
+        // The profile of the recording is used, unless the user gives another.
         if let (None, Some(text)) = (&link.profile, &recording.profile) {
             profile = ucom::Profile::from_toml(text).map_err(Failure::usage)?;
         }
@@ -96,7 +96,7 @@ fn print(decoder: &mut Decoder, time_ns: u64, frame: &RecordedFrame, out: &Outpu
     });
 }
 
-/// Returns lines of stdin as they arrive; Ctrl-C ends them, even while stdin is idle.
+/// Returns lines of stdin as they arrive. Ctrl-C ends them, even while stdin is idle.
 fn received(stop: &Stop) -> Result<impl Iterator<Item = Result<Record, Failure>> + use<>, Failure> {
     let (sender, lines_read) = sync_channel(READ_AHEAD);
     let read = move || lines(std::io::stdin().lock()).try_for_each(|record| sender.send(record));
@@ -127,7 +127,7 @@ fn lines(input: impl BufRead) -> impl Iterator<Item = Result<Record, Failure>> {
 /// Parses a line of a log, or a bare frame; `None` for a comment.
 pub fn parsed(line: &str, number: usize) -> Option<Result<Record, Failure>> {
     let bare = !line.starts_with('(');
-    // A bare frame has no time and no bus; with both it is a line of a log.
+    // A bare frame has no time and no bus name. When both are added, it is a line of a log.
     let full = if bare { format!("(0.0) can0 {line}\n") } else { format!("{line}\n") };
     match CandumpReader::new(full.as_bytes()).next()? {
         Ok(record) => Some(Ok(record)),

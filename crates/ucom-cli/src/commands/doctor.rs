@@ -1,4 +1,4 @@
-//! `ucom doctor` and `ucom probe`: faults, and the boards' reading of the protocol.
+//! `ucom doctor` and `ucom probe`: faults of the bus, and the profile of the boards.
 
 use std::time::Duration;
 
@@ -18,7 +18,7 @@ use crate::shape::board_value;
 /// Listening time before the first request.
 const LISTEN: Duration = Duration::from_millis(1500);
 
-/// Checks everything; ends with 0 without a problem, 3 without any frame, else 1.
+/// Checks everything. The exit code is 0 without a problem, 3 without any frame, and 1 otherwise.
 pub fn doctor(link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     out.note(format!("listening on {}", link.url()?));
@@ -41,7 +41,7 @@ fn line(f: &Finding) -> String {
     text
 }
 
-/// Measures and writes a profile.
+/// Measures the profile of the boards and writes it to a file.
 pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let output = args.out.as_deref().map(|file| open_output(file, args.overwrite.overwrite)).transpose()?;
     let image = match &args.image {
@@ -58,7 +58,8 @@ pub fn probe(args: &ProbeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         other => return Err(SessionError::from(other).into()),
     };
     if report.boards.is_empty() && report.reports == 0 {
-        // Without measurements a profile of defaults would look like the profile of these boards.
+        // Without measurements the file would contain only defaults, which would look like the profile of these
+        // boards.
         let what = "no board answers: nothing was measured, no profile written";
         return Err(
             Failure::new(ErrorKind::NoLink, "no-boards", what).next("ucom doctor looks for the reason")

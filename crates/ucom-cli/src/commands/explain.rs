@@ -1,4 +1,4 @@
-//! `ucom explain`: the meaning of a word on a screen, and the next step.
+//! `ucom explain`: prints the meaning of a word of the output, and the next step.
 
 use cli_kit::{Failure, Output, table};
 use serde_json::{Value, json};

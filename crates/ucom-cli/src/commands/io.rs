@@ -16,7 +16,7 @@ use ucom_host::session::{
 use super::params::{deliver, file_or_stdout, open_output};
 use crate::args::{CiArgs, DbcArgs, IoArgs, LinkArgs};
 
-/// Shows all names, the meaning of their words, and the first inputs if the application runs.
+/// Shows all names and the meaning of their words. If the application runs, also shows the initial inputs.
 pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     note_force(args.force, out);
     let (signals, cache) = (link.signal_table()?, args.cache.cache());
@@ -33,12 +33,12 @@ pub fn io(args: &IoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let numbers = driver.numbers(&args.boards)?;
     for known in cache.all(&mut driver, &signals, &numbers, |_| false)? {
         let board = known.board;
-        // Without a started application no board can answer.
+        // Only a started application can answer this.
         let initial = match args.template {
             None => initial(&mut driver, board).ok(),
             Some(_) => None,
         };
-        // A board that sends its inputs has sent its names before.
+        // A board that has sent its inputs has also sent its names.
         let known = match driver.master.description(board) {
             Some(names) if initial.is_some() => known.renamed(names, &signals, driver.master.profile()),
             _ => known,
@@ -86,7 +86,7 @@ fn io_value((known, initial): &Described) -> Value {
     })
 }
 
-/// Returns the known meaning of a signal's words; null without a table.
+/// Returns the known meaning of a signal's words; null if there is no table.
 fn signal_value(signal: &Signal) -> Value {
     if !signal.known {
         return Value::Null;
@@ -139,7 +139,7 @@ fn initial(driver: &mut Driver, board: u8) -> Result<Vec<u16>, Failure> {
     }
 }
 
-/// Shows initial inputs, or sets some; with `--for` the board moves under supervision.
+/// Shows the initial inputs, or sets some inputs. With `--for` the board moves under supervision.
 pub fn ci(args: &CiArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let mut driver = link.session()?;
@@ -221,7 +221,7 @@ fn move_for(
         }
     }
     followed.ask_no_more(&mut driver.master);
-    // Not as a procedure that Ctrl-C cancels: Ctrl-C requests this stop.
+    // This is not a procedure, because Ctrl-C would cancel a procedure, and here Ctrl-C requests the stop.
     driver.stop_at_once(Some(&[board]));
     driver.stop_board(board, StopLevel::Loop)?;
     driver.nothing_is_left();
@@ -283,7 +283,7 @@ pub fn dbc(args: &DbcArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     Ok(())
 }
 
-/// Notes that `--force` overrides no check here: older scripts use it to overwrite a file.
+/// Notes that `--force` skips no check in this command, because older scripts use it to overwrite a file.
 fn note_force(force: bool, out: &Output) {
     if force {
         out.note("--force has no effect here: there is no check of the bus; --overwrite writes over a file");

@@ -1,4 +1,4 @@
-//! The commands, one file each or one file per family.
+//! The commands. Each file contains one command or one family of commands.
 
 mod boards;
 mod chain;

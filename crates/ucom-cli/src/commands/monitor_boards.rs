@@ -1,4 +1,5 @@
-//! Boards as rows of the live view: as many columns as fit, and always a board's state, status bits and heartbeat.
+//! Boards as rows of the live view. It shows as many columns as fit, and always a board's state, status bits and
+//! heartbeat.
 
 use ratatui::layout::Constraint;
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -7,7 +8,7 @@ use ratatui::widgets::{Cell, Row, Table};
 use ucom::Status;
 use ucom_host::master::{Board, Boards, Life, Statistics};
 
-/// Status bits from the most significant one: a letter each in narrow columns, a word in wider ones.
+/// Status bits from the most significant one. Narrow columns show a letter for each, wider ones a word.
 pub const BITS: [(Status, char, &str); 8] = [
     (Status::MSTART, 'M', ""),
     (Status::ASTART, 'A', "autostart"),
@@ -19,10 +20,10 @@ pub const BITS: [(Status, char, &str); 8] = [
     (Status::IPINIT, 'i', "in-pin"),
 ];
 
-/// Width from which status bits are words, and flash numbers and programs are shown.
+/// Smallest width at which status bits are words, and flash numbers and programs are shown.
 pub const WIDE: u16 = 130;
 const MEDIUM: u16 = 72;
-/// Age above which the last answer of a board counts as old, s.
+/// Age in seconds above which the last answer of a board is shown as old.
 const OLD_S: f64 = 5.0;
 
 /// A column: its head, its width, and its content.
@@ -76,7 +77,7 @@ fn columns(width: u16) -> Vec<Column> {
     vec![number, state, letters, heartbeat]
 }
 
-/// Returns the rows from `first` on, at the width of the view.
+/// Returns the rows from `first` on, with as many columns as the width of the view allows.
 pub fn table(boards: &Boards, statistics: &Statistics, now: u64, width: u16, first: usize) -> Table<'static> {
     let columns = columns(width);
     let row = |(number, b): (u8, &Board)| {
@@ -106,7 +107,7 @@ fn state(board: &Board, now: u64) -> Cell<'static> {
     Cell::from(Span::styled(format!(" {} ", board.state_name(now)), style))
 }
 
-/// Returns a letter for each set bit, in its place.
+/// Returns a text with a letter at the position of each set bit.
 fn letters(board: &Board) -> Cell<'static> {
     let Some(status) = board.status().filter(|_| board.is_known()) else {
         return Cell::from("?").dark_gray();
@@ -126,7 +127,7 @@ fn words(board: &Board) -> Cell<'static> {
 fn heartbeat(board: &Board, now: u64) -> Cell<'static> {
     match (board.life, board.alive_age_s(now)) {
         (Life::Unarmed, _) | (_, None) => match board.last {
-            // The board sends no frames by itself: the values shown are as old as its last answer.
+            // The board sends no frames by itself, so the values shown are as old as its last answer.
             Some((at, _)) if now.saturating_sub(at) as f64 * 1e-6 >= OLD_S => {
                 Cell::from(format!("{:.0} s old", now.saturating_sub(at) as f64 * 1e-6)).dark_gray()
             }
@@ -150,7 +151,7 @@ mod tests {
 
     use super::*;
 
-    /// The letters and words of the view are explained under the names of their bits.
+    /// `ucom explain` explains the letters and words of the view under the names of their bits.
     #[test]
     fn every_letter_and_word_of_a_bit_is_explained() {
         let all = words();

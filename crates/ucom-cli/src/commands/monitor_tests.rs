@@ -6,7 +6,7 @@ use ucom_host::master::{Event, Master, Request};
 
 use super::*;
 
-/// Sizes of terminals, from the smallest on.
+/// Sizes of terminals, smallest first.
 const SIZES: [(u16, u16); 6] = [(40, 12), (50, 15), (60, 20), (80, 24), (120, 40), (200, 60)];
 
 /// Ten boards that have answered a request for their identity.
@@ -47,7 +47,7 @@ fn chain(started: Option<u8>) -> (Master, u64) {
     (master, now)
 }
 
-/// Board 3 sent heartbeats and is silent since.
+/// Returns a chain in which board 3 has sent heartbeats and is now silent.
 fn one_lost() -> (Master, u64) {
     let (mut master, now) = chain(Some(3));
     master.watch(3, Some(3), true);
@@ -113,7 +113,7 @@ fn eighty_columns_have_flash_number_program_and_status_bits() {
     assert!(line_of(&wide, "0x0021").contains("init out-pin in-pin"), "{}", wide.join("\n"));
 }
 
-/// Every board is visible on every terminal, and the keys show how.
+/// Every board can be seen on every terminal, and the line of keys says how.
 #[test]
 fn no_board_vanishes() {
     let chain = ten();
@@ -128,14 +128,14 @@ fn no_board_vanishes() {
             };
             assert!(all.iter().any(row), "{size:?}: board {number}\n{place}");
         }
-        // Each part of a line of facts or heads is complete.
+        // No part of a line of facts or heads is cut.
         assert!(size.0 >= 60 || !place.contains("socketcand"), "{place}");
         assert!(!place.contains("descriptio ") && !place.contains("descriptio│"), "{place}");
         assert!(size.1 > 12 || keys.contains("↑↓ 1-"), "{size:?}: {keys}");
     }
 }
 
-/// A lost board is named first, with the next command, and shows no old values.
+/// A lost board is listed first, with the next command, and without old values.
 #[test]
 fn d51_a_lost_board_looks_dead() {
     let chain = one_lost();

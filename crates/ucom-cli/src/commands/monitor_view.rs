@@ -1,5 +1,5 @@
-//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows: errors and the next command come first, rows
-//! without space scroll, and the keys are always visible.
+//! View of `ucom monitor`, for terminals down to 40 columns and 12 rows. Errors and the next command come first, rows
+//! that do not fit can be scrolled, and the keys are always visible.
 
 use cli_kit::view::{FRAMED, Scroll, Trouble, panel, too_small, wrapped};
 use ratatui::Frame;
@@ -11,9 +11,9 @@ use ucom_host::session::{Picture, Problems, Watch};
 
 use super::monitor_boards::{self as rows, WIDE};
 
-/// Keys; terminals that are too small show only the first.
+/// Keys. A terminal that is too small shows only the first one.
 const KEYS: &str = "s stops  q ends";
-/// Least number of board rows with their head, for any number of errors.
+/// Smallest number of board rows including their head, for any number of errors.
 const LEAST_ROWS: u16 = 4;
 /// Number of rows above which the last event has its own row.
 const EVENT: u16 = 16;
@@ -30,7 +30,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let most = area.height.saturating_sub(1 + LEAST_ROWS + 2 * edge + log);
     let (trouble, rest) = trouble(picture).lines(inner, most.into());
     let first = if trouble.is_empty() { 0 } else { trouble.len() as u16 + edge };
-    // A frame with the load curve only if all other parts have enough space.
+    // A frame with the load curve is shown only if all other parts have enough space.
     let wanted = rest.len() as u16 + boards.max(1) + 1 + edge;
     let head = if framed && area.height >= first + wanted + log + 5 { 5 } else { 1 };
     let left = area.height.saturating_sub(first + head);
@@ -64,7 +64,7 @@ pub fn draw(frame: &mut Frame<'_>, picture: &Picture<'_>, scroll: &mut Scroll) {
     let [causes, table] =
         Layout::vertical([Constraint::Length(above.len() as u16), Constraint::Fill(1)]).areas(place);
     frame.render_widget(Paragraph::new(above), causes);
-    // A head without a row below it is useless.
+    // The head is drawn only if at least one row fits below it.
     if boards > 0 && table.height > 1 {
         frame.render_widget(rows::table(picture.boards, picture.statistics, picture.now, inner, skip), table);
     }
@@ -79,7 +79,7 @@ fn trouble(picture: &Picture<'_>) -> Trouble {
     Trouble { causes, warnings, next, message: picture.watch.message.clone() }
 }
 
-/// Returns the bus in one line, with its name if the whole name fits.
+/// Returns the bus in one line, with the name of the bus if the complete name fits.
 fn facts(picture: &Picture<'_>, boards: u16, width: u16) -> Line<'static> {
     let load = picture.statistics.load_percent(picture.now);
     let foreign = picture.statistics.foreign_count();
@@ -125,7 +125,7 @@ fn load(picture: &Picture<'_>, room: usize) -> Sparkline<'static> {
         .block(panel(&format!("bus load {percent:.1} %")))
 }
 
-/// Draws the newest events, the last one at the bottom; a long one continues on the next line.
+/// Draws the newest events, the last one at the bottom. A long event continues on the next line.
 fn events(frame: &mut Frame<'_>, watch: &Watch, area: Rect, framed: bool) {
     let (width, height) = if framed {
         (area.width.saturating_sub(4), area.height.saturating_sub(2))

@@ -1,4 +1,4 @@
-//! `ucom so`: outputs of running boards, by name and in units.
+//! `ucom so`: shows outputs of running boards by name and in their units.
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -12,7 +12,7 @@ use ucom_host::session::{Driver, Known, nothing_shared};
 
 use crate::args::{LinkArgs, SoArgs};
 
-/// Waits until the reader of stdout has read all output, as long as it reads.
+/// Waits until the reader of stdout has read all output. Gives up if the reader no longer reads.
 pub fn finish(stdout: &mut Lines, driver: &Driver) {
     let unseen = stdout.finish();
     if unseen > 0 && !stdout.gone() {
@@ -20,7 +20,7 @@ pub fn finish(stdout: &mut Lines, driver: &Driver) {
     }
 }
 
-/// Shows outputs of boards as they arrive; only listens once their names are known.
+/// Shows outputs of boards as they arrive. Sends nothing after the names are known.
 pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let mut driver = link.session()?;
     let boards = driver.numbers(&args.boards)?;
@@ -41,7 +41,7 @@ pub fn so(args: &SoArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
         driver.turn(Duration::from_millis(20))?;
         while let Some(event) = driver.master.take_event() {
             match event {
-                // Another PC runs the boards: this is why there are outputs.
+                // Another PC runs the boards, as expected: otherwise there would be no outputs.
                 Event::CompetingMaster { .. } => {}
                 Event::Snapshot { board, snapshot } if left > 0 => {
                     left -= 1;

@@ -94,7 +94,7 @@ fn print(driver: &Driver, all: &[Parameters], one: bool, out: &Output) {
     });
 }
 
-/// Returns place, name, and the value that this process wrote.
+/// Returns for each parameter its index, its name, and the value that this process wrote.
 fn rows<'a>(driver: &Driver, p: &'a Parameters) -> impl Iterator<Item = (usize, &'a String, Option<u16>)> {
     let assumed = driver.master.parameters(p.known.board);
     p.known.names.par.iter().enumerate().map(move |(i, name)| match assumed.get(i) {
@@ -138,7 +138,7 @@ fn save(args: &ParArgs, file: Option<OutputFile>, all: &[Parameters], out: &Outp
     })
 }
 
-/// Delivers a requested text: into a file, or to stdout for `-`.
+/// Writes a requested text to a file, or to stdout for `-`.
 pub fn deliver(
     file: Option<OutputFile>,
     text: &str,
@@ -151,7 +151,7 @@ pub fn deliver(
         out.result(&result, || text.into());
         return Ok(());
     };
-    // Atomic: the old content is a user's work.
+    // Written atomically, because the old content is the work of a user.
     ucom_host::files::write_text(file.path(), text).map_err(Failure::usage)?;
     let name = file.name();
     file.is_written();
@@ -160,7 +160,7 @@ pub fn deliver(
     Ok(())
 }
 
-/// Checks a whole file, then writes its parameters.
+/// Checks the whole file, and then writes its parameters.
 fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let signals = link.signal_table()?;
     let meant = |n: u8| match &args.boards {
@@ -179,7 +179,7 @@ fn apply(args: &ParArgs, path: &Path, link: &LinkArgs, out: &Output) -> Result<(
     }
     let mut driver = link.session()?;
     file.identities(&mut driver)?;
-    // Boards that are written to must run. A check can use the cache.
+    // Boards that are written to must run. For a check, the cache is enough.
     let cache = args.cache.cache();
     let known = cache.all(&mut driver, &signals, &file.numbers(), |_| !args.dry_run)?;
     let checked = file.words(|number| known.iter().find(|k| k.board == number))?;

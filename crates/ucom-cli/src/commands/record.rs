@@ -1,4 +1,4 @@
-//! `ucom record` and `ucom replay`: frames of a bus to a file and back.
+//! `ucom record` and `ucom replay`: write frames of a bus to a file, and send them again.
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use crate::args::{LinkArgs, RecordArgs, ReplayArgs};
 use crate::interrupt::listen;
 use crate::session::shared_numbers;
 
-/// Period of writes to the file: a killed recorder loses no more than this.
+/// Period of writes to the file. A recorder that is killed loses at most the frames of this time.
 const FLUSH: Duration = Duration::from_secs(1);
 
 fn failed(e: RecordingError) -> Failure {
@@ -30,17 +30,17 @@ pub fn report_broken_off(recording: &Recording, file: &Path, out: &Output) {
     }
 }
 
-/// Silence of a bus after which the command reports it.
+/// After this time without a frame, the command reports that the bus is silent.
 const SILENCE: Duration = Duration::from_millis(1500);
 
-/// Reports once, to users, that a bus has sent no frames yet, and what to check.
+/// Reports once that a bus has sent no frames yet, and what to check. Only users get this note.
 pub struct Silence {
     since: Instant,
     over: bool,
 }
 
 impl Silence {
-    /// Starts to listen; without a note for programs, which detect silence themselves.
+    /// Starts to listen. For programs there is no note, because they detect silence themselves.
     pub fn begins(out: &Output) -> Self {
         Self { since: Instant::now(), over: out.is_json() }
     }
@@ -89,11 +89,11 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
         bus.news().iter().for_each(|news| out.note(news));
         silence.look(received.is_some(), out);
         let Some(frame) = received else { continue };
-        // Time never runs backwards in a file, even if the clock is changed meanwhile.
+        // Times in a file never decrease, even if the clock is changed meanwhile.
         let time = began_at + start.elapsed();
         match recorder.take(bus.now_us(), time.as_nanos() as u64, &frame) {
             Ok(()) => {}
-            // `ucom record - | head` has read enough.
+            // The reader of `ucom record - | head` has read enough.
             Err(RecordingError::Io { source: e, .. }) if stdout => {
                 Output::lose(&e);
                 break;
@@ -119,7 +119,7 @@ pub fn record(args: &RecordArgs, link: &LinkArgs, out: &Output) -> Result<(), Fa
     Ok(())
 }
 
-/// Opens the files of a recording before it starts; the file ending selects the format.
+/// Opens the files of a recording before it starts. The file ending selects the format.
 fn outputs(args: &RecordArgs, format: RecordingFormat) -> Result<Vec<OutputFile>, Failure> {
     let ending = args.file.extension().map(|e| e.to_string_lossy().into_owned());
     let known = ["log", "candump", "fzi", "fzican", "mcap"];

@@ -1,4 +1,4 @@
-//! `ucom repair`: one board gets its number back, the others keep theirs.
+//! `ucom repair`: gives one board its number back; the others keep their numbers.
 
 use serde_json::json;
 use ucom_host::files::inventory::flash_number_of;
@@ -10,12 +10,12 @@ use ucom_host::session::SessionError;
 use crate::args::{LinkArgs, RepairArgs};
 use crate::shape::{board_table, board_value};
 
-/// Repairs the board. Its flash number must be the named one, or else that of the inventory.
+/// Repairs the board. Its flash number must equal the given one, or else the one in the inventory.
 pub fn repair(args: &RepairArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let board = args.board;
     let flash_number = match args.flash_id {
         Some(flash) => flash,
-        // The choice of the board belongs to the command line: wrong usage.
+        // The user must choose the board, so a missing flash number is wrong usage.
         None => flash_number_of(&args.inventory, board).map_err(|e| Failure::usage(&e).next(e.hint()))?,
     };
     let mut driver = link.session()?;

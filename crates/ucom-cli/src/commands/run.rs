@@ -1,4 +1,4 @@
-//! `ucom run`: control loops under supervision, from the start of all boards to their stop.
+//! `ucom run`: runs control loops under supervision, from the start of all boards to their stop.
 
 use std::time::{Duration, Instant};
 
@@ -34,13 +34,13 @@ pub fn run(args: &RunArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure>
     only(&boards, &args.ci, "run")?;
     only(&boards, &args.par, "run")?;
     let file = match &args.params {
-        // With all boards, every board in the file must be connected.
+        // If all boards are selected, every board in the file must be connected.
         Some(path) => Some(ParameterFile::read(path, &args.inventory, |n| {
             args.boards == Boards::All || boards.contains(&n)
         })?),
         None => None,
     };
-    // The identities are read first: this needs no started application.
+    // The identities are read first, because this needs no started application.
     if let Some(file) = &file {
         file.identities(&mut driver)?;
     }
@@ -95,7 +95,7 @@ fn print_running(report: &RunReport, active: bool, stdout: &Lines, out: &Output)
     }));
 }
 
-/// Reads names and plans, and starts all boards.
+/// Reads names, prepares the changes, and starts all boards.
 fn start(
     driver: &mut Driver,
     args: &RunArgs,
@@ -162,7 +162,7 @@ fn supervise(
         for notice in followed.look(&mut driver.master, now_us) {
             print(driver, notice);
         }
-        // An error found during the run: a fault, not a refusal.
+        // The error was found during the run, so it is a fault and not a refusal.
         nothing_shared(&driver.master).map_err(|e| Failure { kind: ErrorKind::Fault, ..e.into() })?;
         while let Ok(line) = typed.try_recv() {
             if line.trim() == "stop" {
@@ -187,7 +187,7 @@ fn supervise(
     }
 }
 
-/// Prints the last outputs of each board, as events of `--json`.
+/// Prints the last outputs of each board as events for `--json`.
 fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdout: &Lines, out: &Output) {
     for (board, snapshot, age_s, stale) in followed.outputs(&driver.master, driver.now_us()) {
         let Some(known) = prepared.known.get(&board) else { continue };
@@ -201,7 +201,7 @@ fn print_outputs(driver: &Driver, prepared: &Prepared, followed: &Followed, stdo
     }
 }
 
-/// Returns a notice as an event of `--json`.
+/// Returns a notice as an event for `--json`.
 fn notice_value(notice: &Notice) -> Value {
     let Notice { board, change, time_s, age_s } = *notice;
     match notice.is_of_loop() {

@@ -11,10 +11,11 @@ use ucom_host::session::{is_intrusive, replayed};
 use super::decode::parsed;
 use crate::args::{LinkArgs, SendArgs};
 
-/// Listening time after the last frame: a controller goes bus-off within about 32 attempts of a frame.
+/// Listening time after the last frame, because a controller needs up to about 32 attempts to send a frame before it
+/// is bus-off.
 const SENT: Duration = Duration::from_millis(50);
 
-/// Sends frames in the given order; all are checked before the first one is sent.
+/// Sends frames in the given order. All of them are checked before the first one is sent.
 pub fn send(args: &SendArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     let frame = |(i, text): (usize, &String)| {
         let record = parsed(text.trim(), i + 1).unwrap_or_else(|| Err(Failure::usage("an empty frame")))?;

@@ -24,7 +24,7 @@ use crate::interrupt::listen;
 /// Period at which signals are polled.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Owns the bus until SIGINT or SIGTERM; then boards that the agent has started are stopped.
+/// Owns the bus until SIGINT or SIGTERM. Then stops the boards that the agent has started.
 pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     if args.sim && link.bus.is_some() {
         return Err(Failure::usage("a bus and --sim: the agent owns one of them")
@@ -42,7 +42,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
         signals: link.signal_table()?,
         cache: args.cache.cache(),
         cleanup: CleanupList::default(),
-        // Simulated boards are new each time: the inventory of real boards does not apply.
+        // Simulated boards are new each time, so the inventory of real boards does not apply.
         inventory: (!args.sim).then(|| args.inventory.clone()),
     };
     let stop = listen(&config.cleanup)?;
@@ -59,7 +59,7 @@ pub fn serve(args: &ServeArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     })?;
     let address = listener.local_addr()?;
     let (tokens, are_new) = Tokens::load_or_make(&token_file)?;
-    // The simulated chain outlives the owner of its bus.
+    // The simulated chain must live longer than the owner of its bus.
     let simulated = args.sim.then(|| Simulated::start(args.boards, config.profile, out)).transpose()?;
     let bus = simulated.as_ref().map_or_else(|| link.url().map(str::to_owned), |sim| Ok(sim.url.clone()))?;
     let owner = Owner::open(&bus, config)?;

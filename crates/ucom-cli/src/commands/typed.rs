@@ -1,4 +1,4 @@
-//! Lines typed during `ucom run`: inputs, parameters, outputs on and off.
+//! Lines that the user types during `ucom run`: inputs, parameters, outputs on and off.
 
 use cli_kit::Failure;
 use std::io::{BufRead, ErrorKind};
@@ -17,8 +17,8 @@ pub fn typed() -> Receiver<String> {
     receiver
 }
 
-/// Passes on every line until the end, or until `take` returns `false`. A byte that is not text makes an invalid line, which is reported.
-/// A later `stop` is still read.
+/// Passes each line to `take` until the end of input, or until `take` returns `false`. A byte that is not text makes
+/// its line invalid, which is reported. A later `stop` is still read.
 fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     let mut line = Vec::new();
     loop {
@@ -35,7 +35,8 @@ fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     }
 }
 
-/// Parses the assignments of a line: a word without `=` is the unit of the value before it, `current_max=1500 mA`.
+/// Parses the assignments of a line. A word without `=` is the unit of the value before it, as in `current_max=1500
+/// mA`.
 fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
     let mut values: Vec<String> = Vec::new();
     for word in words {

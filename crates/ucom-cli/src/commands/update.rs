@@ -1,4 +1,4 @@
-//! `ucom update`: firmware onto boards, checked, written, verified.
+//! `ucom update`: checks firmware files, writes them to boards, and verifies the result.
 
 use cli_kit::{ErrorKind, Failure, Output};
 use ucom::Profile;
@@ -63,7 +63,8 @@ fn target(target: &UpdateTarget) -> String {
     format!("board {} ({who})", target.board)
 }
 
-/// Returns the selected boards. `all` means those that answer and those of the inventory: a missing board is reported.
+/// Returns the selected boards. `all` selects the boards that answer and those of the inventory, so that a missing
+/// board is reported.
 fn with_listed(mut numbers: Vec<u8>, args: &UpdateArgs) -> Result<Vec<u8>, Failure> {
     if args.boards == Boards::All && args.inventory.exists() {
         let inventory = Inventory::read(&args.inventory).map_err(Failure::usage)?;
@@ -78,7 +79,7 @@ fn inventory_numbers(inventory: &Inventory) -> impl Iterator<Item = u8> {
     (0..32).filter(|board| inventory.get(*board).is_some())
 }
 
-/// Handles Ctrl-C during the identification: no board was changed, which the report shows.
+/// Handles Ctrl-C during the identification. No board was changed, and the report says so.
 fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Output) -> Failure {
     let inventory = Inventory::read(&args.inventory).ok();
     let left = UpdateOutcome::Cancelled;
@@ -102,7 +103,7 @@ fn cancelled(error: SessionError, args: &UpdateArgs, profile: &Profile, out: &Ou
     Failure::shown(report.failure().unwrap_or(ErrorKind::Refused))
 }
 
-/// Returns the required flash number of each board: the named one, or else that of the inventory.
+/// Returns the required flash number of each board: the given one, or else the one in the inventory.
 fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failure> {
     if let Some(flash) = args.flash_id {
         return match numbers {
@@ -111,7 +112,7 @@ fn targets(args: &UpdateArgs, numbers: &[u8]) -> Result<Vec<UpdateTarget>, Failu
                 .next("a list takes the flash ids from the inventory that ucom init writes")),
         };
     }
-    // For a single board its number is enough; a list needs the identity of each board.
+    // For a single board its number is enough. For a list, the identity of each board is needed.
     if let ([board], Boards::Some(_)) = (numbers, &args.boards)
         && !args.inventory.exists()
     {

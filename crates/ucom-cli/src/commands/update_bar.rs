@@ -1,4 +1,4 @@
-//! Bar of an update on stderr. A separate thread draws it: a blocked terminal (Ctrl-S) must not delay a block.
+//! Bar of an update on stderr. A separate thread draws it, so a blocked terminal (Ctrl-S) does not delay a block.
 
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::time::Duration;
@@ -7,7 +7,7 @@ use cli_kit::{ErrorKind, Failure, Output, ProgressBar};
 use ucom_host::master::Event;
 use ucom_host::master::update::Progress;
 
-/// Largest number of waiting steps; more are dropped.
+/// Largest number of waiting steps; further ones are dropped.
 const WAITING: usize = 4;
 /// Longest wait for a blocked terminal at the end.
 const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
@@ -15,7 +15,7 @@ const PRINT_TIMEOUT: Duration = Duration::from_secs(1);
 /// Next state of the bar.
 struct Step {
     bar: ProgressBar,
-    /// Number of the bar: a new bar replaces the previous one.
+    /// Number of the bar. A bar with a new number replaces the previous one.
     serial: usize,
     bytes: u64,
     message: String,
@@ -58,7 +58,7 @@ impl<'a> Bar<'a> {
         if let Some((_, bar)) = &self.bar {
             let (bar, serial) = (bar.clone(), self.serial);
             let step = Step { bar, serial, bytes: progress.bytes, message: message(progress) };
-            // If too many steps wait, this one is dropped: the next step contains the same progress, and more.
+            // If too many steps wait, this one is dropped. The next step includes its progress.
             let _ = self.steps.try_send(step);
         }
     }

@@ -1,4 +1,4 @@
-//! Files and date of an update, checked against the profile's plan.
+//! Files and date of an update, checked against the plan of the profile.
 
 use std::path::{Path, PathBuf};
 
@@ -25,7 +25,7 @@ pub struct Files {
 }
 
 impl Files {
-    /// Reads the files of the plan; refuses others.
+    /// Reads the files that the plan needs; refuses other files.
     pub fn read(args: &UpdateArgs, profile: &Profile, out: &Output) -> Result<Self, Failure> {
         if args.name_target && !has_header(profile) {
             return Err(Failure::usage(
@@ -51,7 +51,7 @@ fn image(file: &Path, args: &UpdateArgs, out: &Output) -> Result<(UpdateImage, S
     let format = args.raw.then_some(Format::Bin);
     let options = ImageOptions { format, address_unit, gaps, ..Default::default() };
     let image = Image::read(file, &options).map_err(|e| {
-        // Some errors name the file themselves.
+        // Some errors already contain the file name.
         let (path, text) = (file.display().to_string(), e.to_string());
         let failure = Failure::usage(if text.contains(&path) { text } else { format!("{path}: {text}") });
         failure.next(advice(&e))
@@ -125,7 +125,7 @@ fn second(args: &UpdateArgs, plan: Plan) -> Result<Option<&Path>, Failure> {
     Ok(None)
 }
 
-/// Returns the flash date: as requested, else today (UTC); 0 if no header carries it.
+/// Returns the flash date: the requested one, or else today (UTC); 0 if no header contains a date.
 pub fn day(asked: Option<&str>, profile: &Profile) -> Result<u16, Failure> {
     let form = profile.prog_date;
     let date = match asked {
@@ -165,7 +165,7 @@ mod tests {
     use super::*;
     use ucom::DateForm;
 
-    /// D-45: days of the calendar in the profile's form, or its bits.
+    /// D-45: a date is a day of the calendar in the profile's form, or a plain number.
     #[test]
     fn d45_dates_are_days_of_the_calendar() {
         let fat = Profile::default();
@@ -186,11 +186,11 @@ mod tests {
             assert!(read(wrong).is_none(), "{wrong}");
         }
         assert!(day(None, &fat).is_ok_and(|today| today > 0x3AC1));
-        // Bits only, because this form has no calendar.
+        // This form has no calendar, so only plain numbers are valid.
         let raw = Profile { prog_date: DateForm::Raw, ..fat };
         assert_eq!(day(Some("0x1234"), &raw).ok(), Some(0x1234));
         assert!(day(None, &raw).is_err_and(|e| e.next.to_string().contains("0x3AC1")));
-        // No header, no date.
+        // Without a header there is no date.
         let none = Profile { prog_plan: Plan::Raw, ..fat };
         assert_eq!(day(None, &none).ok(), Some(0));
         assert!(day(Some("2009-06-01"), &none).is_err());

@@ -1,4 +1,4 @@
-//! Result of an update, as text and as JSON.
+//! Result of an update as text and as JSON.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub fn print(report: &UpdateReport, names: &[PathBuf], profile: &Profile, out: &
         "bytes": report.bytes,
         "images": images.clone().map(|(image, name)| image_value(image, name)).collect::<Vec<_>>(),
         "unverifiable": report.unverifiable.map(|why| json!({ "reason": why.to_string(), "hint": why.hint() })),
-        // Scripts mostly read the outcome of one board, or of several boards if it is equal for all.
+        // Scripts mostly read the outcome of one board, or the outcome of several boards if all are equal.
         "outcome": match report.boards.as_slice() {
             [first, rest @ ..] if rest.iter().all(|b| b.outcome == first.outcome) => json!(first.outcome.name()),
             _ => Value::Null,
@@ -59,13 +59,13 @@ fn boards(report: &UpdateReport, profile: &Profile) -> String {
     table(&[">board", "flash id", "outcome", ">attempts", ">time", ""], &rows)
 }
 
-/// Returns `true` if only the report of the board itself shows that it is done.
+/// Returns `true` if the board's own report is the only evidence that it is done.
 fn taken_on_trust(b: &UpdateResult, report: &UpdateReport) -> bool {
     let done = matches!(b.outcome, UpdateOutcome::Written | UpdateOutcome::Running);
     report.unverifiable.is_some() && done && b.failure.is_none()
 }
 
-/// Returns the next step for boards whose own answer is the only evidence of the program.
+/// Returns the next step if the program is known only from the board's own answer.
 fn not_known(report: &UpdateReport) -> String {
     match report.boards.iter().any(|b| b.outcome == UpdateOutcome::ProgramUpToDate) {
         true if report.accept_unverified => "program-up-to-date is accepted, NOT verified\n".into(),
@@ -76,7 +76,7 @@ fn not_known(report: &UpdateReport) -> String {
     }
 }
 
-/// Describes what could not be verified, the reason, and a possible verification.
+/// Describes what could not be verified, why, and how it could be verified.
 fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     let Some(why) = report.unverifiable else { return String::new() };
     let line = |b: &UpdateResult| {
@@ -102,7 +102,7 @@ fn unverified(report: &UpdateReport, profile: &Profile) -> String {
     format!("{lines}{why};\n{}{accept}\n", why.hint())
 }
 
-/// Returns `true` if PC_INFO shows another program than before.
+/// Returns `true` if PC_INFO reports another program than before.
 fn changed(b: &UpdateResult) -> Option<bool> {
     let program = |info: BoardInfo| (info.program_id, info.date);
     Some(program(b.before?) != program(b.after?))

@@ -155,7 +155,7 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// Sends a frame in candump notation, `1C1#0202`.
+    /// Sends a frame in candump notation, for example `1C1#0202`.
     pub fn send(&mut self, text: &str) {
         let (id, data) = text.split_once('#').expect("ID#DATA");
         let id = Id::standard(u32::from_str_radix(id, 16).expect("hex")).expect("11 bits");

@@ -18,9 +18,9 @@ import urllib.request
 import served
 
 DESCRIPTION = "openapi.json"
-# Bd. At this rate a log arrives within the time that a request of Schemathesis may take.
+# Baud rate at which a log arrives within the time that a request of Schemathesis may take.
 RATE = "3000000"
-# First and last bytes of a recording in MCAP.
+# First and last bytes of an MCAP recording.
 MCAP = b"\x89MCAP0\r\n"
 
 
@@ -43,7 +43,7 @@ def programs(jtc, directory):
         status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
 
-        # The whole sequence: run, pause, slower, resume, result.
+        # Runs the arm, pauses it, reduces the speed, resumes, and reads the result.
         status, job = anna.command("run", body=anna.model("RunRequest", trajectory=3))
         assert status == 202, job
         number, _ = anna.event("executing")
@@ -57,7 +57,7 @@ def programs(jtc, directory):
             number, event = anna.event("state", number)
             if event.trajectory == "Pause":
                 break
-        # Other clients read meanwhile, from another terminal.
+        # Meanwhile other clients read from another terminal.
         shown = run_jtc("status", "--json")
         assert shown.returncode == 0 and json.loads(shown.stdout)["trajectory"] == "Pause", shown
         seen = run_jtc("monitor", "--json", "--count", "20")
@@ -69,14 +69,14 @@ def programs(jtc, directory):
         assert all(joint.max_error_mrad < 20 for joint in done.result.joints), done.result
         assert anna.command("set_speed", body=anna.model("SpeedObject", percent=100))[0] == 204
 
-        # A second client stops the arm without a lease; then the command does.
+        # A second client stops the arm without a lease. Then the command stops it.
         for stop in [lambda: bob.ask("stop")[0] == 200, lambda: run_jtc("traj", "stop").returncode == 0]:
             # After another client's Stop motion requests are refused for three seconds.
             time.sleep(3.2)
             shown = anna.ask("get_status")[1]
             after = shown.last_event
             request = anna.model("RunRequest", trajectory=3, approach=True, repeat=5)
-            # A request made before a Stop moves nothing, after any delay.
+            # A request made before a Stop moves nothing, whatever its delay.
             status, denied = anna.command("run", body=request, asked_after=shown.last_halt - 1)
             assert status == 409 and denied.code == "denied", denied
             status, job = anna.command("run", body=request, asked_after=shown.last_halt)
@@ -92,7 +92,7 @@ def programs(jtc, directory):
 
 
 def everything_else(jtc, directory):
-    """Requests to a controller other than motions: settings, absent joints, flight recorder, arm, plans."""
+    """Checks the requests that are not motions: settings, disabled joints, flight recorder, arm, plans."""
     # Reading the log of the flight recorder takes long on a slow line.
     with served.serving(jtc, directory, "--baud", RATE) as agent:
         anna = served.Generated(served.generated(DESCRIPTION, directory, "whole_arm_client"), agent)
@@ -119,7 +119,7 @@ def everything_else(jtc, directory):
             status, found = anna.ask("get_absent")
             assert (status, found.to_dict()) == (200, {"absent": absent}), found
 
-        # The arm as it is, then under another name, then as it was.
+        # Pushes the present arm, the same arm under another name, and the original arm again.
         status, arm = anna.ask("get_arm")
         assert status == 200 and arm.hash_ == anna.ask("get_info")[1].hash_
         for text in (arm.text.replace('name = "avena"', 'name = "other"', 1), arm.text):
@@ -131,7 +131,7 @@ def everything_else(jtc, directory):
         status, denied = anna.command("put_arm", body=anna.model("ArmRequest", text=arm.text[:1000]))
         assert status == 422 and anna.ask("get_arm")[1].text == arm.text, denied
 
-        # The motion is planned, stored and run, and is then in the flight recorder.
+        # The motion is planned, stored and run. Afterwards the flight recorder contains it.
         status, job = anna.command("recover", body=anna.model("RecoverRequest", defaults=True))
         assert status == 202 and anna.over(job.number, renewing=True).stage == "finished"
         way = "q1,q2,q3,q4,q5,q6\n0,0,0,0,0,0\n0.3,-0.2,0.2,0,0,0\n0,0,0,0,0,0.2\n"

@@ -39,12 +39,12 @@ class Viewer:
             self.lines.put(json.loads(line))
 
     def forget(self):
-        """Skips everything that was received until now."""
+        """Skips all messages received so far."""
         while not self.lines.empty():
             self.lines.get()
 
     def until(self, wanted):
-        """Returns the first object for which `wanted` returns something, and that result."""
+        """Returns the first object for which `wanted` returns a result, and this result."""
         end = time.monotonic() + served.PATIENCE_S
         while time.monotonic() < end:
             with contextlib.suppress(queue.Empty):
@@ -81,7 +81,7 @@ def viewing(packages, url):
 
 
 def installed(directory):
-    """Returns the viewer with its packages, as the lock file has them."""
+    """Installs the packages in the versions of the lock file, and returns the viewer."""
     packages = directory / "packages"
     shutil.copytree(SOURCE, packages)
     command = [served.SCRIPTS / "npm", "ci", "--ignore-scripts", "--no-fund", "--no-audit", "--silent"]

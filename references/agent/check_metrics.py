@@ -4,7 +4,7 @@ protocol that was written from its specification only.
 usage: check_metrics.py JTC
 
 The metrics are compared with `/api/status` and with the actions of this script. The messages on the Foxglove channels are decoded with
-the schemas that came with them and compared in the same way, also while the arm moves. A client that never reads does not disturb another
+the schemas that came with them and compared in the same way, at rest and in motion. A client that never reads does not disturb another
 client and is disconnected. Pages of allowed origins have read-only access. Needs prometheus-client, websockets and mcap-ros2-support.
 """
 
@@ -28,7 +28,7 @@ import served
 
 ORIGIN = "https://app.example"
 NAMES = ["foxglove.websocket.v1", "foxglove.sdk.v1"]
-# A client that never reads is disconnected after 10 s without a pong; the machine may be slow.
+# A client that never reads is disconnected after 10 s without a pong. On a slow computer this takes longer.
 GONE_S = 60.0
 
 
@@ -56,12 +56,12 @@ def states(metrics, name):
 
 
 def check_metrics(arm):
-    """Compares every number of the page that is also shown elsewhere."""
+    """Compares every metric that another interface also shows."""
     for _ in range(20):
         status = arm.json("GET", "/api/status")
         metrics = arm.metrics()
         again = arm.json("GET", "/api/status")
-        # Skips samples between which a path ended and was sent again.
+        # Skips samples if a path ended and was sent again between them.
         (before, point), (after, then) = [(s["controller"]["trajectory"], s["controller"]["point"]) for s in (status, again)]
         if before == after and point <= then:
             break
@@ -110,7 +110,7 @@ class Viewer:
         return self
 
     async def take(self):
-        """Returns the next message: topic, stamp (ns), decoded contents; `None` for a message of another kind."""
+        """Returns the next message: topic, timestamp in ns, decoded contents; `None` for a message of another kind."""
         message = await asyncio.wait_for(self.socket.recv(), 20)
         if isinstance(message, str):
             message = json.loads(message)
@@ -220,7 +220,7 @@ async def check_channels(arm):
         joints = arm.json("GET", "/api/status")["controller"]["joints"]
         assert "/joint_commands" not in seen, "nobody has commanded anything"
         assert len(seen["/robot_description"]) == 1, "the description is sent once"
-        # At most 25 per second, from an arm that reports at least as often.
+        # At most 25 messages per second; the arm reports at least as often.
         count = len(seen["/joint_states"])
         assert 20 <= count <= 5 * 25 + 2, count
         of_states = [stamp for topic, stamp in stamps if topic == "/joint_states"]
@@ -286,7 +286,7 @@ async def check_motion(arm):
         assert len(errors) > 300 and max(errors) < 0.02, (len(errors), max(errors, default=None))
         check_metrics(arm)
         assert max(gaps) < 3, "the one that reads is not disturbed"
-        # In the middle of the path, not while it is sent again.
+        # This is in the middle of the path, and not while it is sent again.
         await viewer.until("/jtc/status", lambda words: words["trajectory"] == "Execute" and 1000 < words["point"] < 3000)
         halt = await viewer.call("pause", 1)
         assert halt["sent"] == "pause"
@@ -308,14 +308,14 @@ async def check_motion(arm):
 
 
 def arm_sockets(url):
-    """Returns the established connections to the agent, by the system's own list."""
+    """Returns the established connections to the agent, from the list of the operating system."""
     port = int(url.rsplit(":", 1)[1])
     rows = pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]
     return sum(row.split()[1].endswith(f":{port:04X}") and row.split()[3] == "01" for row in rows)
 
 
 async def refused(arm, **options):
-    """Returns the status of a refused socket."""
+    """Returns the HTTP status with which a socket is refused."""
     try:
         async with socket(arm.url, **options):
             return 101

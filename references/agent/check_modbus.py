@@ -22,17 +22,17 @@ from pymodbus.exceptions import ModbusException
 import served
 
 PAGE = served.DOCS / "modbus.md"
-# The codes used here, by the numbers in the page's tables.
+# Codes that this script uses, from the tables of the page.
 DONE, SEQUENCE, VALUE, NO_TRAJECTORY, BUSY, HELD, STOPPED, COIL, NOT_READY = 1, 2, 3, 4, 5, 6, 7, 8, 9
 START, PAUSE, RESUME, STOP, TEACH, TEACH_OFF, PUMP_ON, PUMP_OFF, CLEAR, RECOVER, DEFAULTS, SPEED, RELEASE = range(1, 14)
 RUNNING, FINISHED, STOPPED_JOB, FAILED = 1, 2, 3, 4
-# Long enough for a busy computer; the second value is for tests in which the watchdog expires.
+# The first value is long enough for a busy computer. The second one is for tests in which the watchdog expires.
 WATCHDOG_MS, SHORT_MS = 10_000, 2000
 WORDS = {"u16": 1, "u32": 2, "f32": 2}
 
 
 def tables():
-    """Returns name to (address, count, form) for each table of the page."""
+    """Returns, for each table of the page, a mapping from names to (address, count, form)."""
     found, title = {}, None
     for line in PAGE.read_text().splitlines():
         if line.startswith("### "):
@@ -70,7 +70,7 @@ class Plc:
             time.sleep(0.1)
 
     def do(self, function, *arguments, **named):
-        """Returns the response of the server, also if it is an exception."""
+        """Returns the response of the server, even if it is an exception."""
         with self.lock:
             return getattr(self.client, function)(*arguments, **named)
 
@@ -181,7 +181,7 @@ def runs(agent, plc):
     job = now["job"]
     plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 2000)
     assert plc.bits()["executing"] and not plc.bits()["ready"]
-    # Only one command at a time.
+    # Only one command may run at a time.
     for other in (START, CLEAR, PUMP_ON, TEACH, RECOVER, RELEASE):
         result, now = plc.command(other, trajectory=3)
         assert result == BUSY and now["job"] == job, (other, now)
@@ -237,7 +237,7 @@ def repeats(agent, plc):
     now = plc.job_over()
     assert now["job"] == job + 1 and now["job_stage"] == STOPPED_JOB, now
     assert plc.command(START, trajectory=3, approach=1)[0] == COIL
-    # A repeated value is not an edge.
+    # Writing the same value again is not an edge.
     assert not plc.coil("stop", True).isError() and not plc.coil("stop", False).isError()
     plc.until(lambda now: plc.bits()["ready"])
 
@@ -271,7 +271,7 @@ def nonsense(agent, plc):
         response = plc.do(function, *arguments, **named)
         assert response.isError() and response.exception_code == code, (function, arguments, response)
     assert plc.do("read_holding_registers", 0, count=end).registers == before
-    # Requests that pymodbus never sends: half a frame, other protocols, invalid lengths.
+    # Sends requests that pymodbus never sends: half a frame, other protocols, invalid lengths.
     pieces = [b"\0\1\0\0\0\6\1\5\0\0\1\0", b"\0\1\0\0\0\7\1\x0f\0\0\xff\xff\0", b"\0\1\0\0\0\x09\1\x10\0\0\x80\1\2\0\0"]
     for piece in pieces:
         with socket.create_connection(("127.0.0.1", agent.port), timeout=5) as raw:
@@ -299,14 +299,14 @@ def two(agent, plc):
     assert not other.coil("stop", True).isError()
     now = plc.job_over()
     assert now["job_stage"] == STOPPED_JOB, now
-    # Refused while the coil is set, and for three seconds after that.
+    # Commands are refused while the coil is set, and for three seconds afterwards.
     assert plc.command(START, trajectory=3, approach=1)[0] == COIL
     assert not other.coil("stop", False).isError()
     assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
     job = now["job"]
     time.sleep(3.6)
     assert plc.inputs()["job"] == job and plc.inputs()["trajectory_state"] != 3
-    # A Stop by HTTP counts as another client's as well.
+    # A Stop by HTTP is also a Stop of another client.
     agent.http("POST /api/stop")
     assert plc.command(START, trajectory=3, approach=1)[0] == STOPPED
     time.sleep(3.6)
@@ -323,7 +323,7 @@ def held(agent, plc):
         assert result in (HELD, NOT_READY) and (command in (RESUME,) or result == HELD), (command, now)
         assert now["lease"] == 2 and now["trajectory_state"] != 3, now
     agent.http("DELETE /api/lease", key=grant["key"])
-    # Released and without a watchdog, the PLC cannot command.
+    # After its lease was released, the PLC cannot command without a watchdog.
     assert plc.command(RELEASE)[0] == DONE
     assert plc.command(PUMP_ON, watchdog=0)[0] == VALUE and plc.inputs()["lease"] == 0
     assert plc.command(PUMP_ON)[0] == DONE
@@ -333,7 +333,7 @@ def held(agent, plc):
     assert plc.command(START, trajectory=3)[0] == NOT_READY
     assert plc.command(TEACH_OFF)[0] == DONE
     plc.until(lambda now: plc.bits()["ready"])
-    # The check refuses the trajectory; joint and point are in the registers as numbers.
+    # The check refuses the trajectory. The registers contain the numbers of the joint and of the point.
     far = "t,q1,q2,q3,q4,q5,q6\n0,0,9,0,0,0,0\n1,0,9,0,0,0,0\n"
     assert agent.http("PUT /api/trajectories/4", {"name": "far", "text": far})[0] == 200
     assert plc.command(START, trajectory=4)[0] == DONE
@@ -344,11 +344,11 @@ def held(agent, plc):
 
 
 def watchdog(agent, plc):
-    """Loses the connection during a motion, which pauses; then the PLC connects again and resumes."""
+    """Checks a lost connection during a motion. The motion pauses; then the PLC connects again and resumes it."""
     result, now = plc.command(START, trajectory=3, approach=1, watchdog=SHORT_MS)
     assert result == DONE, now
     plc.until(lambda now: now["trajectory_state"] == 3 and now["point"] > 300)
-    # A client that only reads, even all the time, does not renew another client's lease.
+    # A client that only reads does not renew another client's lease, however often it reads.
     viewer = Plc(agent.port)
     job, left = now["job"], time.monotonic()
     plc.leave()
@@ -369,18 +369,18 @@ def watchdog(agent, plc):
     assert again.inputs()["trajectory_state"] == 2
     assert again.command(RESUME, watchdog=SHORT_MS)[0] == DONE
     again.until(lambda now: now["trajectory_state"] == 3)
-    # A PLC that stays connected but is silent has the same effect.
+    # A PLC that stays connected but sends nothing has the same effect.
     again.open = False
     end = time.monotonic() + served.PATIENCE_S
     while agent.joints()[0]["trajectory"] != "Pause":
         assert time.monotonic() < end, "it does not pause"
         time.sleep(0.1)
-    # The command stop ends the motion.
+    # The command `stop` ends the motion.
     assert again.command(STOP)[0] == DONE
     now = again.job_over()
     assert (now["job"], now["job_stage"]) == (job, STOPPED_JOB), now
     again.leave()
-    # After this the hold-off of three seconds after the watchdog's pause has passed.
+    # After this time the hold-off of three seconds after the watchdog's pause has ended.
     time.sleep(3.6)
     # The other policies: the motion stops, or continues to its end.
     for policy, stage in ((2, STOPPED_JOB), (0, FINISHED)):
@@ -403,7 +403,7 @@ def restarted(jtc, directory, sequence, motions):
             assert not plc.write("watchdog_ms", WATCHDOG_MS, 1, 3, 100, 1, 1, START, sequence).isError()
             now = plc.until(lambda now: now["result"] != 0)
             assert now["result"] == SEQUENCE and now["job"] == 0, now
-        # Trajectories survive the restart; the arm of this agent is not up yet.
+        # The trajectories are still there after the restart. The arm of this agent is not up yet.
         assert [kept["number"] for kept in agent.http("GET /api/trajectories")[1]] == motions
         plc.until(lambda now: plc.bits()["controller_there"])
         assert plc.command(START, trajectory=3)[0] == NOT_READY
@@ -411,7 +411,7 @@ def restarted(jtc, directory, sequence, motions):
 
 
 def commanded(jtc, directory):
-    """Runs a PLC at an agent from its start to its restart."""
+    """Checks a PLC with an agent, from the start of the agent to its restart."""
     assert len(COILS) == 2 and len(HOLDINGS) == 8 and len(INPUTS) > 20, MAP
     with serving(jtc, directory) as agent:
         assert agent.http("PUT /api/trajectories/3", {"name": "there and back", "text": motion(6)})[0] == 200

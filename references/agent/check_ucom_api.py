@@ -3,7 +3,7 @@
 usage: check_ucom_api.py UCOM
 
 openapi-python-client generates a first client from the description, and Schemathesis builds a second one from the same file. The first
-takes the lease, numbers the chain, runs boards, sets an input, waits until the axis is there, and updates a board. Another client stops
+takes the lease, numbers the chain, runs boards, sets an input, waits until the axis has arrived, and updates a board. Another client stops
 all boards without a lease. The second sends valid and invalid requests of all kinds, with and without a lease, and compares every answer
 with the description. Needs openapi-python-client and schemathesis.
 """
@@ -21,7 +21,7 @@ def agent(ucom, directory):
 
 
 class Chain(served.Generated):
-    """The generated client, with jobs for boards."""
+    """The generated client, extended by jobs for boards."""
 
     def job(self, operation, **values):
         """Runs a job and returns it after its end."""
@@ -40,7 +40,7 @@ def programs(ucom, directory):
         job = anna.job("init", body=anna.model("InitRequest"))
         assert job.stage == "finished" and [board.number for board in job.chain.boards] == [1, 2], job
 
-        # Control loops, an input by its name, and the axis that moves there, in hundredths of a degree.
+        # Runs the control loops and sets an input by its name. The axis moves there; positions are in hundredths of a degree.
         job = anna.job("run", body=anna.model("RunRequest", boards=[1, 2], active=True))
         assert job.stage == "finished" and all(board.active for board in job.run.boards), job
         status, sent = anna.command("set_input", number=1, name="set_position", body=anna.model("ValueRequest", value=1500))
@@ -56,7 +56,7 @@ def programs(ucom, directory):
             assert time.monotonic() < end, position
             time.sleep(0.05)
 
-        # Another client stops all boards, without a lease.
+        # Another client stops all boards without a lease.
         status, stopped = bob.ask("stop")
         assert status == 200, stopped
         _, event = bob.event("stopped", stopped.last_event)
@@ -64,7 +64,7 @@ def programs(ucom, directory):
         status, boards = bob.ask("list_boards")
         assert [board.state for board in boards] == ["exloader", "exloader"], boards
 
-        # An update, with the checksum on the protocol page.
+        # Updates a board. The protocol page gives the checksum of the image.
         image = base64.b64encode(bytes((37 * i + 11) % 256 for i in range(1000))).decode()
         request = anna.model("UpdateRequest", boards=[{"board": 2}], image=image, format="bin")
         # After another client's Stop motion requests are refused for three seconds.

@@ -31,8 +31,8 @@ ENDING_S = 20.0
 
 
 def run(*checks):
-    """Calls each check with the program that the script was given and with its own empty folder."""
-    # A terminated script leaves its `with` blocks, and so ends the agents that it has started.
+    """Calls each check with the program from the command line and with a separate empty folder."""
+    # A terminated script leaves its `with` blocks, which end the agents that it has started.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("terminated"))
     program = pathlib.Path(sys.argv[1]).resolve()
     for check in checks:
@@ -44,7 +44,7 @@ def run(*checks):
 class Agent:
     """A running agent."""
 
-    # Output of the agent when it was ready.
+    # Output of the agent up to the time when it was ready.
     ready: dict
     # Tokens by role.
     tokens: dict
@@ -58,8 +58,8 @@ class Agent:
 
 @contextlib.contextmanager
 def serving(program, directory, *options):
-    """Runs `PROGRAM serve --sim` on a free port, with its folders below `directory`, as an `Agent`. The agent ends with the block, even
-    if that fails."""
+    """Runs `PROGRAM serve --sim` as an `Agent` on a free port, with its folders below `directory`. The agent ends with the block,
+    even if the block fails."""
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("JTC_", "UCOM_"))}
     for name in ("state", "run", "cache"):
         (directory / name).mkdir(exist_ok=True)
@@ -80,13 +80,13 @@ def serving(program, directory, *options):
             try:
                 ended = process.wait(ENDING_S)
             finally:
-                # Kills an agent that does not end; has no effect on one that has ended.
+                # Kills the agent if it has not ended.
                 process.kill()
             assert ended == 0, f"the agent ended with {ended}"
 
 
 def over(ask, number):
-    """Waits for the end of the job with this number and returns the job; `ask` returns its present stage and the job."""
+    """Waits for the end of the job with this number and returns the job. `ask` returns the present stage and the job."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         stage, job = ask()
@@ -132,7 +132,7 @@ class Requests:
 
     @contextlib.contextmanager
     def renewing(self):
-        """Renews the lease within the block, also on a busy computer."""
+        """Renews the lease within the block, even on a busy computer."""
         done = threading.Event()
 
         def renew():
@@ -187,14 +187,14 @@ class Generated:
         return self.ask(operation, lease_key=self.key, **values)
 
     def take(self, name, **values):
-        """Takes the lease, which later commands use; returns the grant."""
+        """Takes the lease, which later commands use. Returns the answer of the agent."""
         status, grant = self.ask("take_lease", body=self.model("LeaseRequest", name=name, **values))
         assert status == 200, grant
         self.key = grant.key
         return grant
 
     def over(self, number, renewing=False):
-        """Waits for the end of a job and returns the job; `renewing` renews a lease that is shorter than the job."""
+        """Waits for the end of a job and returns the job. If the job takes longer than the lease, use `renewing`."""
 
         def ask():
             status, job = self.ask("get_job", number=number)
@@ -206,7 +206,7 @@ class Generated:
         return over(ask, number)
 
     def event(self, kind, after=0):
-        """Returns number and contents of the first event of a kind after a number; checks that no number is left out."""
+        """Returns number and contents of the first event of this kind after a number. Checks that no number is left out."""
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
             status, found = self.ask("get_events", after=after, wait_s=2.0)
@@ -220,7 +220,7 @@ class Generated:
 
 
 def requests_of_all_kinds(description, examples, serve, directory):
-    """Runs Schemathesis' valid and invalid requests for a description in docs/ on an agent that `serve` starts, with and without a lease.
+    """Sends Schemathesis' requests for a description in docs/ to an agent that `serve` starts, with and without a lease.
 
     Every answer is compared with the description; `examples` is the largest number of generated requests per operation.
     """
@@ -234,7 +234,7 @@ def requests_of_all_kinds(description, examples, serve, directory):
             # number.
             command += ["--exclude-checks", "positive_data_acceptance"]
             if lease:
-                # The lease holder reaches more code. The lease's own requests are excluded then, because their key is not known to
+                # Requests with the lease reach more code. The requests of the lease itself are excluded, because their key is not known to
                 # Schemathesis.
                 grant = Requests(agent.url, token).json("POST", "/api/lease", {"name": "everything", "lasts_s": 60.0})
                 command += ["-H", f"Lease-Key: {grant['key']}", "--exclude-path", "/api/lease"]
@@ -244,8 +244,8 @@ def requests_of_all_kinds(description, examples, serve, directory):
 
 
 def sway(amplitude, seconds):
-    """Returns the text of a trajectory: all joints there and back, at rest at both ends, every 10 ms; written without code of the
-    project."""
+    """Returns the text of a trajectory: all joints move there and back, with rest at both ends and a point every 10 ms. Uses no code of
+    the project."""
     lines = ["t," + ",".join(f"q{j}" for j in range(1, 7))]
     steps = round(100 * seconds)
     for n in range(steps + 1):

@@ -3,10 +3,11 @@
     python check_driving.py JTC [--board EMULATOR ELF] [--only NAME]
 
 JTC is the command (`cargo build --release -p jtc-cli`). Each description of the package example-robot-data is imported, checked, pushed
-and stored. Then the controller is switched off and on; its defaults must now be that arm, to the hash. A motion around the present pose
-must end where it began, with the largest error reported, and a joint is jogged. The controller is `jtc sim`, whose arm is the imported
-one and whose controller begins with the built-in arm. With --board the controller is the board's own program in the emulator, which
-stores its flash in a file while it is off. An arm file that differs in one component of gravity is refused, and the error names it.
+and stored. Then the controller is switched off and on. Now its defaults must be that arm, with the same hash. A motion around the present
+pose must end where it began, and its largest error is printed. A joint is jogged. The controller is `jtc sim`: the simulated arm is the
+imported one, and the controller begins with the built-in arm. With --board the controller is the board's own program in the emulator,
+which stores its flash in a file while it is off.
+An arm file with another value in one component of gravity is refused with an error that mentions gravity.
 """
 
 import argparse
@@ -22,13 +23,14 @@ import tomllib
 
 import descriptions
 
-# Name, file, options of the import.
+# Each entry: name, file, options of the import.
 ARMS = [
     ("ur5", "ur_description/urdf/ur5_robot.urdf", ["--tip", "ee_link"]),
     ("kinova", "kinova_description/robots/kinova.urdf", []),
     ("z1", "z1_description/urdf/z1.urdf", ["--joints", "joint1,joint2,joint3,joint4,joint5,joint6"]),
 ]
-# rad. A gear without play, an encoder of 16 bits and the proposed gains give a far smaller error; a wrong model gives a larger one.
+# Largest accepted error in rad. The error of a gear without play, a 16-bit encoder and the proposed gains is far smaller, that of a
+# wrong model larger.
 ERROR_MAX = 0.02
 AMPLITUDE = 0.15
 PATIENCE_S = 60
@@ -60,7 +62,7 @@ class Controller:
 
 
 class Desk:
-    """Runs the command, always with the same port."""
+    """Runs the command `jtc`, always with the same port."""
 
     def __init__(self, jtc, port):
         self.jtc, self.port = jtc, port
@@ -85,7 +87,7 @@ def motion(path, begin):
 
 
 def otherwise(arm, path):
-    """Writes the same arm file with another value in one component of gravity."""
+    """Writes a copy of the arm file with another value in one component of gravity."""
     text = arm.read_text()
     gravity = next(line for line in text.splitlines() if line.strip().startswith("gravity"))
     values = tomllib.loads(gravity.split("#")[0])[gravity.split("=")[0].strip()]
@@ -94,7 +96,7 @@ def otherwise(arm, path):
 
 
 def drive(desk, switch_on, arm, folder):
-    """Takes one arm through all steps; returns the largest error of the motion, rad."""
+    """Does all steps with one arm. Returns the largest error of the motion in rad."""
     with switch_on():
         pushed = desk("arm", "push", arm, "--store")
     with switch_on():
@@ -121,7 +123,7 @@ def drive(desk, switch_on, arm, folder):
 
 
 def largest_error(record):
-    """Returns the largest difference between commanded and measured position in a recorded motion, of all joints and times, rad."""
+    """Returns the largest difference in rad between commanded and measured position in a recorded motion, over all joints and times."""
     with record.open() as file:
         rows = csv.DictReader(line for line in file if not line.startswith("#"))
         # The columns are empty before the first point.

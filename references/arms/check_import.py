@@ -2,11 +2,11 @@
 
     python check_import.py JTC [--states 40] [--seed N]
 
-JTC is the command (`cargo build --release -p jtc-cli`). The descriptions are those of the package example-robot-data: axes other than z,
-fixed joints in between, joints without end, grippers that are left out. Pinocchio reads the original file, with all joints but the six
-held at 0; `jtc dynamics` reads the arm file. Gravity, inverse dynamics, mass matrix and forward dynamics must agree to 1e-9 of the
-largest entry, plus the effect of right angles that the controller makes exact. The torques that `jtc arm check` reports for its worst
-poses must agree to 1 mN·m, and the command must accept the file. Exit code 1 and the worst case on failure.
+JTC is the command (`cargo build --release -p jtc-cli`). The descriptions come from the package example-robot-data. They contain axes
+other than z, fixed joints between moving ones, joints without end, and grippers that are left out. Pinocchio reads the original file,
+with all joints except the six fixed at 0; `jtc dynamics` reads the arm file. Gravity, inverse dynamics, mass matrix and forward dynamics
+must agree to 1e-9 of the largest entry, plus the effect of right angles that the controller makes exact. The torques that `jtc arm check`
+reports for its worst poses must agree to 1 mN·m, and the command must accept the file. Exit code 1 and the worst case on failure.
 """
 
 import argparse
@@ -22,12 +22,12 @@ import pinocchio as pin
 import descriptions
 
 LIMIT = 1e-9
-# Largest relative change of a torque or an acceleration for a change of an angle.
+# Largest relative change of a torque or an acceleration per change of an angle.
 SENSITIVITY = 100.0
-# N·m. In the poses that `arm check` reports, positions with little effect are set to 0.
+# Tolerance in N·m. In the poses that `arm check` reports, positions with little effect are set to 0.
 HOLDING = 1e-3
 
-# File, joints to name (none: the file holds no other joints), tip to name.
+# Each entry: file, joints for the import (none if the file has no other joints), tip for the import.
 ARMS = [
     ("ur_description/urdf/ur3_robot.urdf", None, None),
     ("ur_description/urdf/ur5_robot.urdf", None, "ee_link"),
@@ -52,8 +52,8 @@ def run(command, lines=None):
 
 
 def reference(path, joints, gravity, base):
-    """Returns Pinocchio's model of the original, with all joints but the six held at 0, our order of joints, and the arm file's
-    gravity."""
+    """Returns Pinocchio's model of the original: all joints except the six are fixed at 0, the joints have our order, and gravity is
+    that of the arm file."""
     whole = pin.buildModelFromUrdf(str(path))
     held = [k for k, name in enumerate(whole.names) if k > 0 and name not in joints]
     model = pin.buildReducedModel(whole, held, pin.neutral(whole)) if held else whole
@@ -120,7 +120,7 @@ def compare(jtc, folder, rng, states, row):
 
 
 def snapped(angles):
-    """Returns the sum of the deviations of angles within 2 µrad of a right angle, which count as right angles (J-40), rad."""
+    """Returns the sum in rad of the deviations of angles within 2 µrad of a right angle, which are treated as right angles (J-40)."""
     off = np.abs(np.array(angles) - np.round(np.array(angles) / (np.pi / 2)) * (np.pi / 2))
     return off[off < 2e-6].sum()
 
@@ -130,7 +130,7 @@ def symmetric(upper):
 
 
 def worst_holding(model, data, names, holding):
-    """Returns the largest difference between the torques that `arm check` gives for its worst poses and Pinocchio's, N·m."""
+    """Returns the largest difference in N·m between the torques of `arm check` for its worst poses and Pinocchio's torques."""
     errors = []
     for h in holding:
         torque = pin.computeGeneralizedGravity(model, data, configuration(model, names, h["pose_rad"]))

@@ -1,6 +1,6 @@
 """Robot descriptions of other projects: the URDF files of the package example-robot-data, without its 400 MB of meshes.
 
-The files are downloaded once and stored in the folder that OPENJTC_ROBOTS names, or else next to the packages of the virtual environment.
+The files are downloaded once and stored in the folder OPENJTC_ROBOTS, or else next to the packages of the virtual environment.
 """
 
 import hashlib

@@ -1,6 +1,6 @@
 """Compares python-can's udp_multicast interface with can-link's: every frame is echoed as it was sent.
 
-Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, else built with cargo. Frames
+Needs python-can and msgpack. The example `echo` is taken from $JTC_EXAMPLES, or else built with cargo. Frames
 stay on this host (hop limit 0). Exit code 0: all agreed.
 """
 
@@ -20,7 +20,7 @@ TIMEOUT_S = 10.0
 
 
 def echoed(bus: can.BusABC) -> can.Message:
-    """Returns the next message that is not our own (python-can receives what it sends)."""
+    """Returns the next message of the other side (python-can also receives its own messages)."""
     end = time.monotonic() + TIMEOUT_S
     while time.monotonic() < end:
         try:

@@ -1,6 +1,6 @@
 """Compares python-can's slcan interface with can-link's adapter side, at a pseudo-terminal.
 
-Needs python-can and pyserial. The example `slcan_adapter` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all
+Needs python-can and pyserial. The example `slcan_adapter` is taken from $JTC_EXAMPLES, or else built with cargo. Exit code 0: all
 agreed.
 """
 
@@ -52,7 +52,7 @@ def main() -> int:
         line = adapter.stdout.readline()
         assert line.startswith("ready: /"), line
         path = line.removeprefix("ready: ").strip()
-        # A second host finds the adapter as the first one did.
+        # A second host finds the adapter in the same state as the first one.
         for _ in range(2):
             check(path, seed)
     finally:

@@ -1,6 +1,6 @@
 """Compares python-can's socketcand interface with can-link's server.
 
-Needs python-can. The example `socketcand_server` is taken from $JTC_EXAMPLES, else built with cargo. Exit code 0: all agreed.
+Needs python-can. The example `socketcand_server` is taken from $JTC_EXAMPLES, or else built with cargo. Exit code 0: all agreed.
 """
 
 import logging
@@ -44,7 +44,7 @@ def check_kinds(port: int, rng: random.Random) -> None:
 
 
 def check_two(port: int) -> None:
-    """Checks two clients: each receives the other's frames once and its own never, in order, and a burst without gaps."""
+    """Checks two clients: each receives the other's frames once and in order, a burst without gaps, and never its own frames."""
     with connect(port, "can1") as one, connect(port, "can1") as two:
         def send() -> None:
             for number in range(BURST):
@@ -64,9 +64,9 @@ def check_two(port: int) -> None:
 
 
 def check_busy(port: int) -> None:
-    """Checks a bus that is never quiet: connecting works, and the frames come without gaps.
+    """Checks a bus that is never quiet: a client can connect, and gets the frames without gaps.
 
-    Between two reads of python-can's constructor, a busy computer may pause longer than frames are held back. The client itself then
+    The server holds frames back while a client connects. A busy computer may pause longer than that between two reads. The client then
     refuses, and the check tries again.
     """
     attempts, connected = 60, 0
@@ -98,7 +98,7 @@ def check_unknown_bus(port: int) -> None:
 
 
 def main() -> int:
-    # python-can's messages about a line that is cut between two reads are of no interest here.
+    # Hides python-can's messages about a line that is cut between two reads.
     logging.getLogger("can").setLevel(logging.CRITICAL)
     seed = int(os.environ.get("SEED", random.randrange(2**32)))
     print(f"seed {seed}")

@@ -19,7 +19,7 @@ def program(name: str) -> list[str]:
 
 
 def received(bus: can.BusABC, timeout_s: float) -> can.Message:
-    """Returns the next message. python-can returns none when only a confirmation or a part of a line has come."""
+    """Returns the next message. Skips the results without a message, which python-can gives for confirmations and parts of lines."""
     end = time.monotonic() + timeout_s
     while time.monotonic() < end:
         message = bus.recv(1.0)

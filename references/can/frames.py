@@ -8,7 +8,7 @@ FD_LENGTHS = [*range(9), 12, 16, 20, 24, 32, 48, 64]
 
 
 def messages(rng: random.Random) -> list[can.Message]:
-    """Returns a message of each kind and length. Their ids are even; those of the answers are odd."""
+    """Returns a message of each kind and length. Their ids are even; the ids of the answers are odd."""
     found = []
     for extended in (False, True):
         top = 0x1FFFFFFF if extended else 0x7FF

@@ -18,7 +18,7 @@ def read(path):
 
 
 def right_angles(rpy):
-    """Returns angles of joint origins; those within 2e-6 rad of a multiple of a right angle become that multiple."""
+    """Returns angles of joint origins. An angle within 2e-6 rad of a multiple of a right angle becomes that multiple."""
     quarters = np.round(np.asarray(rpy) / (np.pi / 2)) * (np.pi / 2)
     return np.where(np.abs(rpy - quarters) <= 2e-6, quarters, rpy)
 

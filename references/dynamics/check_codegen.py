@@ -3,9 +3,9 @@
     python check_codegen.py
 
 Builds the crate for thumbv7em-none-eabihf with target-cpu=cortex-m7 (which computes f64 in hardware) and reads the assembly. The crate
-may not mention `panicking` anywhere. The per-tick functions may not contain a call, a fused multiply-add or a conditional branch, except
-one that closes a loop over the six joints. Every call therefore executes the same instructions, and the printed count is exact. Exit code
-1 on a finding.
+may not mention `panicking` anywhere. The per-tick functions may not contain a call, a fused multiply-add or a conditional branch; a
+branch that closes a loop over the six joints is allowed. So every call executes the same instructions, and the printed count is exact.
+Exit code 1 on a finding.
 """
 
 import glob
@@ -44,7 +44,7 @@ def is_instruction(line):
 
 
 def inspect(body):
-    """Returns the instructions that a call executes (without the clearing of a matrix by `__aeabi_memclr8`), and the findings."""
+    """Returns the number of instructions per call, without those of `__aeabi_memclr8`, which clears a matrix; and the findings."""
     count, findings, loops = sum(map(is_instruction, body)), [], 0
     for place, line in enumerate(body):
         word, *operands = line.split()

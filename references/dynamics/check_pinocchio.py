@@ -4,7 +4,7 @@
 
 PROGRAM is the example `reference` of the crate jtc-dynamics (`cargo build --release -p jtc-dynamics --example reference`). Every model
 has random joint origins, masses, inertias and gravity. A share of the models has parallel, nearly parallel, antiparallel or crossing
-axes, and every second model carries a payload at its flange (J-60). Angles close to a right angle are taken as J-40 takes them. Each
+axes, and every second model carries a payload at its flange (J-60). Angles close to a right angle are treated as in J-40. Each
 result must agree to 1e-9 relative to the largest entry of its vector or matrix. Needs `pin` from PyPI. Exit code 1 and the worst case on
 failure.
 """
@@ -22,7 +22,7 @@ SHAPES = [("inverse", 6), ("gravity", 6), ("mass matrix", 36), ("forward, rotors
 
 
 def random_inertia(rng):
-    """Returns six numbers of a possible inertia of a body: that of some random points."""
+    """Returns the six numbers of the inertia of some random points, which is always physically possible."""
     points = rng.normal(size=(8, 3)) * rng.uniform(0.02, 0.3)
     cov = points.T @ points / 8 * rng.uniform(0.2, 8.0)
     j = np.trace(cov) * np.eye(3) - cov

@@ -37,7 +37,7 @@ def frame(kind, body=b""):
 
 
 class Status:
-    """Bytes of a JtcStatus, by the offsets that existing hosts read."""
+    """Bytes of a JtcStatus, read at the offsets that existing hosts use."""
 
     def __init__(self, data):
         self.record = (data[4], data[5], data[6], struct.unpack_from(">H", data, 7)[0])
@@ -56,7 +56,7 @@ class Host:
         self.statuses = 0
 
     def status(self):
-        """Returns the next status; any other data are a failure."""
+        """Returns the next status. Any other data are an error."""
         end = time.monotonic() + PATIENCE_S
         while time.monotonic() < end:
             while len(self.held) >= 4:
@@ -120,14 +120,14 @@ def session(host):
     for kind in (0x0F, 0x08, 0x0A):
         host.ask(frame(kind))
     host.until("HoldPos", lambda s: s.state == "HoldPos")
-    # Refusals: a wrong CRC, an unknown type, a trajectory that begins in its middle, an Execute without a trajectory.
+    # Frames that are refused: a wrong CRC, an unknown type, a trajectory that begins in its middle, an Execute without a trajectory.
     broken = bytearray(frame(0x08))
     broken[-1] ^= 1
     host.ask(bytes(broken), expect=(4, 0))
     points = motion()
     head = lambda segment, segments: struct.pack(">4H", 3, segment, segments, 2)
     host.ask(frame(0x04, head(1, 3) + points[0]), expect=(1, 4))
-    # An existing host knows no data status above 6 (J-51), so "not allowed" is 6 for it.
+    # Existing hosts do not know data statuses above 6 (J-51), so for them "not allowed" is 6.
     host.ask(frame(0x0B, b"\x03"), expect=(1, 6))
     chunks = [b"".join(points[i : i + 500]) for i in range(0, len(points), 500)]
     for number, chunk in enumerate(chunks):

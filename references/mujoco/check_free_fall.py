@@ -36,7 +36,7 @@ def quaternion(rpy):
 
 
 def random_arm(rng):
-    """Returns the numbers of one arm, physical by construction."""
+    """Returns the parameters of one random arm, which is always physically possible."""
     uniform = rng.uniform
     joints = [[uniform(-0.4, 0.4) for _ in range(3)] + [uniform(-3.1, 3.1) for _ in range(3)] for _ in range(7)]
     links = []

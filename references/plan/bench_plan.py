@@ -1,10 +1,10 @@
-"""Measures planned motions and those of toppra and Ruckig; prints times and durations as JSON, for `cargo xtask bench`.
+"""Measures motions of jtc-plan, toppra and Ruckig; prints times and durations as JSON, for `cargo xtask bench`.
 
     python bench_plan.py PROGRAM
 
-PROGRAM is the example `plans` of the crate jtc-plan. `plan.ms_100` and `plan.ms_400`: planning 100 and 400 waypoints of six joints, with
-limits of jerk and torque. `plan.path_s` and `plan.toppra_s`: durations of motions along the same paths without a limit of jerk.
-`plan.path_ms` and `plan.toppra_ms`: times to plan them. `plan.moves_s` and `plan.ruckig_s`: durations from point to point.
+PROGRAM is the example `plans` of the crate jtc-plan. `plan.ms_100` and `plan.ms_400`: times to plan 100 and 400 waypoints of six joints,
+with limits of jerk and torque. `plan.path_s` and `plan.toppra_s`: durations of motions along the same paths without a limit of jerk.
+`plan.path_ms` and `plan.toppra_ms`: times to plan them. `plan.moves_s` and `plan.ruckig_s`: durations of motions from point to point.
 """
 
 import json

@@ -3,11 +3,11 @@
     python check_kinematics.py PROGRAM [--poses 40] [--seed N]
 
 PROGRAM is the example `poses` of the crate jtc-plan (`cargo build --release -p jtc-plan --example poses`). The arms are six axes of the
-robot descriptions of example-robot-data, as read by Pinocchio, and random arms. Pinocchio's forward kinematics makes a pose from random
-joint positions. Every solution for the pose must bring Pinocchio's flange there, to 1e-9 m and 1e-9 rad. Away from singular poses the
-original joint positions must be among the solutions, as well as those that Pinocchio's own iteration finds (closed forms: always;
-searches: except for at most one in a hundred). On lines the flange must be on the straight line with an even turn, with velocity and
-acceleration that Pinocchio computes from the derivatives. For the UR5 the solutions must be those of the formulas of R. S. Andersen
+robot descriptions of example-robot-data, as read by Pinocchio, and random arms. Pinocchio's forward kinematics computes a pose from
+random joint positions. Every solution for the pose must bring Pinocchio's flange there, to 1e-9 m and 1e-9 rad. Away from singular poses,
+the original joint positions must be among the solutions. The results of Pinocchio's own iteration must be among them as well: always for
+closed forms; a search may miss at most one in a hundred. On lines the flange must move straight and turn evenly, with the velocity and
+acceleration that Pinocchio computes from the derivatives. For the UR5 the solutions must equal those of the formulas of R. S. Andersen
 (Kinematics of a UR5, 2018). Exit code 1 and the worst case on failure.
 """
 
@@ -23,13 +23,13 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "arms"))
 import descriptions  # noqa: E402
 
 LIMIT = 1e-9
-# Smallest singular value (m and rad as they are) from which on a pose counts as away from singular poses.
+# A pose is away from singular poses if the smallest singular value is at least this (m and rad are not scaled).
 AWAY = 0.03
 # Largest share of the results of Pinocchio's iteration that our search may miss.
 MISSED = 0.01
 SAMPLES = 20
 
-# File, joints, and whether there is a closed form.
+# Each entry: file, joints, `True` if there is a closed form.
 UR = ["shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint"]
 ARMS = [
     ("ur_description/urdf/ur3_robot.urdf", UR, True),
@@ -152,7 +152,7 @@ def values(answer):
 
 
 def check_poses(program, arm, rng, count):
-    """Returns the worst residual, the number of known solutions, the number of those that are missing, and the failures."""
+    """Returns the worst residual, the number of known solutions, the number of missing ones, and the failures."""
     made = rng.uniform(-np.pi, np.pi, (count, 6))
     near = rng.uniform(-np.pi, np.pi, (count, 6))
     poses = [arm.flange(q) for q in made]
@@ -188,7 +188,7 @@ def check_poses(program, arm, rng, count):
 
 
 def check_lines(program, arm, rng, count):
-    """Returns the number of paths, the worst deviation from straight lines (m, rad), and that of velocity and acceleration."""
+    """Returns the number of paths, and the worst deviations from straight lines (m, rad) and of velocity and acceleration."""
     starts = rng.uniform(-np.pi, np.pi, (count, 6))
     starts = [q for q in starts if arm.smallest(q) > AWAY]
     begins = [arm.flange(q) for q in starts]
@@ -216,7 +216,7 @@ def check_lines(program, arm, rng, count):
 
 
 def ur5_solutions(target, d1, a2, a3, d4, d5, d6):
-    """Returns all solutions for the UR5, by Andersen's formulas in modified Denavit-Hartenberg frames."""
+    """Returns all solutions for the UR5 from Andersen's formulas in modified Denavit-Hartenberg frames."""
 
     def frame(alpha, a, d, theta):
         return pin.SE3(pin.rpy.rpyToMatrix(alpha, 0, 0), np.array([a, 0, 0])) * pin.SE3(

@@ -2,10 +2,10 @@
 
     python check_plan.py PROGRAM [--moves 300] [--paths 40] [--seed N]
 
-PROGRAM is the example `plans` of the crate jtc-plan (`cargo build --release -p jtc-plan --example plans`). Point to point, with random
-limits of velocity, acceleration and jerk: durations within 1 % of Ruckig's. Along blended paths without a limit of jerk, with and without
-torque limits: within 2 % of toppra's. toppra gets the same path as positions with two derivatives, and its torque from Pinocchio. Exit
-code 1 and the worst case on failure.
+PROGRAM is the example `plans` of the crate jtc-plan (`cargo build --release -p jtc-plan --example plans`). Motions from point to point
+have random limits of velocity, acceleration and jerk; their durations must be within 1 % of Ruckig's. Motions along blended paths have no
+limit of jerk, and some have torque limits; their durations must be within 2 % of toppra's. toppra gets the same path as positions with
+two derivatives, and its torque from Pinocchio. Exit code 1 and the worst case on failure.
 """
 
 import argparse

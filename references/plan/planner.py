@@ -27,7 +27,7 @@ def answers(program, lines):
 
 
 def ruckig_duration(start, end, velocity, acceleration, jerk):
-    """Returns Ruckig's duration of a move from rest to rest. Without waypoints, which Ruckig would send to a server."""
+    """Returns Ruckig's duration of a move from rest to rest. Waypoints are not used, because Ruckig would send them to a server."""
     given = ruckig.InputParameter(6)
     given.current_position, given.target_position = list(start), list(end)
     given.max_velocity, given.max_acceleration, given.max_jerk = list(velocity), list(acceleration), list(jerk)
@@ -64,7 +64,8 @@ class SampledPath(toppra.interpolator.AbstractGeometricPath):
 
 
 def toppra_duration(rows, velocity, acceleration, inverse=None, torque=None):
-    """Returns the duration of the fastest motion along a path in rows as the example prints them, and the time to find it, s."""
+    """Returns the duration of the fastest motion along a path, and the time to compute it, both in s. The path has the rows that the
+    example prints."""
     scheme = toppra.constraint.DiscretizationType.Interpolation
     begin = time.perf_counter()
     path = SampledPath(rows)

@@ -2,7 +2,7 @@
 
 usage: check_mcap.py RECORDING.mcap [RECORDING.csv]
 
-Needs `mcap` and `mcap-ros2-support` from PyPI. With a CSV file of the same run, both must hold the same numbers.
+Needs `mcap` and `mcap-ros2-support` from PyPI. If a CSV file of the same run is given, both must contain the same numbers.
 """
 
 import csv

@@ -1,4 +1,4 @@
-"""First steps of rows with simulated boards."""
+"""First steps of the test rows that use simulated boards."""
 
 import tempfile
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ FLASH = "0x21,0x42,0x63,0x04,0x7F"
 
 
 def status(peer: Peer, board: int) -> str:
-    """Returns the status byte of PC_INFO, although a running board's process data come in between."""
+    """Returns the status byte from the answer to PC_INFO. Skips process data of running boards before it."""
     return peer.answer(wire.frame(8, board), f"{0x140 + board:03X}#")[10:12]
 
 
 def give_numbers(bench: Bench, peer: Peer, boards: int) -> None:
-    """Resets all boards and numbers the first ones."""
+    """Resets all boards and gives numbers to the first ones."""
     peer.ask("000#", 0.6)
     for board in range(1, boards + 1):
         number = f"{board:02X}"
@@ -38,7 +38,7 @@ def five(bench: Bench) -> Chain:
 
 @contextmanager
 def chain_of(bench: Bench, boards: str) -> Iterator[Chain]:
-    """Starts a chain from the text of a file."""
+    """Starts a chain whose file has this text."""
     with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
         file.write(boards)
         file.flush()

@@ -1,4 +1,4 @@
-"""Rows of `check_boards.py`: a raw-frame peer updates simulated boards."""
+"""Test rows of `check_boards.py` in which a raw-frame peer updates simulated boards."""
 
 import time
 
@@ -26,7 +26,7 @@ def block(peer: Peer, board: int, data: bytes) -> str:
 
 
 def identity(bench: Bench, program: int, date: int) -> str:
-    """Returns Program ID and date as DSP_INFO has them."""
+    """Returns the bytes of Program ID and date in DSP_INFO."""
     return (wire.word(bench.order, program) + wire.word(bench.order, date)).hex().upper()
 
 
@@ -50,7 +50,7 @@ def update(bench: Bench) -> None:
         bench.ok("D-T17")
 
 
-# Mistakes of a peer, the error for each, and whether something was erased by then.
+# Each entry: mistake of the peer, error code, and whether memory was erased before the error.
 MISTAKES = {
     "bad sum": (5, False), "wrong target": (2, False), "DLC 7": (7, False), "a pause in a block": (10, False),
     "cycle 2 first": (10, False), "address range": (2, False), "length range": (2, False),
@@ -60,7 +60,7 @@ MISTAKES = {
 
 
 def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
-    """Makes the mistake, so that the error is the next frame; returns False if the peer was too slow for it."""
+    """Makes the mistake; the next frame is the error. Returns False if the peer was too slow to make the mistake."""
     order = bench.order
     first = bytearray(wire.header(order, 1, image, DATE))
 
@@ -110,7 +110,7 @@ def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
                 give(peer, 1, bytes(first))
             give(peer, 1, b"\0" * 8)
             answer = peer.wait(*VERDICTS)
-            # The board had processed the block before this peer's ninth frame came, so the mistake did not occur.
+            # The board had processed the block before it received this peer's ninth frame, so the mistake did not occur.
             if answer == "181#":
                 return False
             bench.same("D-T18", f"{name}:", answer, "081#04")
@@ -120,7 +120,7 @@ def mistake(bench: Bench, peer: Peer, name: str, image: bytes) -> bool:
 
 
 def mistakes(bench: Bench, part: int) -> None:
-    """Checks a third of the mistakes."""
+    """Checks every third mistake, starting with number `part`."""
     some = list(MISTAKES.items())[part::3]
     for name, (_, erased) in some:
         for tries in range(5):

@@ -126,7 +126,7 @@ def process_data(bench: Bench) -> None:
     text = text.replace(', { name = "c" }', "")
     with chain_of(bench, text) as chain, chain.peer() as peer:
         start(bench, peer)
-        # Ten outputs: the last of four packages has one word, and its other two words are 0.
+        # With ten outputs, the last of four packages contains one output, and its other two words are 0.
         peer.send("680#")
         peer.send("541#")
         last = peer.wait("381#" + wire.word(order, 9).hex().upper())
@@ -152,13 +152,13 @@ def life_signs_missing(bench: Bench) -> None:
 
 
 def life_signs(bench: Bench) -> None:
-    """Checks D-T14 for the whole minute."""
+    """Checks D-T14 for a complete minute."""
     with five(bench) as chain, chain.peer() as peer:
         start(bench, peer)
         sent = [peer.send("680#")]
         peer.send("541#")
         bench.same("D-T14", "flags", peer.wait("601#"), "601#01000000")
-        # A heartbeat every 500 ms for a minute, then one is missing.
+        # A heartbeat is sent every 500 ms for a minute; then one is missing.
         due, stops, outputs = time.monotonic(), [], 0
         for step in [1] * 120 + [2, 1]:
             due += 0.5 * step
@@ -169,7 +169,7 @@ def life_signs(bench: Bench) -> None:
                     stops.append(peer.stamp)
             sent.append(peer.send("680#"))
         gaps = sorted(after - before for before, after in zip(sent, sent[1:]))
-        # If a pause is near the limit, this peer itself was too late, and the row cannot judge the board.
+        # If a pause is near the limit, this peer was too late, so the row says nothing about the board.
         if gaps[-1] < 1.4:
             bench.same("D-T14", "stops in a minute, and with one heartbeat missing:", stops, [])
         bench.expect(outputs > 60 * 100, "D-T14", "two packages of outputs every 10 ms", f"{outputs} in a minute")

@@ -57,7 +57,7 @@ def foreign(bench: Bench) -> None:
 
 
 def recorded(bench: Bench) -> None:
-    """C-3 and C-7: a recording has the frames that were sent, and a replay sends them again; `000#` is a frame like any other."""
+    """C-3 and C-7: a recording contains the frames that were sent, and a replay sends them again. `000#` is a frame like all others."""
     for ending in ("log", "fzi"):
         sent = ["000#"] + [
             wire.frame(bench.random.randrange(28), bench.random.randrange(32), bench.random.randbytes(length))

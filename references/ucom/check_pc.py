@@ -76,14 +76,14 @@ def acknowledgements(bench: Bench) -> None:
 
 
 def repair(bench: Bench) -> None:
-    """5.4: the pin of board 2 goes down three times before PC_INIT(2), and the number of another board is never given."""
+    """5.4: the pin of board 2 is switched off three times before PC_INIT(2). The number of another board is never given again."""
     flash = bench.flash_ids(3)
     for deaf_master in (False, True):
         with bench.bus() as chain, boards(bench, chain, flash) as played:
             told(bench, "repair", chain.start("init", "--renew"), 0)
             del played.heard[:]
             played.later(0.0, played.crash, played.boards[2 if deaf_master else 1])
-            # Board 2 works, but its frames are lost, and board 3 has lost its number: board 3 must not become number 2.
+            # Board 2 works, but its frames are lost. Board 3 has lost its number. Board 3 must not get number 2.
             played.boards[1].mute = deaf_master
             time.sleep(0.3)
             said = told(bench, "repair", chain.start("repair", "2"), (1, 3, 4, 5) if deaf_master else 0)

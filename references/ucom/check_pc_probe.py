@@ -17,7 +17,7 @@ KEYS = ("inclusive", "all4", "auto_pin", "strict")
 
 
 def flat(table: dict, before: str = "") -> dict:
-    """Returns the keys of a profile, `a.b` for a key in a table."""
+    """Returns the keys of a profile; a key `b` in a table `a` becomes `a.b`."""
     out = {}
     for key, value in table.items():
         out |= flat(value, f"{before}{key}.") if isinstance(value, dict) else {f"{before}{key}": value}
@@ -46,14 +46,14 @@ def agrees(bench: Bench, path: str, quirks: dict, without: tuple[str, ...] = ())
 
 
 def numbering(bench: Bench, several: list[dict]) -> None:
-    """Checks `--init`, beginning with the profile's defaults for boards of any kind."""
+    """Checks `--init` with boards of all kinds; the probe begins with the default profile."""
     for quirks in several:
         with bench.bus() as chain, boards(bench, chain, bench.flash_ids(3), **quirks) as played:
             out = chain.path("found.toml")
             none = chain.write("none.toml", "")
             told(bench, "P-20", chain.start("probe", "--init", "--out", out, profile=none), 0)
             agrees(bench, out, quirks)
-            # The measured profile works.
+            # `ucom` works with the measured profile.
             said = told(bench, "P-20", chain.start("init", "--renew", profile=out), 0)
             seen = [(b["flash_number"], b["description"]) for b in said["boards"]]
             there = [(board.flash, board.names()[0]) for board in played.boards]
@@ -91,7 +91,7 @@ def some_by_chance(bench: Bench) -> None:
 
 
 def harmless(bench: Bench) -> None:
-    """Checks that without `--init` numbered or started boards stay unchanged, and that questions alone find all they can."""
+    """Checks that without `--init` numbered or started boards stay unchanged, and that the questions find all that they can."""
     for started in (False, True):
         quirks = {"inclusive": True, "all4": True}
         how = {"numbered": True, "shape": (7, 4, 2), "running": 3 if started else 0}

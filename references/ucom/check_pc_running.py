@@ -21,7 +21,7 @@ SAFE = "600#00000000"
 
 
 class Traffic(threading.Thread):
-    """Sends outputs of ten boards at full rate, two packages of each every 10 ms."""
+    """Sends outputs of ten boards at full rate: two packages of each board every 10 ms."""
 
     def __init__(self, peer: Peer, order: str, numbers: range):
         super().__init__(daemon=True)
@@ -43,7 +43,7 @@ class Traffic(threading.Thread):
 
 
 def interleaved(bench: Bench) -> None:
-    """P-6: outputs of ten boards, and DSP_INFO of board 3 between the frames of a dump of board 2."""
+    """P-6: outputs of ten boards and DSP_INFO of board 3 arrive between the frames of a dump of board 2."""
     flash = bench.flash_ids(13)
     order = bench.order
     head = wire.word(order, flash[2]) + bytes([3, MSTART | INIT]) + wire.word(order, 1) + wire.word(order, 2)
@@ -95,7 +95,7 @@ def dump_and_life_signs(bench: Bench) -> None:
 
 
 def lost_and_back(bench: Bench) -> None:
-    """P-15: a board falls silent for 6 s."""
+    """P-15: a board is silent for 6 s."""
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(2), numbered=True) as played:
         command = chain.start("run", "1,2", "--for", "11", "--active")
         bench.expect(command.wait_out("running") is not None, "P-15", "both boards run", command.notes)
@@ -124,7 +124,7 @@ def lost_and_back(bench: Bench) -> None:
 
 
 def rebooted(bench: Bench) -> None:
-    """P-16: an unrequested report."""
+    """P-16: a board sends a report without a request."""
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(2), numbered=True) as played:
         command = chain.start("run", "1,2", "--for", "4")
         bench.expect(command.wait_out("running") is not None, "P-16", "both boards run", command.notes)
@@ -138,7 +138,7 @@ def rebooted(bench: Bench) -> None:
 
 
 def second_master(bench: Bench) -> None:
-    """P-17: frames that only a PC sends, every 100 ms."""
+    """P-17: frames that only a PC sends arrive every 100 ms."""
     image = bench.image()
     zeros = "0" * 16
     frames = ["680#", "205#", "240#", "585#", "600#00000000", f"345#{zeros}", f"2C5#{zeros}"]
@@ -159,7 +159,7 @@ def second_master(bench: Bench) -> None:
             # The frames of the other PC are received here as well.
             odd = [f for f in intrusive(played.frames()) if f != frame]
             bench.same("P-17", f"{words[0]}: frames that do something", odd, [])
-        # A running board's own heartbeats and flags do not count as those of a PC.
+        # The tool does not mistake heartbeats and flags of a running board for frames of a PC.
         command = chain.start("start", "1")
         while command.process.poll() is None:
             other.send("682#")
@@ -171,13 +171,13 @@ def second_master(bench: Bench) -> None:
 
 
 def load(bench: Bench) -> None:
-    """P-19: sixteen boards with twelve outputs and three inputs each are more than a bus carries."""
+    """P-19: a bus cannot carry the data of sixteen boards with twelve outputs and three inputs each."""
     shape = (3, 12, 0)
     how = {"numbered": True, "shape": shape, "running": 16}
     with bench.bus(PATIENT) as chain, boards(bench, chain, bench.flash_ids(16), **how) as played:
         command = chain.start("run", "1-16", "--for", "1")
         said = told(bench, "P-19", command, 4)
-        # The first number of boards that is too large: whole packages of 135 bits, outputs every 10 ms, inputs every 20 ms.
+        # Smallest number of boards that is too large. A package has 135 bits; outputs are sent every 10 ms, inputs every 20 ms.
         forecast, count = map(int, re.search(r"(\d+) %.* (\d+) boards", said["error"]["message"]).groups())
         percent = count * (4 * 100 + 1 * 50) * 135 / 1e6 * 100
         bench.expect(count <= 16 and 70 < forecast, "P-19", "a forecast of more than 70 %", said)

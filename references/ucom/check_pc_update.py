@@ -21,7 +21,7 @@ DATE = 0x3AC1
 
 @contextmanager
 def alone(bench: Bench, profile: str = "", **quirks) -> Iterator[tuple[Chain, Boards]]:
-    """Runs a bus with one numbered board; keywords are those of `Quirks`."""
+    """Runs a bus with one numbered board. The keyword arguments are fields of `Quirks`."""
     with bench.bus(PATIENT + profile) as chain, boards(bench, chain, [0x21], numbered=True, **quirks) as played:
         yield chain, played
 
@@ -60,7 +60,7 @@ def golden(bench: Bench) -> None:
                 header = "4355010001000000 00000000F4010000 3F4BC13AFFFFFFFF".split() + ["F" * 16] * 4
                 named = [f"2C1#{part}" for part in (*header, "FFFFFFFFFFFFDC22", "0B30557A9FC4E90E")]
                 bench.same("13.4", "first frames", frames[:9], named)
-            # D-62: no inventory has a record of this board, so its Program ID and date prove nothing.
+            # D-62: no inventory has a record of this board, so its Program ID and date do not prove the image.
             said = told(bench, "U-3", begin(chain, image), 4)
             bench.same("U-3", "outcome of the same image again", (said["outcome"], played.attempts), ("program-up-to-date", 1))
             said = told(bench, "U-3", begin(chain, image, "--unverified"), 0)
@@ -87,7 +87,7 @@ def one_by_one(bench: Bench) -> None:
 
 
 def late_ready(bench: Bench) -> None:
-    """P-8: 0.9 s for a block, 8 s for the erase and for the end."""
+    """P-8: the board needs 0.9 s for a block, and 8 s each for the erase and the end."""
     image = bench.image(200, 400)
     middle = bench.random.randint(1, blocks(image) - 2)
     late = {(1, 0): 0.9, (1, middle): 0.9, (2, 0): 8.0, (2, middle): 0.9, (2, blocks(image) - 1): 8.0}
@@ -115,7 +115,7 @@ def old_program(bench: Bench) -> None:
 def errors(bench: Bench) -> None:
     image = bench.image()
     last = blocks(image) - 1
-    # Code, cycle, block, attempts, exit code.
+    # Each entry: error code, cycle, block, attempts, exit code.
     cases = [(2, 1, 0, 1, 1), (5, 1, 0, 1, 1), (5, 2, 0, 1, 5), (2, 2, bench.random.randint(1, last), 1, 5),
              (1, 1, last, 3, 1), (1, 2, last, 3, 5)]
     for code, cycle, block, attempts, leave in cases:
@@ -149,7 +149,7 @@ def until(played: Boards, frames: int) -> int:
 def cancelled(bench: Bench) -> None:
     image = bench.image()
     for cycle in (1, 2):
-        # Slow enough that the signal comes during a block.
+        # The boards are slow, so the signal comes during a block.
         with alone(bench, profile="prog.frame_gap_us = 20000\n") as (chain, played):
             command = begin(chain, image)
             until(played, 8 * ((cycle - 1) * blocks(image) + 2) + bench.random.randint(1, 6))
@@ -184,7 +184,7 @@ def killed(bench: Bench) -> None:
 
 
 def group(bench: Bench) -> None:
-    """Checks a broadcast to boards 1 and 3, with DSP_READY after any delay of each. Board 2 receives all frames and is silent."""
+    """Checks a broadcast to boards 1 and 3, each with its own delay of DSP_READY. Board 2 receives all frames and sends none."""
     image = bench.image()
     plans = {"": {}, "board 3 complains once": {(1, bench.random.randint(1, blocks(image) - 1)): 1}}
     for name, once in plans.items():
@@ -219,7 +219,7 @@ def life_signs(bench: Bench) -> None:
 
 
 def punctual(bench: Bench, what: str, signs: list[float], first: float, last: float) -> None:
-    """Checks that a PC's heartbeats between two times are 500 ms apart: within 50 ms on average, and each within the bench's
+    """Checks that a PC's heartbeats between two times are 500 ms apart. The average may differ by 50 ms, each pause by the bench's
     tolerance."""
     gaps = [after - before for before, after in zip(signs, signs[1:])]
     bench.expect(len(gaps) >= 4 and signs[0] <= first + 0.6, "P-14", f"heartbeats all the time of the {what}", signs)

@@ -12,9 +12,9 @@ class Quirks:
     """Deviations and faults of these boards."""
 
     order: str = "little"
-    inclusive: bool = False  # the count of a string counts its header
+    inclusive: bool = False  # the count of a string includes its header
     all4: bool = False  # each board sends four reports
-    auto_pin: bool = False  # the pin goes up with the acknowledgement
+    auto_pin: bool = False  # the pin is switched on with the acknowledgement
     strict: bool = False  # surplus bytes are refused
     lost_acks: int = 0
     wrong_ack: bool = False
@@ -23,10 +23,10 @@ class Quirks:
     keeps_old: bool = False
     lost_finished: bool = False
     errors: dict[tuple[int, int], int] = field(default_factory=dict)  # error after a block of a cycle, from 0
-    late: dict[tuple[int, int], float] = field(default_factory=dict)  # delay of DSP_READY after a block, s
+    late: dict[tuple[int, int], float] = field(default_factory=dict)  # delay of DSP_READY after a block, in seconds
     late_by: Callable[[], float] = lambda: 0.0  # delay for all other blocks
-    dump_gap: float = 0.0  # pause between frames of an IO description, s
-    between: Callable[[], list[str]] = list  # other frames between them
+    dump_gap: float = 0.0  # pause between frames of an IO description, in seconds
+    between: Callable[[], list[str]] = list  # other frames between the frames of an IO description
 
 
 class Board:
@@ -38,7 +38,7 @@ class Board:
         self.status = EXLRUN
         self.program = (0x1234, 0x386E)
         self.silent = False
-        self.mute = False  # the board receives frames, but its own are lost
+        self.mute = False  # the board receives frames, but the frames that it sends are lost
         self.once: dict[tuple[int, int], int] = {}  # as `Quirks.errors`, each entry once
         self.dropping, self.busy = False, False
         self.block, self.blocks = b"", []
@@ -47,7 +47,7 @@ class Board:
         self.text = f"python {flash:x}"
 
     def names(self) -> list[str]:
-        """Returns its description, then the names of inputs, outputs and parameters."""
+        """Returns the description of the board, and then the names of inputs, outputs and parameters."""
         kinds = zip(("ci", "so", "par"), self.shape)
         return [self.text] + [f"{kind}{i} of {self.flash:x}" for kind, n in kinds for i in range(n)]
 

@@ -14,7 +14,7 @@ from peer import Peer
 
 
 class Boards(threading.Thread, Programming):
-    """A chain on a bus, with all received and sent frames and their times."""
+    """A chain on a bus, with a list of all received and sent frames and their times."""
 
     def __init__(self, peer: Peer, flash: list[int], quirks: Quirks, shape=(2, 4, 3), numbered=False, running=0):
         super().__init__(daemon=True)
@@ -51,7 +51,7 @@ class Boards(threading.Thread, Programming):
             self.broken = e
 
     def turn(self) -> None:
-        """Performs due actions, and handles a frame if one comes."""
+        """Performs due actions, and handles a frame if one arrives."""
         while (act := self.due()) is not None:
             act()
         with self.lock:
@@ -112,7 +112,7 @@ class Boards(threading.Thread, Programming):
                 self.numbered(board, function, to, data)
 
     def crash(self, board: Board) -> None:
-        """Lets the board reboot by itself."""
+        """Reboots the board without a request."""
         self.forget(board)
         self.report(board)
 
@@ -205,7 +205,7 @@ class Boards(threading.Thread, Programming):
             self.later(0.01, self.outputs, board, 0)
         board.status = board.status | MCARUN if on else board.status & ~MCARUN
         board.flags = bytes([on, on and board.flags[1], *board.flags[2:]])
-        # Not at once, because both sides use the same identifier.
+        # The answer is delayed, because both sides use the same identifier.
         self.later(0.003, self.say, 24, board.number, board.flags)
 
     def outputs(self, board: Board, turn: int) -> None:

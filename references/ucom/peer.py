@@ -65,7 +65,7 @@ class Chain:
 
 
 class Command:
-    """A running `ucom` command; every line of its output is stored with its time."""
+    """A running `ucom` command. Every line of its output is stored with its time."""
 
     def __init__(self, words: list[str], chain: Chain):
         environment = os.environ | {"UCOM_INVENTORY": chain.path("inventory.toml"), "UCOM_CACHE": chain.path("cache")}
@@ -86,7 +86,7 @@ class Command:
             lines.append((time.time(), line.rstrip("\n")))
 
     def end(self, seconds: float = 120.0) -> int:
-        """Waits for the end; returns the exit code, -9 for a killed process."""
+        """Waits for the end. Returns the exit code; -9 for a killed process."""
         try:
             code = self.process.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -123,7 +123,7 @@ class Command:
 
 
 class Peer:
-    """Sends and receives frames written as candump does, `1C1#0202`, with the bus's times of received frames."""
+    """Sends and receives frames in candump notation, such as `1C1#0202`. The times of received frames come from the bus."""
 
     def __init__(self, port: int):
         self.bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="can0", tcp_tune=True)
@@ -143,7 +143,7 @@ class Peer:
         return now
 
     def next(self, seconds: float) -> str | None:
-        """Returns the next frame within a time; `stamp` is the time at which it was on the bus."""
+        """Returns the next frame within a time. `stamp` is the time at which it was on the bus."""
         end = time.monotonic() + seconds
         while True:
             message = self.bus.recv(max(0.0, end - time.monotonic()))
@@ -163,12 +163,12 @@ class Peer:
         return frames
 
     def ask(self, text: str, seconds: float = 0.3) -> list[str]:
-        """Returns all frames within a time after a frame."""
+        """Sends a frame, and returns all frames within a time after it."""
         self.send(text)
         return self.all(seconds)
 
     def wait(self, *starts: str, seconds: float = 15.0) -> str:
-        """Returns the next frame that begins with one of `starts`, and skips others; empty if none came."""
+        """Returns the next frame that begins with one of `starts`; empty if none came. Skips other frames."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
             frame = self.next(left)
@@ -177,6 +177,6 @@ class Peer:
         return ""
 
     def answer(self, text: str, *starts: str, seconds: float = 5.0) -> str:
-        """Sends a request and returns the first answer that begins with one of `starts`; the timeout allows for a busy machine."""
+        """Sends a request and returns the first answer that begins with one of `starts`. The timeout is long enough for a busy computer."""
         self.send(text)
         return self.wait(*starts, seconds=seconds)

@@ -1,4 +1,4 @@
-"""How many frames python-can and cantools read in a second: `read_frames.py DBC CANDUMP-LOG` prints the number."""
+"""Prints the number of frames that python-can and cantools read in a second. Usage: `read_frames.py DBC CANDUMP-LOG`"""
 
 import sys
 import time

@@ -1,6 +1,6 @@
 """Runs the rows of the protocol's tests in parallel, each in its own process and on its own bus.
 
-A row that fails while others run is repeated once alone, and the second result counts: both are printed.
+A row that fails while others run is repeated once alone. The second result is the valid one; both are printed.
 
 A row is a function of a `Bench`; it runs once for each byte order of words. Random values depend on a seed that is printed; `--seed N`
 gives the same values again. `--only TEXT` runs the rows whose function name contains that text.
@@ -18,7 +18,7 @@ from peer import Chain
 
 # Times of the protocol have a tolerance of a fifth.
 BENCH = 1.2
-# A machine that wakes its programs this late, s, cannot judge answers within 100 ms.
+# Wake-up delay in seconds above which a computer is too slow to check answers within 100 ms.
 TOO_LATE = 0.05
 TRIES = 3
 
@@ -28,7 +28,7 @@ class Disagreement(Exception):
 
 
 class Jitter(threading.Thread):
-    """Measures how late this machine wakes threads that sleep 5 ms: no program here can be more punctual."""
+    """Measures how late this computer wakes threads that sleep for 5 ms. No program on it can be more punctual."""
 
     def __init__(self):
         super().__init__(daemon=True)
@@ -44,7 +44,7 @@ class Jitter(threading.Thread):
                 self.late.append((time.time(), late))
 
     def worst(self, since: float, until: float) -> float:
-        """Returns the longest delay that ended between two times, s."""
+        """Returns the longest delay, in seconds, that ended between two times."""
         return max((late for at, late in list(self.late) if since <= at <= until + late), default=0.0)
 
 
@@ -67,7 +67,7 @@ class Bench:
         return self.chain("--boards", "0", profile=profile)
 
     def ok(self, rule: str, note: str = "") -> None:
-        """Records that this rule holds."""
+        """Records that a rule holds."""
         self.lines.append(f"{rule} {self.order}-endian ok{': ' if note else ''}{note}")
 
     def expect(self, holds: bool, rule: str, expected: str, came) -> None:
@@ -78,7 +78,7 @@ class Bench:
         self.expect(came == expected, rule, f"{what} {expected}", came)
 
     def within(self, rule: str, what: str, seconds: float, low: float, high: float) -> None:
-        """Checks that a time is between two others, s."""
+        """Checks that a time is between two others, all in seconds."""
         self.expect(low <= seconds <= high, rule, f"{what} after {low:.3f} to {high:.3f} s", f"{seconds:.3f} s")
 
     def image(self, least: int = 200, most: int = 1200) -> bytes:
@@ -91,9 +91,9 @@ class Bench:
 
 
 def run_row(program: str, order: str, seed: int, function) -> tuple[bool, list[str], float]:
-    """Runs one row; returns whether it held, and the lines to print.
+    """Runs one row. Returns whether its rules hold, and the lines to print.
 
-    Answers within 100 ms need a machine that lets its programs run within 100 ms. A row that failed while the machine was too slow is run
+    Answers within 100 ms are possible only if the computer runs its programs within 100 ms. A row that failed on a slow computer is run
     again, three times in all.
     """
     start, lines = time.monotonic(), []
@@ -143,7 +143,7 @@ def main(rows: list, workers: int = 12) -> None:
 
 
 def told(row, order: str, came: tuple[bool, list[str], float]) -> bool:
-    """Prints the result of a row; returns whether it held."""
+    """Prints the result of a row, and returns whether its rules hold."""
     good, lines, seconds = came
     for line in lines:
         print(line, flush=True)

@@ -2,7 +2,7 @@
 
 
 def frame(function: int, sequence: int, data: bytes = b"") -> str:
-    """Returns a frame as candump writes it: function in bits 10..6 of the identifier, sequence number in bits 4..0."""
+    """Returns a frame in candump notation: function in bits 10..6 of the identifier, sequence number in bits 4..0."""
     return f"{function << 6 | sequence:03X}#{data.hex().upper()}"
 
 
@@ -26,7 +26,7 @@ def report(flash: int) -> str:
 
 
 def string(order: str, text: str, inclusive: bool = False) -> list[bytes]:
-    """Returns a string's packages: the number of packages that follow (or of all packages), then eight characters each."""
+    """Returns a string's packages. The first contains the number of packages that follow (or of all), the others eight characters each."""
     data = text.encode("latin-1")
     packages = [data[i:i + 8] for i in range(0, len(data), 8)]
     return [word(order, len(packages) + inclusive), *packages]

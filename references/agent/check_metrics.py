@@ -361,7 +361,7 @@ async def check_origins(arm, tokens, log):
 
 
 def watched(jtc, directory):
-    """Checks an agent at rest and in motion, and the metrics that count meanwhile."""
+    """Checks an agent at rest and in motion, and the counters among the metrics."""
     log = directory / "commands.jsonl"
     with served.serving(jtc, directory, "--allow-origin", ORIGIN, "--command-log", log) as agent:
         arm = Agent(agent.url, agent.tokens["operator"])

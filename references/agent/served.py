@@ -149,8 +149,8 @@ class Requests:
 
 
 def generated(description, directory, name):
-    """Returns the client that openapi-python-client makes from a description in docs/: an imported package of this name below
-    `directory`."""
+    """Returns the client that openapi-python-client makes from a description in docs/. It is imported as a package
+    of this name, which is written below `directory`."""
     command = [SCRIPTS / "openapi-python-client", "generate", "--path", DOCS / description, "--meta", "none"]
     path = f"{SCRIPTS}{os.pathsep}{os.environ['PATH']}"
     subprocess.run(

@@ -76,7 +76,7 @@ def acknowledgements(bench: Bench) -> None:
 
 
 def repair(bench: Bench) -> None:
-    """5.4: the pin of board 2 is switched off three times before PC_INIT(2). The number of another board is never given again."""
+    """5.4: the pin of board 2 is switched off three times before PC_INIT(2). The number of another board is never given."""
     flash = bench.flash_ids(3)
     for deaf_master in (False, True):
         with bench.bus() as chain, boards(bench, chain, flash) as played:

@@ -180,7 +180,7 @@ impl Access {
         }
     }
 
-    /// Checks that the request names this agent, and that no page of another site made it.
+    /// Checks that the request is addressed to this agent, and that no page of another site made it.
     ///
     /// # Errors
     ///

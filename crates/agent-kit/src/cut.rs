@@ -3,9 +3,9 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
-/// Longest foreign text in a log or an answer (a path, a Host, an Origin), characters.
+/// Longest foreign text in a log or an answer (a path, a Host, an Origin), in characters.
 const FOREIGN_MAX: usize = 200;
-/// Longest text of a line of the log of commands, characters.
+/// Longest text of a line of the log of commands, in characters.
 const LOGGED_MAX: usize = 1000;
 
 /// Returns at most 200 characters of a text.

@@ -21,7 +21,7 @@ use crate::problem::Denial;
 
 /// Prefix of the token in the list of protocols of a socket.
 const BEARER: &str = "bearer.";
-/// Longest name of a client, characters.
+/// Longest name of a client, in characters.
 const NAME_MAX: usize = 64;
 
 /// Access rules, with the log of refused requests.
@@ -53,8 +53,8 @@ impl Gate {
         self.log.lock().unwrap_or_else(PoisonError::into_inner).write(what, facts);
     }
 
-    /// Writes a line to the log of commands about an address that can cause many lines: the first ones in full, later
-    /// ones as a count.
+    /// Writes a line to the log of commands about an address that can cause many lines. The first lines are written
+    /// in full; later ones are only counted.
     pub fn note_repeated(&self, what: &'static str, from: SocketAddr, facts: serde_json::Value) {
         let mut log = self.log.lock().unwrap_or_else(PoisonError::into_inner);
         log.write_repeated(what, &from.ip().to_string(), facts);
@@ -252,7 +252,7 @@ fn protocol_token(headers: &HeaderMap) -> Option<&str> {
 }
 
 fn text_of(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {
-    // A header that is not text counts as present, but is never valid.
+    // A header that is not text is treated as present but never valid.
     headers.get(name).map(|value| value.to_str().unwrap_or("?"))
 }
 

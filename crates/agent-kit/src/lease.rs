@@ -10,16 +10,16 @@ use crate::api::Problem;
 
 /// Header with the key of a lease.
 pub const KEY: &str = "lease-key";
-/// Allowed duration of a lease without a request, s.
+/// Allowed duration of a lease without a request, in seconds.
 const LASTS_S: std::ops::RangeInclusive<f64> = 1.0..=60.0;
-/// Default duration of a lease without a request, s.
+/// Default duration of a lease without a request, in seconds.
 const LASTS_DEFAULT_S: f64 = 10.0;
 /// Largest number of clients at the same time.
 const CLIENTS_MAX: usize = 32;
 /// Time after the end of its lease until a silent client is forgotten.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 
-/// Returns the default duration of a lease without a request, s.
+/// Returns the default duration of a lease without a request, in seconds.
 pub fn default_lasts_s() -> f64 {
     LASTS_DEFAULT_S
 }
@@ -281,7 +281,7 @@ impl<P: Clone> Leases<P> {
     fn pass_on(&mut self, wanted_by: Option<String>, now: Duration) {
         if let Some(next) = wanted_by.filter(|next| self.clients.contains_key(next)) {
             self.hold(&next, now);
-            // The new holder is kept as long as a client that takes the lease now.
+            // The new holder is treated as if it had just sent a request, so it is not forgotten too early.
             if let Some(client) = self.clients.get_mut(&next) {
                 client.seen = now;
             }

@@ -38,7 +38,7 @@ pub struct CommandLog {
     repeats: Repeats,
 }
 
-/// Kinds of lines that are written even if other lines are dropped: what moved something, and who stopped it. Other
+/// Kinds of lines about motions, Stops and leases. They are written even if other lines are dropped, because other
 /// lines leave half of the queue free.
 const NEEDED: [&str; 10] =
     ["sent", "answered", "command", "halt", "stop", "stopped", "ended", "lease", "policy", "not-taken"];
@@ -142,7 +142,7 @@ impl Drop for CommandLog {
             self.line(what, facts);
         }
         self.lines = None;
-        // The channel carries no message; it closes when the writer's thread ends, also after a panic. The wait is
+        // The channel carries no message; it closes when the writer's thread ends, even after a panic. The wait is
         // limited.
         let _ = self.written.recv_timeout(LAST_LINES);
     }

@@ -56,7 +56,7 @@ fn for_each_response(description: &mut OpenApi, mut act: impl FnMut(&str, &mut R
     }
 }
 
-/// Returns the name of a status without spaces: `NotFound` of 404.
+/// Returns the name of a status without spaces: `NotFound` for 404.
 fn status_name(status: &str) -> String {
     let code = status.parse().ok().and_then(|code: u16| StatusCode::from_u16(code).ok());
     let reason = code.and_then(|code| code.canonical_reason()).unwrap_or("Response");

@@ -34,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Longest time for the head of a request, and longest wait of a connection for its next request.
 const HEAD_TIME: Duration = Duration::from_secs(10);
 const HEAD_TIME_OF_FEW: Duration = Duration::from_secs(1);
-/// Longest head of a request, bytes.
+/// Longest head of a request, in bytes.
 const HEAD_MAX: usize = 16 << 10;
 /// Longest time for the body of a request while few places are left. Otherwise only the time of the whole request is
 /// limited.

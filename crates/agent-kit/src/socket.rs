@@ -15,7 +15,7 @@ const VIEWERS_MAX: usize = 128;
 const OPERATORS_MAX: usize = 32;
 /// Protocol that a page requests for its socket, in addition to `bearer.` and its token.
 pub const PROTOCOL: &str = "openjtc";
-/// Longest message of a client with read-only access, bytes.
+/// Longest message of a client with read-only access, in bytes.
 pub const MESSAGE_MAX: usize = 1024;
 /// Largest number of pings of a client between two messages to it.
 const NOISE_MAX: u32 = 100;
@@ -69,7 +69,7 @@ pub(crate) async fn ended(socket: &mut WebSocket) {
     }
 }
 
-/// Sends a message as JSON. Returns `false` if the client does not take it.
+/// Sends a message as JSON. Returns `false` if the client does not accept it in time.
 pub(crate) async fn pass(socket: &mut WebSocket, message: &impl Serialize) -> bool {
     // The message contains only strings and numbers, so this cannot fail.
     let text = serde_json::to_string(message).unwrap_or_default();

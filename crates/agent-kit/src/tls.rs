@@ -44,8 +44,8 @@ impl host_kit::Diagnose for TlsError {
     }
 }
 
-/// Returns a configuration for TLS 1.2 and 1.3 with this certificate chain, the agent's own certificate first, and its
-/// private key, both as PEM.
+/// Returns a configuration for TLS 1.2 and 1.3 with this certificate chain and its private key, both PEM files. The
+/// agent's own certificate is the first one in the chain.
 ///
 /// # Errors
 ///

@@ -97,7 +97,7 @@ mod terminal {
 
     /// Keys from stdin, if stdin is a terminal with this process in the foreground.
     pub struct Keys {
-        /// Start of a key.
+        /// Bytes of a key that has not arrived completely.
         begun: Vec<u8>,
         gone: bool,
     }

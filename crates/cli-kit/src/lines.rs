@@ -29,7 +29,7 @@ struct Shared {
 #[derive(Default)]
 struct State {
     waiting: VecDeque<String>,
-    /// A line has been taken and is not written yet.
+    /// A line has been taken from the queue and is not written yet.
     writing: bool,
     written: u64,
     dropped: u64,

@@ -158,7 +158,7 @@ impl Output {
         self.warn(&failure.message, &failure.next.to_string());
     }
 
-    /// Prints an error and the next step, as at the end of a command; on a terminal the text is wrapped between words.
+    /// Prints an error and the next step, in the form used at the end of a command. On a terminal the text is wrapped between words.
     pub fn warn(&self, message: &str, hint: &str) {
         let width = bar::stderr_width();
         self.note(hanging(&format!("{}: ", self.program), message, width));

@@ -16,7 +16,7 @@ const PRINT_TIMEOUT: Duration = Duration::from_millis(500);
 
 /// Parses the command line of this process; otherwise prints help, version or wrong usage, and returns the exit code.
 /// Wrong usage is also one JSON object on stdout if `--json` or its variable requests JSON, in addition to the text on
-/// stderr. Variables that set an option of the command are named on stderr.
+/// stderr. Variables that set an option of the command are listed on stderr.
 pub fn parse<Cli: Parser>(program: &'static str, variables: &Variables) -> Result<Cli, ExitCode> {
     parse_with(program, variables, &[])
 }

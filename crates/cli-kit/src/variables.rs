@@ -1,9 +1,9 @@
 //! Environment variables that set options: the values for on and off, a line about variables in effect, and notes about
 //! retired variables.
 //!
-//! Only options that name a place, a file or a format have a variable, and a few harmless numbers. Options that move,
-//! reset, number, program, enable outputs, set bits, answer a question or override a check have none, because a shell
-//! keeps a variable for later commands. `audit` checks this for all options of a command line.
+//! Only options for a place, a file or a format have a variable, and a few options with harmless numbers. Options
+//! that move, reset, number, program, enable outputs, set bits, answer a question or override a check have none,
+//! because a shell keeps a variable for later commands. `audit` checks this for all options of a command line.
 
 #[cfg(feature = "trial")]
 pub mod audit;

@@ -1,4 +1,4 @@
-//! Next steps: sentences that name actions, which each front end words in its own way.
+//! Next steps: sentences with actions. Each front end has its own name for an action.
 use std::borrow::Cow;
 use std::fmt;
 
@@ -132,13 +132,15 @@ actions! {
 enum Part {
     /// Words for all front ends. Commands are enclosed in backticks.
     Words(Cow<'static, str>),
-    /// Action, which each front end names itself. The command line shows this command instead of the name, if there is one.
+    /// Action. Each front end shows its own name for it. The command line shows this command instead, if there is
+    /// one.
     Action(Action, Option<String>),
 }
 
 /// Sentence about the next step, without a full stop; empty if no step helps.
 ///
-/// [`next!`](crate::next!) makes one with actions. Its [`Display`](fmt::Display) form is that of the command line.
+/// [`next!`](crate::next!) makes a sentence with actions. Its [`Display`](fmt::Display) form is the sentence of the
+/// command line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Next(Vec<Part>);
 
@@ -168,12 +170,12 @@ impl Next {
         pieces.zip(actions).fold(first, |next, (piece, &action)| next.then(action).then(piece))
     }
 
-    /// Returns `true` if the sentence names this action.
+    /// Returns `true` if the sentence contains this action.
     pub fn names(&self, wanted: Action) -> bool {
         self.0.iter().any(|part| matches!(part, Part::Action(action, _) if *action == wanted))
     }
 
-    /// Sets the command of an action, with all arguments, wherever the sentence names the action.
+    /// Sets the command of an action, with all arguments, wherever the sentence contains the action.
     #[must_use]
     pub fn with_command(mut self, wanted: Action, command: &str) -> Self {
         for part in &mut self.0 {
@@ -256,7 +258,8 @@ impl From<Cow<'static, str>> for Next {
     }
 }
 
-/// Makes a [`Next`] of a sentence. Each `{}` in it stands for one of the [`Action`]s that follow, in their order.
+/// Makes a [`Next`] from a sentence. Each `{}` in it is replaced by one of the [`Action`]s that follow, in their
+/// order.
 #[macro_export]
 macro_rules! next {
     ($sentence:literal $(, $action:ident)* $(,)?) => {{

@@ -6,7 +6,7 @@
 //! Stops are numbered. A Stop cancels the request that is being done, unless it is an update. A command or an update that was requested
 //! before a Stop and has not begun is refused. So nothing that was requested before a Stop begins after it.
 //!
-//! A front end adds what it knows about a request in a tag: the client, the number of a job.
+//! A front end stores its own data about a request in a tag, such as the client and the number of a job.
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

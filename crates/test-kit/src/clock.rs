@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-/// Processor time of this thread. The clock stands still while another program runs on the processor. Caches that other programs have
+/// Processor time of this thread. The clock stops while another program runs on the processor. Caches that other programs have
 /// filled still slow the thread down, so the smallest of many measurements is nearest to the true time.
 #[derive(Clone, Copy, Debug)]
 pub struct CpuTime(Duration);

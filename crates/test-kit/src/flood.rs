@@ -1,4 +1,4 @@
-//! Clients that take all connections of an agent: the agent must still answer a Stop.
+//! Clients that take all connections of an agent. The agent must still answer a Stop.
 use std::io::{ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};

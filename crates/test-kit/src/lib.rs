@@ -1,6 +1,6 @@
-//! Shared code of the tests and benchmarks of several crates: the kept inputs of the fuzz targets, run on the stable
-//! toolchain; documents that show the output of commands; pages whose commands are run; the data of an existing arm; a
-//! clock; the timeouts of tests; and requests to agents.
+//! Shared code of the tests and benchmarks of several crates: runs of the stored inputs of the fuzz targets on the
+//! stable toolchain; documents that show the output of commands; pages whose commands are run; the data of an
+//! existing arm; a clock; the timeouts of tests; and requests to agents.
 #![forbid(unsafe_code)]
 
 pub mod clock;
@@ -33,7 +33,8 @@ pub type Target = (&'static str, Body);
 /// Runs each body over every file of `fuzz/corpus/<target>` and `fuzz/regressions/<target>`. The name of the file that
 /// runs is printed, so a failing test shows it.
 ///
-/// If a body panics, if the target does not exist, or if no input is kept for it. Otherwise a misspelt name would test nothing.
+/// Panics if a body panics, if the target does not exist, or if no input is stored for it. Otherwise a misspelt name
+/// would test nothing.
 pub fn run_kept_inputs(targets: &[Target]) {
     for (target, body) in targets {
         let files = kept_inputs(target);
@@ -46,7 +47,7 @@ pub fn run_kept_inputs(targets: &[Target]) {
     }
 }
 
-/// Returns the kept inputs of a target in the order of their names.
+/// Returns the stored inputs of a target in the order of their names.
 fn kept_inputs(target: &str) -> Vec<PathBuf> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fuzz"));
     let source = fuzz.join("fuzz_targets").join(target).with_extension("rs");

@@ -57,7 +57,7 @@ impl Picture {
         }
     }
 
-    /// Returns the present time of the session, µs.
+    /// Returns the present time of the session, in µs.
     pub(crate) fn clock_us(&self) -> u64 {
         self.now_us + self.at.elapsed().as_micros() as u64
     }

@@ -253,7 +253,8 @@ fn the_end_stops_what_runs_before_a_job_is_undone() {
     drop(ending.join());
 }
 
-/// A command whose turn comes shortly before its request times out is refused, because the client would not see its effect.
+/// A command is refused if its turn comes shortly before its request times out, because the client would not see its
+/// effect.
 #[test]
 fn what_waits_too_long_does_not_move_anything() {
     let (served, key) = Served::numbered(1);

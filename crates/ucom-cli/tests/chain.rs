@@ -241,8 +241,8 @@ fn p20_probe_finds_big_endian_boards() {
     assert_eq!(init["boards"][0]["flash_number"], 0x21);
 }
 
-/// Ctrl-C while a board moves stops it at once. The test does not wait for the board's own supervision, which is for
-/// a dead PC.
+/// Ctrl-C while a board moves stops it at once. The board's own supervision, which is for a dead PC, would stop it
+/// later.
 #[test]
 fn an_interrupted_motion_is_stopped() {
     let sim = Sim::numbered(&["--boards", "1"]);

@@ -41,7 +41,7 @@ fn d21_a_board_gets_its_number_back() {
     assert_eq!(sim.json(&["scan"], 0)["boards"], all["boards"]);
 }
 
-/// The exit codes: 4 if another board is there, 3 without an answer, 2 if the board is ambiguous.
+/// The exit codes: 4 if another board answers, 3 without an answer, 2 if the board is ambiguous.
 #[test]
 fn repairs_that_are_refused() {
     let sim = rebooted();

@@ -11,8 +11,9 @@ use hyper::body::{Body, Bytes, Frame, Incoming, SizeHint};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep, sleep_until};
 
-/// Longest time in which a connection may take no bytes although some wait. It may wait longer in all if it takes
-/// `TAKES_PER_S` bytes for each further second. Quick reading does not extend the longest time without bytes.
+/// Longest time in which a connection may take no bytes although some wait. The total waiting time may be longer by a
+/// second for each `TAKES_PER_S` bytes that the connection takes. Quick reading does not extend the longest time
+/// without bytes.
 const TAKES_NOTHING: Duration = Duration::from_secs(10);
 const TAKES_PER_S: f64 = 16_000.0;
 

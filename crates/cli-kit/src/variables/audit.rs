@@ -27,7 +27,7 @@ pub enum Kind {
     Caution,
 }
 
-/// Forms of values that name a place or a file.
+/// Value names of options for a place or a file.
 const PLACES: [&str; 11] = [
     "FILE",
     "FILE.mcap",

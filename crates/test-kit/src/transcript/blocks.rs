@@ -26,7 +26,7 @@ pub struct Block {
     pub text: String,
     /// Parts of the comment directly above the block.
     notes: Vec<String>,
-    /// Program that the page names, if any.
+    /// Program in the page's `commands` comment, if there is one.
     page: Option<String>,
 }
 

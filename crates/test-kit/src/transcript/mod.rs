@@ -1,14 +1,14 @@
 //! Pages whose commands are run as a reader of the page would type them, and compared with the output that the page
 //! shows.
 //!
-//! A page is followed from top to bottom in a folder of its own. Fenced blocks of the kind `console` (commands after
-//! `$ `, output below) and `sh` (commands without output) are run by the tests of the program that the page names with a
-//! comment, `<!-- commands: jtc -->`. Each command must succeed, unless the next one is `echo $?`, and must print the
-//! output on the page; a line `...` stands for any number of lines. A comment directly above a block gives options,
-//! separated by semicolons:
+//! A page is followed from top to bottom in a separate folder. A comment of the page, such as `<!-- commands: jtc
+//! -->`, selects the program whose tests run its fenced blocks. These are blocks of the kind `console` (commands
+//! after `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next one is
+//! `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment directly
+//! above a block gives options, separated by semicolons:
 //!
 //! - `not run: REASON`: left out, and counted with its reason.
-//! - `numbers vary`: numbers are not compared, except those of joints and boards.
+//! - `numbers vary`: numbers are not compared, except numbers of joints and boards.
 //! - `terminal: NAME`: typed in a terminal of its own; the last command keeps running. If the block shows no command,
 //!   the test waits until the terminal has printed these lines. With `Ctrl-C`, that program is interrupted first.
 //! - `in tests: WORDS`: options added to the last command, so that a test takes no longer than necessary.
@@ -120,7 +120,7 @@ struct Run {
     done: Followed,
 }
 
-/// Default terminal, for blocks that name no terminal.
+/// Default terminal, for blocks without the option `terminal`.
 const OWN: &str = "";
 
 impl Run {

@@ -83,7 +83,7 @@ impl Drop for Owner {
     }
 }
 
-/// Marks the bus as lost on drop, also after a panic of its thread.
+/// Marks the bus as lost on drop, even after a panic of its thread.
 struct Gone<'a>(&'a Shared, String);
 
 impl Drop for Gone<'_> {

@@ -19,9 +19,9 @@ const PICTURE: Duration = Duration::from_millis(40);
 /// After this time without a frame, another PC is regarded as disconnected; in µs.
 const COMPETING_US: u64 = 3_000_000;
 
-/// Time for which a Stop is repeated, µs.
+/// Time for which a Stop is repeated, in µs.
 const SERIES_US: u64 = 60_000;
-/// Interval between progress events within a cycle, µs.
+/// Interval between progress events within a cycle, in µs.
 const PROGRESS_US: u64 = 200_000;
 
 /// Job, boards, attempt and cycle of an update.
@@ -41,7 +41,7 @@ pub(super) struct Local {
     /// `true` if the Stop at the agent's end was sent.
     pub end_sent: bool,
     pub job: Option<u64>,
-    /// Time of the last event about another PC, µs.
+    /// Time of the last event about another PC, in µs.
     pub competing_us: Option<u64>,
     pub now_us: u64,
     /// Time of the last snapshot; `None`: a new one is due at once.

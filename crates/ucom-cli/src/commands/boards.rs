@@ -147,7 +147,7 @@ pub fn reset(args: &ResetArgs, link: &LinkArgs, out: &Output) -> Result<(), Fail
     Ok(())
 }
 
-/// Sends PC_XRESET: exloader with programming enabled.
+/// Sends PC_XRESET. Afterwards the board is in the exloader with programming enabled.
 pub fn xreset(args: &ActArgs, link: &LinkArgs, out: &Output) -> Result<(), Failure> {
     act(args, link, out, |board, force| Request::XReset { board, force })
 }

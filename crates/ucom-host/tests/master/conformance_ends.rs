@@ -110,8 +110,8 @@ fn cancelled_tests_leave_the_boards_as_they_were() {
     }
 }
 
-/// A board disconnects during the tests: exit code 3, the remaining tests are skipped with the reason, and the other boards are as
-/// before.
+/// A board disconnects during the tests. The exit code is 3, the remaining tests are skipped with the reason, and the
+/// other boards are in the same state as before.
 #[test]
 fn a_board_that_is_gone_ends_the_tests_with_their_report() {
     let mut bench = chain();

@@ -1,4 +1,4 @@
-//! A board that takes program data, as a table of frames.
+//! A board, as a table of frames, that accepts program data.
 
 use ucom::Frame;
 

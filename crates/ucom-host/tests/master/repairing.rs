@@ -46,7 +46,8 @@ fn is_sound(bench: &mut Bench, result: &Result<Outcome, Error>, what: &str) {
     }
 }
 
-/// D-21: two boards have no number, and the pin before each is on. Only the selected board takes the number.
+/// D-21: boards 2 and 4 have no number, and the pins of the boards before them are on. Only the selected board takes
+/// the number.
 #[test]
 fn d21_a_number_goes_to_one_board_only() {
     let mut bench = rebooted(&[2, 4]);
@@ -94,8 +95,8 @@ fn d21_no_single_fault_gives_a_number_twice() {
     }
 }
 
-/// Many frames are lost together: those that lower the pin before the other board, that board's answers, and the
-/// answers of the selected board.
+/// Many frames are lost together: those that switch off the pin before the other board, the answers of that board,
+/// and the answers of the selected board.
 #[test]
 fn d21_no_losses_give_a_number_twice() {
     let mut shared = 0;

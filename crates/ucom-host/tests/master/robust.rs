@@ -17,7 +17,7 @@ proptest! {
         ucom_host::master::fuzzing::frames(&data);
     }
 
-    /// As above, with identifiers of boards 1 to 3 and valid lengths, so that more answers are accepted.
+    /// The same with identifiers of boards 1 to 3 and valid lengths, so that the master accepts more of the frames.
     #[test]
     fn likely_frames_into_any_procedure(
         choice: u8,

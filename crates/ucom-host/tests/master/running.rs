@@ -1,4 +1,4 @@
-//! Descriptions, inputs, parameters, flags, supervision.
+//! Descriptions, inputs, parameters, flags, and supervision of running boards.
 
 use super::bench::Exit;
 use ucom::profile::OnLost;
@@ -325,7 +325,7 @@ fn d50_end_of_session() {
     assert_eq!(bench.sent().len(), sent);
 }
 
-/// P-19: a forecast above the limit refuses the start before any loop runs.
+/// P-19: if the predicted load is above the limit, the start is refused before any loop runs.
 #[test]
 fn p19_load_forecast() {
     let profile = Profile { so_period: 1, load_limit: 70, ..Profile::default() };

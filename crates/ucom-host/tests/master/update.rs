@@ -131,7 +131,7 @@ fn p8_slow_boards_are_waited_for() {
     );
 }
 
-/// P-9, U-9: DSP_PROGFINISHED is lost. PC_INFO shows that the update is done.
+/// P-9, U-9: DSP_PROGFINISHED is lost. The answer to PC_INFO shows that the update is done.
 #[test]
 fn p9_lost_finished_is_a_success() {
     let mut bench = loader(Loader { special: |_, block| (block == 33).then_some(""), ..Loader::new(34) });
@@ -144,7 +144,7 @@ fn p9_lost_finished_is_a_success() {
     assert_eq!(bench.count("041#"), 1);
 }
 
-/// P-10, U-10: the board reports success but shows the old program: a failure.
+/// P-10, U-10: the board reports success but has the old program. The result is a failure.
 #[test]
 fn p10_success_must_be_read_back() {
     let mut bench = loader(Loader { info: ["34126E38"; 2], ..Loader::new(34) });
@@ -231,7 +231,7 @@ fn p5_the_board_must_be_the_one_that_is_meant() {
     assert_eq!((report.exit(), bench.count("041#")), (4, 0));
 }
 
-/// No board answers: exit code 3, and nothing intrusive was sent.
+/// No board answers. The exit code is 3, and nothing intrusive was sent.
 #[test]
 fn update_of_nobody() {
     let mut bench = Bench::script(Script::default());
@@ -392,7 +392,7 @@ fn every_frame_of_an_update_disturbed() {
                     bench.fault = None;
                     let mut again = update(&mut bench, options(&[2], 128));
                     if again.exit() == 3 {
-                        // The board lost its number.
+                        // The board has lost its number.
                         bench.go(Request::Init(InitOptions::default()), 60).unwrap();
                         again = update(&mut bench, options(&[2], 128));
                     }

@@ -181,7 +181,7 @@ fn a_board_that_is_up_to_date_is_started() {
     assert_eq!((update(&mut bench, all).exit(), bench.beginning("301#")), (0, sent));
 }
 
-/// A board that answers but does not enable programming is not reported as silent: exit code 1.
+/// A board that answers but does not enable programming is not reported as silent. The exit code is 1.
 #[test]
 fn a_board_that_does_not_enable_programming_answers() {
     let info = ["141#2100011B34126E38", "141#0000"];
@@ -285,7 +285,7 @@ fn d08_a_dry_run_looks_for_another_pc() {
     assert_eq!(report.exit(), 4);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());
     assert!(!bench.master.is_master());
-    // Without another PC: success, and still no heartbeats.
+    // Without another PC the dry run succeeds, and it still sends no heartbeats.
     let mut bench = Bench::script(Script::default().on("201#", &info).on("200#", &info));
     assert_eq!(update(&mut bench, dry).exit(), 0);
     assert!(bench.sent().iter().all(|t| t == "201#" || t == "200#"), "{:?}", bench.sent());

@@ -99,7 +99,7 @@ fn u10_what_cannot_be_verified_says_so() {
     assert!(report.unverifiable.unwrap().hint().contains("--expect-program-id"));
     let shown = [board.before, board.after].map(|info| info.map(|i| (i.program_id, i.date)));
     assert_eq!(shown, [Some(OLD), Some((0x4B3F, 0x3AC1))]);
-    // The board has no application, or an application runs: the board's report alone is not enough.
+    // The board's report alone is not enough if the board has no application, or if an application runs.
     for (after, status) in [("FFFFFFFF", 0x1B), ("3F4BC13A", 0x8B)] {
         let report = raw(after, status, None);
         let failure = report.boards[0].failure.clone();

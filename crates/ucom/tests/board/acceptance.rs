@@ -186,7 +186,7 @@ fn d_t11_initial_inputs() {
     }
 }
 
-/// D-T12, D-34: inputs beyond the last input.
+/// D-T12, D-34: the PC sends inputs with numbers beyond the last input.
 #[test]
 fn d_t12_inputs_beyond_the_dimension() {
     let mut bus = Bus::started();
@@ -254,7 +254,7 @@ fn d_t14_alive_for_a_minute() {
     assert_eq!(bus.boards[0].status(), Status(0x8B));
 }
 
-/// D-T15, D-37, D-12: flags other than 0 and 1, and a frame that is too short.
+/// D-T15, D-37, D-12: the PC sends flags other than 0 and 1, and a frame that is too short.
 #[test]
 fn d_t15_bad_flags() {
     let mut bus = Bus::started();
@@ -300,7 +300,7 @@ fn d_t16_autostart_can_be_held_off() {
     assert_eq!(bus.boards[0].status(), Status(0x59));
 }
 
-/// D-T20, D-24, D-06: a second request while the acknowledgement still waits.
+/// D-T20, D-24, D-06: a second request arrives while the acknowledgement still waits.
 #[test]
 fn d_t20_init_while_the_acknowledgement_waits() {
     let mut bus = Bus::new(&[0x21, 0x42], Profile::default());

@@ -4,7 +4,7 @@ use ucom::{Frame, Profile, Status};
 
 use super::bus::{Bus, blocks, frames, header, image, sorted};
 
-/// D-T17, D-40, D-42: a whole update by raw frames, with the golden header.
+/// D-T17, D-40, D-42: a complete update by raw frames, with the golden header.
 #[test]
 fn d_t17_update() {
     let mut bus = Bus::initialised();

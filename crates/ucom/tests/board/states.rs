@@ -358,8 +358,8 @@ fn d24_no_acknowledge_without_a_number() {
     assert!(board.next_deadline() > now, "nothing to do");
 }
 
-/// D-24: the board's number is removed while its acknowledge is in the CAN controller. When this acknowledge is sent,
-/// the board does not yet have the new number that it is taking.
+/// D-24: the board's number is removed while its acknowledge is in the CAN controller, and the PC gives another
+/// number. When the old acknowledge is sent, the board does not get the new number yet.
 #[test]
 fn d24_acknowledge_of_a_forgotten_number() {
     let mut bus = in_state(Idle);

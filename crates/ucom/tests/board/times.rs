@@ -86,7 +86,7 @@ fn d43_pause_inside_a_block() {
     assert_eq!(board.next_deadline(), u64::MAX);
 }
 
-/// D-42: a whole block is processed when its time has passed.
+/// D-42: a block is processed after exactly the configured time.
 #[test]
 fn d42_block_time() {
     let (mut board, now) = board(Bus::initialised());
@@ -265,7 +265,7 @@ fn d36_a_dump_ends_with_its_last_package() {
     }
 }
 
-/// D-14: the packages of an answer follow one another without a pause, and after the last package nothing is due at once.
+/// D-14: the packages of an answer follow one another without a pause. After the last package nothing is due at once.
 #[test]
 fn d14_packages_follow_back_to_back() {
     type Case = (&'static str, fn() -> Bus, &'static str, u16, usize);

@@ -288,7 +288,7 @@ fn d41_no_header() {
     assert_eq!(bus.errors, frames("081#01"));
 }
 
-/// D-44, D-10: the other checksums and the other byte order, through a whole update.
+/// D-44, D-10: a complete update with each of the other checksums and with the other byte order.
 #[test]
 fn d44_update_in_other_profiles() {
     for (checksum, endian) in [

@@ -213,7 +213,7 @@ fn d43_ready_of_the_transfer_before() {
     assert_eq!(board.poll(now + board.config().block_us), Some(ready), "the block is taken");
 }
 
-/// D-42: a block of an image without header is accepted as soon as its time has passed.
+/// D-42: a block of an image without a header is accepted as soon as the block's processing time has passed.
 #[test]
 fn d42_block_time_without_header() {
     let mut bus = headerless(Plan::VerifyWrite);

@@ -378,7 +378,7 @@ mod tests {
             (None, Some("0123456789abcdefghij")),
             (None, Some(operator.as_str())),
         ];
-        // Holds after too many wrong tokens as well.
+        // This also holds after too many wrong tokens.
         for token in wrong.iter().cycle().take(4 * WRONG_MAX).copied() {
             for here in ["127.0.0.1", "127.8.9.10", "::1", "::ffff:127.0.0.1"] {
                 assert_eq!(enter(here, None, token, true), Ok(Role::Viewer), "{here} {token:?}");

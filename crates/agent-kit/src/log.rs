@@ -262,8 +262,8 @@ mod tests {
         drop::<SyncSender<()>>(hangs);
     }
 
-    /// For any time at which the disk is full: each failure is reported once, lines are complete except for an
-    /// interrupted one, and the next line states the number of missing lines.
+    /// The disk becomes full at any time. Each failure is reported once, lines are complete except for an interrupted
+    /// one, and the next line states the number of missing lines.
     #[test]
     fn a_full_disk_costs_the_lines_that_it_does_not_take_and_they_are_counted() {
         for room in 0..120 {
@@ -299,8 +299,8 @@ mod tests {
         }
     }
 
-    /// For any limit and any number of restarts: the current and the previous file together stay within the limit, each
-    /// line is complete and appears once, and no line is missing between the first and the last kept line.
+    /// For any limit and any number of restarts, the current and the previous file together stay within the limit. Each
+    /// line is complete and appears once, and no line is missing between the first and the last line in the files.
     #[test]
     fn the_log_keeps_its_limit_and_its_last_lines() {
         let dir = tempfile::tempdir().expect("a directory");

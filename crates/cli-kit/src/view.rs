@@ -92,7 +92,7 @@ impl Trouble {
             .collect();
         let room = most.saturating_sub(foot.len());
         let all: usize = blocks.iter().map(Vec::len).sum();
-        // A line is kept for "and N more" if not all causes fit.
+        // A line is reserved for "and N more" if not all causes fit.
         let room = if all <= room { room } else { room.saturating_sub(1) };
         let mut taken = 0;
         let mut head: Vec<Line<'static>> = Vec::new();

@@ -33,8 +33,8 @@ fn a_hangup_and_a_kill_end_what_moves_and_what_records() {
         let mut peer = sim.peer();
         let child = sim.spawn(&["ci", "1", "set_position=1500", "--for", "60"]);
         peer.wait("601#01010000");
-        // Long enough for a complete snapshot on a loaded computer. Without a snapshot the command ends with an
-        // error.
+        // Long enough for a complete snapshot on a loaded computer. Without a snapshot the command has no
+        // values to show.
         peer.wait_for(50, "381#");
         signal(&child, name);
         peer.wait("601#00000000");

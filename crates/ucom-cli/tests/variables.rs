@@ -100,7 +100,7 @@ fn a_variable_that_shaped_a_command_refuses_it_before_anything_is_sent() {
     with(&sim, ("UCOM_CONTROL_ONLY", "1"), &["stop", "all"]).ends(0);
 }
 
-/// On and off are eight words in any letter case; any other value enables nothing.
+/// Eight words, in any letter case, mean on or off. Any other value enables nothing.
 #[test]
 fn on_off_variables_take_eight_words_and_nothing_else() {
     let sim = Sim::numbered(&["--boards", "1"]);

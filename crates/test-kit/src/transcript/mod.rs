@@ -1,9 +1,9 @@
 //! Pages whose commands are run as a reader of the page would type them, and compared with the output that the page
 //! shows.
 //!
-//! A page is followed from top to bottom in a separate folder. A comment of the page, such as `<!-- commands: jtc
-//! -->`, selects the program whose tests run its fenced blocks. These are blocks of the kind `console` (commands
-//! after `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next one is
+//! A page is followed from top to bottom in a separate folder. A comment of the page selects the program whose tests
+//! run its fenced blocks, for example `<!-- commands: jtc -->`. These are blocks of the kind `console` (commands after
+//! `$ `, output below) and `sh` (commands without output). Each command must succeed, unless the next one is
 //! `echo $?`, and must print the output on the page. A line `...` stands for any number of lines. A comment directly
 //! above a block gives options, separated by semicolons:
 //!

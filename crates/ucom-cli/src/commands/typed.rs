@@ -35,8 +35,8 @@ fn each_line(mut from: impl BufRead, mut take: impl FnMut(String) -> bool) {
     }
 }
 
-/// Parses the assignments of a line. A word without `=` is the unit of the value before it, as in `current_max=1500
-/// mA`.
+/// Parses the assignments of a line. A word without `=` is the unit of the value before it, as in
+/// `current_max=1500 mA`.
 fn assignments<'a>(words: impl Iterator<Item = &'a str>) -> Result<Vec<Assignment>, Failure> {
     let mut values: Vec<String> = Vec::new();
     for word in words {

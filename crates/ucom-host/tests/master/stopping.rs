@@ -74,7 +74,7 @@ fn a_silent_board_gets_the_stop_more_than_once() {
     for level in [StopLevel::Outputs, StopLevel::Loop, StopLevel::Application] {
         let mut bench = initialised(&[0x21]);
         bench.go(run(&[1]), 30).unwrap();
-        // The first three stops for the outputs and all status answers are lost.
+        // The first three stop frames `601#` and all status answers are lost.
         bench.lose = vec![("> 141#", 1000), ("< 601#", 3)];
         let result = bench.go(Request::Stop { board: 1, level, force: true }, 30);
         assert!(result.is_err(), "{level:?}");

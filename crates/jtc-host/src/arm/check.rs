@@ -1,5 +1,5 @@
-//! Check of an arm: physical, complete, held by its drives, within the range of the controller. The check lists all findings, not
-//! only the first.
+//! Check of an arm: it must be physical and complete, its drives must hold it, and its numbers must be within the range of
+//! the controller. The check lists all findings, not only the first.
 
 mod borne;
 mod limits;
@@ -73,7 +73,7 @@ impl ArmFinding {
 pub struct Holding {
     /// The joint.
     pub joint: Joint,
-    /// The greatest gravity torque over all positions, N·m, without sign.
+    /// Greatest magnitude of the gravity torque over all positions, N·m.
     pub torque_nm: f64,
     /// The joint's torque limit, N·m.
     pub limit_nm: f64,
@@ -100,7 +100,7 @@ impl Checked {
 }
 
 impl Arm {
-    /// Checks the arm and returns all that an operator must know before its parameters go to a controller.
+    /// Checks the arm. Returns all that an operator must know before the parameters are sent to a controller.
     pub fn check(&self) -> Checked {
         let mut findings = Vec::new();
         self.find_limits(&mut findings);
@@ -142,7 +142,8 @@ impl Arm {
     }
 
     fn find_model(&self, findings: &mut Vec<ArmFinding>) {
-        // Checks each joint and link alone with valid values for the rest, because the check ends at the first fault.
+        // The check of a model ends at the first fault. So each joint and link is checked alone, with valid values for all
+        // others.
         let good = Arm::avena().model;
         for index in 0..=JOINTS {
             let mut joint = ArmModel { links: good.links, ..good };
@@ -171,7 +172,7 @@ impl Arm {
             ModelError::NotFinite { value, .. } => ("a slip", value, None),
             _ => ("a slip", f64::NAN, None),
         };
-        // Names the part by its name instead of its number.
+        // The text gives the number of the part; the finding gives its name.
         let text = error.to_string();
         let problem = text.split_once(": ").map_or(text.as_str(), |(_, problem)| problem);
         let what = format!("{}: {problem}", self.name_of_part(error).trim_start_matches("arm model, "));
@@ -239,8 +240,8 @@ impl Arm {
         }
     }
 
-    /// Finds gains, friction and masses out of bounds. The joints in `faulty` are left out, because friction is checked against
-    /// their limits.
+    /// Finds gains, friction and masses that are out of bounds. Leaves out the joints in `faulty`: their friction would be
+    /// checked against invalid limits.
     fn find_bounds(&self, faulty: &[Joint], findings: &mut Vec<ArmFinding>) {
         let (set, bounds) = (self.parameter_set(), self.config().parameter_bounds);
         let beyond = |joint: Option<Joint>, name, e: OutOfBounds| {

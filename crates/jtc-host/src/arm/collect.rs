@@ -1,4 +1,4 @@
-//! Loader for every file format with parameters, and for directories of such files.
+//! Loader for all file formats with parameters, and for directories of such files.
 
 use std::path::{Path, PathBuf};
 
@@ -35,22 +35,23 @@ pub struct ParameterFile {
     pub model: Option<ArmModel>,
     /// Files that were read, with the parameter that each file gave.
     pub sources: Vec<(PathBuf, &'static str)>,
-    /// Values that were not carried over, were filled in or left out.
+    /// Values that the loader did not carry over, filled in or left out.
     pub warnings: Vec<Warning>,
 }
 
 impl ParameterFile {
-    /// Reads an arm file (TOML, URDF), one of the CSV forms, or all of a directory.
+    /// Reads an arm file (TOML, URDF), a CSV file with parameters, or all such files of a directory.
     ///
     /// # Errors
     ///
-    /// Returns an error with the place if a file cannot be read, or holds no parameters in a known format.
+    /// Returns an error with the place if a file cannot be read or has no parameters in a known format.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         Self::load_all(std::slice::from_ref(&path.to_owned()))
     }
 
-    /// Reads files and directories together; later ones override earlier ones. Tables of single joints count only if all six of a
-    /// kind are named or lie in a named directory. So no joint gets the numbers of another joint, and no unintended file is read.
+    /// Reads files and directories together. If two contain the same parameter, the later one is used. A parameter in one
+    /// file for each joint is used only if `paths` lists all six files or their directory. So no joint gets the numbers of
+    /// another joint, and no file is read that the user did not mean.
     ///
     /// # Errors
     ///
@@ -71,7 +72,8 @@ impl ParameterFile {
         Ok(all)
     }
 
-    /// Parses the text of one table; the table of one joint is used for all six, so that its numbers are checked.
+    /// Parses the text of one table. The table of a single joint is used for all six joints, so that its numbers are
+    /// checked.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn parse_table(text: &str) -> Result<Self, FileError> {
         let mut all = Self::default();
@@ -210,7 +212,7 @@ fn is_arm(text: &str) -> bool {
     is_xml(text) || text.lines().any(|l| l.contains('=') || l.trim_start().starts_with("[["))
 }
 
-/// Tables of single joints, collected until all six of a kind are present.
+/// Tables of single joints, collected until the tables of all six joints are present.
 #[derive(Default)]
 struct JointTables {
     friction: PerJoint<TableOf<f32>>,
@@ -257,7 +259,8 @@ impl<T> PerJoint<T> {
         Ok(())
     }
 
-    /// Returns the tables of all six joints, `None` if no file has such a table, or an error that names the missing files.
+    /// Returns the tables of all six joints, or `None` if no file has such a table. If some joints have no table, returns
+    /// an error that lists their files.
     fn complete(self) -> Result<Option<Complete<T>>, FileError> {
         let Some((first, _)) = self.found.iter().flatten().next() else { return Ok(None) };
         let first = first.clone();
@@ -281,7 +284,8 @@ impl<T> PerJoint<T> {
     }
 }
 
-/// Splits a file name: `PidParamJoint3.csv` is joint 4 between `PidParamJoint` and `.csv`, because these files count from 0.
+/// Splits a file name: `PidParamJoint3.csv` gives `PidParamJoint`, joint 4 and `.csv`. The numbers in these names start at
+/// 0.
 fn split_name(path: &Path) -> Option<(String, Joint, String)> {
     let name = path.file_name()?.to_string_lossy().into_owned();
     let (head, tail) = name.split_once("Joint")?;

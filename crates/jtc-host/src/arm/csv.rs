@@ -122,8 +122,8 @@ fn long_table(text: &str) -> Result<Table, FileError> {
     Ok(Table::FrictionAll(tables))
 }
 
-/// Returns `true` if the Coulomb and viscous coefficients are positive, the temperature coefficient is small and the reference
-/// temperature is that of a workshop.
+/// Returns `true` if the Coulomb and viscous coefficients are positive, the temperature coefficient is small, and the
+/// reference temperature is between −20 and 100 °C.
 fn plausible(c: &[f64]) -> bool {
     let viscous = c[0] > 0.0 && c[1] > 0.0;
     match c {
@@ -136,7 +136,7 @@ fn polynomial(all: &[(usize, Vec<f64>)]) -> Result<Table, FileError> {
     let reversed = |c: &Vec<f64>| c.iter().rev().copied().collect::<Vec<f64>>();
     let wrong: Vec<usize> = (0..all.len()).filter(|i| !plausible(&all[*i].1)).collect();
     let turned = wrong.iter().filter(|i| plausible(&reversed(&all[**i].1))).count();
-    // Most rows are plausible only from right to left.
+    // Most rows are plausible only if they are read from right to left.
     if turned * 2 > all.len() {
         let (line, row) = (all[wrong[0]].0, &all[wrong[0]].1);
         let problem = format!(

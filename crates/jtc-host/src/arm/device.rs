@@ -1,8 +1,9 @@
-//! Differences between an arm file and a controller's built-in settings. Friction, gains and arm model can be sent; limits,
-//! gravity and rotor inertia are built into the controller.
+//! Differences between an arm file and the settings of a controller. Friction, gains and arm model can be sent. Limits,
+//! gravity and rotor inertia are settings of the controller.
 //!
-//! A controller with other limits or another gravity than the arm file moves another arm than the checked one (J-55). The
-//! controller is known to use the settings of the built-in arm, [`Config::avena`].
+//! If a controller has other limits or another gravity than the arm file, the check of a motion does not apply to the arm
+//! that moves (J-55). A controller without extensions is assumed to use the settings of the built-in arm,
+//! [`Config::avena`].
 
 use jtc_core::settings::{Setting, TABLE};
 use jtc_core::{Config, JointConfig};
@@ -10,7 +11,7 @@ use jtc_wire::Joint;
 
 use super::Arm;
 
-/// Relative difference below which two values count as the same number, written in two ways.
+/// Relative difference up to which two values are considered equal, because a number can be written in two ways.
 const SAME: f64 = 1e-9;
 
 /// A value of the arm file that the controller does not use.
@@ -22,7 +23,7 @@ pub struct Difference {
     pub joint: Option<Joint>,
     /// Value in the arm file.
     pub file: f64,
-    /// Value that is built into the controller.
+    /// Value in the controller.
     pub device: f64,
     /// Unit of both values.
     pub unit: &'static str,
@@ -40,12 +41,12 @@ impl std::fmt::Display for Difference {
 
 const GRAVITY_SETTINGS: [&str; 3] = ["gravity_m_s2, x", "gravity_m_s2, y", "gravity_m_s2, z"];
 
-/// Settings that no frame of the protocol carries, in words.
+/// Description of the settings that cannot be sent in a frame.
 pub const NOT_CARRIED: &str =
     "gravity, the limits of position, velocity, acceleration, torque and position error, rotor inertia";
 
 impl Arm {
-    /// Returns `true` if the arm has its own value for a setting; a URDF cannot give gravity and rotor inertia.
+    /// Returns `true` if the arm has its own value for a setting. A URDF file cannot give gravity and rotor inertia.
     pub(super) fn gives(&self, setting: &Setting, joint: Option<Joint>) -> bool {
         match setting.name {
             "rotor_inertia_kg_m2" => joint.is_none_or(|joint| self.rotors_given[joint.index()]),
@@ -59,8 +60,8 @@ impl Arm {
         setting.of_joint() && setting.of_arm() && self.gives(setting, Some(joint))
     }
 
-    /// Returns the settings in which this arm differs from the controller settings `device`: gravity first, then joint by joint.
-    /// Empty: all settings are equal.
+    /// Returns the settings in which this arm differs from the controller settings `device`: gravity first, then joint by
+    /// joint. The list is empty if all settings are equal.
     pub fn device_differences(&self, device: &Config) -> Vec<Difference> {
         let own = self.config();
         let mut all = Vec::new();
@@ -85,16 +86,16 @@ impl Arm {
         all
     }
 
-    /// Returns the settings that no frame carries and that the file does not give. The controller uses its own values for them,
-    /// so there is nothing to compare.
+    /// Returns the settings that cannot be sent in a frame and that the file does not give. The controller uses its own
+    /// values, so these settings are not compared.
     pub fn settings_not_given(&self) -> Vec<&'static str> {
         let rotors = self.rotors_given.contains(&false);
         let parts = [(self.gravity.is_none(), "gravity"), (rotors, "rotor inertia")];
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the settings for the check of a motion that a controller with the settings `device` will execute: the tighter of
-    /// both limits, and the controller's gravity, payload and rotor inertia.
+    /// Returns the settings with which a motion for a controller with the settings `device` is checked. Of two limits the
+    /// tighter one is used; gravity, payload and rotor inertia are those of the controller.
     pub fn config_on_device(&self, device: &Config) -> Config {
         let mut config = self.config();
         config.gravity = device.gravity;
@@ -146,14 +147,15 @@ mod tests {
         );
     }
 
-    /// An arm without gravity in its file uses the gravity of the controller.
+    /// If the arm file does not give gravity, the gravity of the controller is used.
     #[test]
     fn j55_what_the_file_leaves_open_is_no_difference() {
         let arm = Arm { gravity: None, ..Arm::avena() };
         assert!(arm.device_differences(&Config::avena()).is_empty());
     }
 
-    /// A URDF cannot give a rotor inertia: the value is unknown, not 0, and not a difference.
+    /// A URDF file cannot give a rotor inertia. The value is then unknown instead of 0, and is not reported as a
+    /// difference.
     #[test]
     fn j55_a_rotor_inertia_that_no_file_gives_is_no_difference() {
         let urdf = Arm::parse(&Arm::avena().to_urdf()).unwrap();
@@ -166,7 +168,7 @@ mod tests {
             urdf.config_on_device(&Config::avena()).joints[3].rotor_inertia,
             Config::avena().joints[3].rotor_inertia
         );
-        // An arm file written from the URDF has no rotor inertia either; a file with the value 0 has one.
+        // An arm file that is written from the URDF also omits the rotor inertia. A file with the value 0 gives it.
         let text = urdf.to_toml();
         assert!(!text.contains("rotor_inertia"), "{text}");
         assert_eq!(Arm::parse(&text).unwrap().settings_not_given(), ["gravity", "rotor inertia"]);

@@ -1,11 +1,12 @@
-//! Inertia that the gains of an arm tolerate in the loop of the controller (J-41, J-71).
+//! Range of inertias in which the gains of an arm are stable in the loop of the controller (J-41, J-71).
 //!
-//! The loop of one joint: the controller reads a position, and its torque acts `delay_ticks` later for one tick. The derivative
-//! covers five ticks. Such a loop is stable between two inertias. Below the lower inertia the derivative is too late; above the
-//! upper inertia the integral is too strong.
+//! Loop of one joint: the controller reads a position. Its torque takes effect `delay_ticks` later and lasts for one tick.
+//! The derivative covers five ticks. Such a loop is stable between two inertias. Below the lower inertia the derivative is
+//! too late; above the upper inertia the integral is too strong.
 //!
-//! Coupled joints: with D the lower and U the upper inertias of the joints and M the mass matrix with rotors, the arm is stable
-//! if M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same ratios.
+//! Coupled joints: D and U are the lower and upper inertias of the joints, and M is the mass matrix with rotors. The arm is
+//! stable if M − D and U − M are positive definite. This condition is exact if the gains of all joints have the same
+//! ratios.
 
 use std::f64::consts::PI;
 
@@ -22,10 +23,10 @@ const WINDOW: f64 = 5.0;
 const STEPS: i32 = 400;
 /// Lowest frequency of the search, rad per tick.
 const SLOWEST: f64 = 1e-6;
-/// Factors of a proposed rotor inertia that the gains must tolerate until the rotor is measured: drives of one family differ by
-/// these factors.
+/// Factors of a proposed rotor inertia for which the gains must be stable until the rotor is measured. The drives of one
+/// family differ by these factors.
 pub(super) const PROPOSED_RANGE: RotorMargin = RotorMargin { down: 0.2, up: 3.0 };
-/// Smallest and largest rotor inertia of the search, as a factor.
+/// Smallest and largest factor of the rotor inertia in the search.
 const FACTORS: (f64, f64) = (0.0, 1000.0);
 
 type Matrix = [[f64; JOINTS]; JOINTS];
@@ -39,20 +40,20 @@ pub(super) struct StableInertia {
     pub most: f64,
 }
 
-/// Range of rotor inertias, as factors of those in the file, in which the arm is stable.
+/// Factors of the rotor inertias in the file between which the arm is stable.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RotorMargin {
-    /// Lowest factor; 0: the arm is stable also without a rotor.
+    /// Lowest factor; 0 if the arm is stable even without a rotor.
     pub down: f64,
-    /// Highest factor; 1000: the arm is stable up to 1000 or more.
+    /// Highest factor; 1000 if the arm is stable up to 1000 or more.
     pub up: f64,
 }
 
 impl StableInertia {
-    /// Returns the stable range, or `None` if these gains are not stable with any inertia, or are not numbers.
+    /// Returns the stable range. Returns `None` if the gains are not stable with any inertia, or are not finite.
     ///
-    /// With θ the frequency in rad per tick, the loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ). H is the control law with the delay
-    /// and half a tick of hold. At a change of stability H is real, and the inertia is that factor times H.
+    /// θ is the frequency in rad per tick. The loop is −T²/4J · cos(θ/2)/sin²(θ/2) · H(θ), where H is the control law with
+    /// its delay and half a tick of hold. At a limit of stability H is real and the loop is −1, which gives the inertia J.
     pub fn of(gains: &PidGains, delay_ticks: u8) -> Option<Self> {
         let turned = |theta: f64| {
             let half = 0.5 * gains.ki * DT;

@@ -1,4 +1,4 @@
-//! Compares the computed limits of stability with a simulation of the loop, tick by tick.
+//! Compares the computed stability limits with a simulation of the loop, tick by tick.
 
 use super::*;
 use crate::arm::Arm;
@@ -49,7 +49,7 @@ fn j41_j71_a_joint_is_stable_between_two_inertias_and_nowhere_else() {
             assert_eq!(most, f64::INFINITY);
             continue;
         }
-        // Slow growth: simulates some hundred swings.
+        // Near the upper limit the oscillation grows slowly, so some hundred swings are simulated.
         let slow = |inertia: f64| {
             let swing = std::f64::consts::TAU * (inertia / gains.kp).sqrt() / DT;
             growth(&gains, delay, inertia, ((300.0 * swing) as usize).clamp(6_000, 20_000_000))
@@ -78,7 +78,7 @@ fn j41_gains_that_hold_no_inertia_are_known() {
     }
 }
 
-/// A rotor alone, for which the margin is known without a matrix.
+/// The mass matrix is zero, so the margin follows from the rotor inertia alone.
 #[test]
 fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     let arm = Arm::avena();
@@ -89,7 +89,7 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     let least = stable.iter().map(|s| s.least / 0.7).fold(0.0, f64::max);
     let most = stable.iter().map(|s| s.most / 0.7).fold(f64::INFINITY, f64::min);
     assert!((margin.down - least).abs() < 1e-6 && (margin.up - most).abs() < 1e-6 * most, "{margin:?}");
-    // Two joints with full coupling are one joint with twice the stiffness.
+    // Two fully coupled joints behave like one joint with twice the stiffness.
     let mut both = [[0.0; JOINTS]; JOINTS];
     (both[4][4], both[5][5], both[4][5], both[5][4]) = (0.3, 0.3, 0.3, 0.3);
     let coupled = rotor_margin(&[both], &rotor, &stable, [true; JOINTS]).unwrap();
@@ -97,8 +97,8 @@ fn j71_the_margin_of_a_rotor_alone_is_that_of_its_inertia() {
     assert_eq!(rotor_margin(&[both], &[0.01; JOINTS], &stable, [true; JOINTS]), None);
 }
 
-/// For every delay, the inertia that a controller requires has a reserve over the loop's limit, and the reserve is not much
-/// larger than needed.
+/// For every delay, the inertia that a controller requires is 1.1 to 1.7 times the stability limit of the loop. For delays
+/// below two ticks and a strong Kp it may be down to 0.85 times the limit.
 #[test]
 fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     for delay in 0..=7u8 {
@@ -114,7 +114,8 @@ fn j71_the_inertia_that_a_controller_asks_for_is_stable_with_reserve() {
     }
 }
 
-/// Gain sets in use, on their arms, in 300 poses with and without a load; and the same gains times three and five.
+/// A controller accepts the gain sets in use on their arms in 300 poses, with and without a load. It refuses these gains times
+/// three and five.
 #[test]
 fn j71_the_gains_in_use_are_taken_in_all_poses_with_all_loads() {
     let plain = include_str!("../../tests/sessions/plain.urdf");

@@ -9,7 +9,7 @@ use jtc_wire::{ArmImage, EncodeError, FloatName, Floats, FrictionImage, Hash, Jo
 use super::{Arm, Difference, values};
 use crate::frame::model_rows;
 
-/// Reason why an image is not that of an arm.
+/// Reason why bytes are not the image of an arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -22,8 +22,8 @@ pub enum ImageError {
 }
 
 impl Arm {
-    /// Returns the setting values of a controller with this arm, in the order of the settings table. Missing values are taken
-    /// from the built-in arm.
+    /// Returns the values of all settings of a controller with this arm, in the order of the settings table. Values that
+    /// the arm does not give are those of the built-in arm.
     pub fn settings(&self) -> Vec<SettingValue> {
         settings::values(&self.config(), 0, true).collect()
     }
@@ -32,7 +32,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error for a number that no frame carries.
+    /// Returns an error for a number that does not fit into its frame.
     pub fn image(&self) -> Result<Option<Vec<u8>>, EncodeError> {
         let (Some(pid), Some(friction)) = (&self.pid, self.friction()) else { return Ok(None) };
         let settings = self.settings();
@@ -88,12 +88,12 @@ impl Arm {
         })
     }
 
-    /// Returns the differences between this arm and the arm of a controller, value by value; values that the file does not give
-    /// are skipped.
+    /// Returns the differences between this arm and the arm of a controller, value by value. Skips values that the file
+    /// does not give.
     pub fn differences(&self, device: &Self) -> Vec<Difference> {
         let mut all = Vec::new();
         let mut compare = |name: String, joint, file: f64, device: f64, unit| {
-            // The wire carries gains, friction and model as 32-bit floats.
+            // Gains, friction and model are sent as 32-bit floats.
             if file as f32 != device as f32 {
                 all.push(Difference { name, joint, file, device, unit });
             }
@@ -145,7 +145,7 @@ impl Arm {
                         let torque = t.torque.into_iter().flatten();
                         t.velocity.into_iter().chain(t.temperature).chain(torque).collect::<Vec<_>>()
                     };
-                    // The first different number of the 440 represents the whole table.
+                    // Of the 440 numbers of a table, only the first difference is listed.
                     let pairs = numbers(own).into_iter().zip(numbers(has));
                     if let Some((own, has)) = pairs.clone().find(|(own, has)| own != has) {
                         let count = pairs.filter(|(own, has)| own != has).count();
@@ -154,7 +154,7 @@ impl Arm {
                     }
                 }
             }
-            // The two forms differ: polynomial and table.
+            // One friction is a polynomial and the other a table.
             (Some(own), Some(has)) => {
                 let kind = |friction: &Friction| f64::from(u8::from(matches!(friction, Friction::Table(_))));
                 compare("friction (0 polynomial, 1 table)".into(), None, kind(&own), kind(&has), "");
@@ -258,7 +258,7 @@ mod tests {
         assert_eq!(Arm { pid: None, ..arm }.image(), Ok(None));
     }
 
-    /// Settings without a joint key are in a table of the file.
+    /// Settings that have no key in the joints are written to a table of the file.
     #[test]
     fn j53_settings_of_the_controller_travel_with_the_file() {
         let text =

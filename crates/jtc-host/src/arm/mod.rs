@@ -55,19 +55,20 @@ mod urdf {
 /// File of the default arm, as delivered.
 pub const AVENA_TOML: &str = include_str!("../../../../arms/avena.toml");
 
-/// Selection of the arm in a robot description that holds more joints than the six.
+/// Selection of the arm in a robot description with more than six joints.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ArmChoice {
-    /// Names of the six moving joints, base to wrist; `None`: the description has exactly six.
+    /// Names of the six moving joints, base to wrist. `None` if the description has exactly six.
     pub joints: Option<Vec<String>>,
-    /// Flange link; only joints on the path to this link are considered. `None`: the frame fixed to the last joint.
+    /// Flange link. Only joints on the path to this link are considered. `None` selects the frame that is fixed to the last
+    /// joint.
     pub tip: Option<String>,
 }
 
-/// Arm of a robot description, with the values of the description for which an arm has no field.
+/// Arm of a robot description, and those values of the description for which an arm has no field.
 struct Described {
     arm: Arm,
-    /// Acceleration of gravity in the base frame, m/s²: z of the description points upwards.
+    /// Acceleration of gravity in the base frame, m/s². In the description z points upwards.
     gravity: [f64; 3],
     /// Coulomb (N·m) and viscous (N·m·s/rad) friction of each joint.
     friction: [[f64; 2]; JOINTS],
@@ -88,9 +89,10 @@ pub struct Arm {
     pub model: ArmModel,
     /// Limits and rotor inertia, base to wrist.
     pub joints: [JointConfig; JOINTS],
-    /// Joints, base to wrist, whose rotor inertia the file gives. An unknown rotor inertia is 0 in `joints`.
+    /// For each joint, base to wrist: `true` if the file gives the rotor inertia. If not, the rotor inertia in `joints` is
+    /// 0.
     pub rotors_given: [bool; JOINTS],
-    /// Acceleration of gravity in the base frame, m/s²; `None`: the device's setting.
+    /// Acceleration of gravity in the base frame, m/s². `None`: the controller's setting is used.
     pub gravity: Option<[f64; 3]>,
     /// Controller settings from the `[settings]` table of the file.
     pub others: Vec<SettingValue>,
@@ -102,7 +104,7 @@ pub struct Arm {
     pub table: Option<Box<[TableOf<f32>; JOINTS]>>,
     /// Named joint positions, rad. Poses are not sent to a controller and are not part of a hash.
     pub poses: Poses,
-    /// Values that were not carried over, or were filled in.
+    /// Values that the loader did not carry over, or filled in.
     pub warnings: Vec<Warning>,
     /// Source of each number.
     pub sources: Sources,
@@ -148,7 +150,7 @@ impl Arm {
     ///
     /// # Errors
     ///
-    /// Returns an error if the text is not a valid URDF, or `choice` does not name six revolute joints in a row.
+    /// Returns an error if the text is not a valid URDF, or if `choice` does not select six revolute joints in a row.
     pub fn from_urdf_with(text: &str, choice: &ArmChoice) -> Result<Self, FileError> {
         urdf::read(text, choice).map(|described| described.arm)
     }
@@ -179,7 +181,7 @@ impl Arm {
         Ok(arm)
     }
 
-    /// Loads an arm from a TOML or URDF file without checking its numbers; [`Arm::check`] finds wrong numbers.
+    /// Loads an arm from a TOML or URDF file without checking its numbers. [`Arm::check`] reports invalid numbers.
     ///
     /// # Errors
     ///
@@ -203,7 +205,7 @@ impl Arm {
     /// Returns an error with the first invalid number of the model or of the limits.
     pub fn is_physical(&self) -> Result<(), FileError> {
         self.model.check().map_err(|e| FileError::at(Place::name(self.name_of_part(&e)), e.to_string()))?;
-        // J-35, J-43: limits that the drives cannot keep, or at which the drives stop by themselves.
+        // J-35, J-43: rejects limits that the drives cannot keep, or at which the drives stop by themselves.
         self.config().check().map_err(|e| {
             let name =
                 e.joint().checked_sub(1).and_then(|j| self.joint_names.get(j)).map_or("", String::as_str);
@@ -211,7 +213,7 @@ impl Arm {
         })
     }
 
-    /// Returns the name in the file of the joint or link with the model error.
+    /// Returns the name that the file gives to the joint or link with the model error.
     fn name_of_part(&self, error: &ModelError) -> String {
         let part = if error.is_of_joint() { &self.joint_names[..] } else { &self.link_names[..] };
         let kind = if error.is_of_joint() { "joint" } else { "link" };
@@ -219,30 +221,31 @@ impl Arm {
         format!("arm model, {kind} {name}")
     }
 
-    /// Returns the controller settings for this arm. Missing values are taken from the default arm; a missing rotor inertia is 0.
+    /// Returns the controller settings for this arm. Values that the arm does not give are those of the default arm, except
+    /// that an unknown rotor inertia is 0.
     pub fn config(&self) -> Config {
         let default = Config::avena();
         let mut config =
             Config { joints: self.joints, gravity: self.gravity.unwrap_or(default.gravity), ..default };
         for value in &self.others {
-            // A value out of range keeps its default; no file reader lets such a value through.
+            // An out-of-range value is skipped. The file readers reject such values.
             let _ = settings::apply(&mut config, *value);
         }
         config
     }
 
-    /// Returns the friction compensation: the polynomial if there is one, else the table.
+    /// Returns the friction compensation: the polynomial, or, if there is none, the table.
     pub fn friction(&self) -> Option<Friction> {
         let polynomial = self.polynomial.map(Friction::Polynomial);
         polynomial.or_else(|| self.table.as_ref().map(|t| Friction::Table(**t)))
     }
 
-    /// Returns the parameters for a controller, with friction as polynomial if there is one, else as table.
+    /// Returns the parameters for a controller, with the friction of [`friction`](Self::friction).
     pub fn parameter_set(&self) -> ParameterSet {
         ParameterSet { friction: self.friction(), pid: self.pid, model: Some(self.model) }
     }
 
-    /// Returns the controller parameters for this arm. Missing values are taken from the default arm.
+    /// Returns the controller parameters for this arm. Values that the arm does not give are those of the default arm.
     pub fn parameters(&self) -> Parameters {
         let default = Parameters::avena();
         Parameters {
@@ -276,12 +279,13 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a controller setting without its own key in an arm file: such a setting stands in `[settings]`.
+/// Returns `true` for a controller setting that has no key of its own in an arm file, so that the file lists it in
+/// `[settings]`.
 fn has_no_key(setting: &Setting) -> bool {
     setting.of_arm() && !setting.of_joint() && !setting.name.starts_with("gravity_")
 }
 
-/// Returns `true` if the text is XML, as a robot description is; a byte order mark may precede the XML.
+/// Returns `true` if the text is XML, like a robot description. A byte order mark may precede the XML.
 fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with('<')
 }

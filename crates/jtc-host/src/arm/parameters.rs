@@ -5,7 +5,7 @@ use jtc_core::{Config, Friction, JOINTS, OutOfBounds, PidGains, TableOf};
 use jtc_dynamics::ArmModel;
 use jtc_wire::Joint;
 
-/// Parameters to send; a part that is `None` is not sent.
+/// Parameters to send. A part that is `None` is not sent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParameterSet {
     /// Friction compensation.
@@ -20,7 +20,7 @@ pub struct ParameterSet {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParameterError {
-    /// A number that no frame carries.
+    /// A number that does not fit into its frame.
     #[error("{what} of {joint}: {value} does not fit into a 32-bit float")]
     NotFinite {
         /// Name of the number.
@@ -59,7 +59,7 @@ pub enum ParameterError {
     Model(jtc_dynamics::ModelError),
 }
 
-/// A parameter beyond the bounds of a controller (J-06).
+/// A parameter that is out of the bounds of a controller (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beyond {
     /// Joint; `None` for a parameter of the arm model.
@@ -105,7 +105,8 @@ impl ParameterSet {
         parts.into_iter().filter_map(|(lacks, name)| lacks.then_some(name)).collect()
     }
 
-    /// Returns the first parameter beyond the bounds of a controller with these settings (J-06), for the message after a refusal.
+    /// Returns the first parameter out of the bounds of a controller with these settings (J-06). Used for the message after
+    /// a refusal.
     pub fn beyond(&self, config: &Config) -> Option<Beyond> {
         let bounds = &config.parameter_bounds;
         let joints = Joint::ALL.into_iter().zip(&config.joints);
@@ -129,12 +130,13 @@ impl ParameterSet {
         friction.or_else(gains).or_else(masses)
     }
 
-    /// Checks the parameters before they are sent, including many values that the controller would refuse with "incorrect value"
-    /// (J-06).
+    /// Checks the parameters before they are sent. Finds many of the values that the controller would refuse with
+    /// "incorrect value" (J-06).
     ///
     /// # Errors
     ///
-    /// Returns an error with the first number that no frame carries, that contradicts another number, or that is not physical.
+    /// Returns an error with the first number that does not fit into its frame, contradicts another number, or is not
+    /// physical.
     pub fn check(&self) -> Result<(), ParameterError> {
         match &self.friction {
             Some(Friction::Polynomial(c)) => {
@@ -164,7 +166,7 @@ fn finite(what: &'static str, joint: Joint, value: f64) -> Result<(), ParameterE
     if (value as f32).is_finite() { Ok(()) } else { Err(ParameterError::NotFinite { what, joint, value }) }
 }
 
-/// Checks that both axes increase and that frames carry all numbers.
+/// Checks that both axes increase and that all numbers fit into their frames.
 pub(super) fn check_table(j: Joint, t: &TableOf<f32>) -> Result<(), ParameterError> {
     for (axis, values) in [("velocity", &t.velocity), ("temperature", &t.temperature)] {
         values.iter().try_for_each(|v| finite("friction table axis", j, f64::from(*v)))?;

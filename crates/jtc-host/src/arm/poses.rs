@@ -21,11 +21,12 @@ use crate::file::{FileError, Place, read_text, short};
 /// Named joint positions, rad.
 pub type Poses = BTreeMap<String, [f64; JOINTS]>;
 
-/// Longest name of a pose, characters.
+/// Maximum length of a pose's name, characters.
 const NAME_MAX: usize = 64;
-/// Similarity from which a name counts as a misspelling of another name.
+/// Similarity at which a name is suggested as the correct spelling of another name.
 const ALIKE: f64 = 0.7;
-/// Saved positions have a resolution of 1e-6 rad, a micrometre at the end of a one-metre arm: encoders measure no finer.
+/// Saved positions have a resolution of 1e-6 rad, which is a micrometre at the end of a one-metre arm. Encoders have no
+/// finer resolution.
 const DECIMALS: f64 = 1e6;
 
 impl Arm {
@@ -48,7 +49,7 @@ impl Arm {
         self.at_pose(name, position).map(|()| *position)
     }
 
-    /// Checks that a position (rad) is within the arm's limits; `name` is for the error.
+    /// Checks that a position (rad) is within the arm's limits. `name` is used in the error.
     ///
     /// # Errors
     ///
@@ -72,8 +73,8 @@ impl Arm {
     }
 }
 
-/// Returns `true` for a valid name of a pose: it fits into an option next to lists of numbers, and into a cell of a waypoint
-/// file.
+/// Returns `true` for a valid name of a pose. Such a name can be used in an option next to lists of numbers, and in a cell
+/// of a waypoint file.
 pub fn is_pose_name(name: &str) -> bool {
     name.chars().count() <= NAME_MAX
         && name.starts_with(char::is_alphabetic)
@@ -120,7 +121,7 @@ pub fn save_pose(path: &Path, name: &str, position: &[f64; JOINTS], force: bool)
             return Err(PoseError::Exists { path: path.to_owned(), name: name.into() });
         }
         match table.get_mut(name).and_then(Item::as_value_mut) {
-            // Text before and after the value stays.
+            // The text before and after the value is kept.
             Some(value) => {
                 let around = value.decor().clone();
                 *value = Value::Array(Array::from_iter(rounded));
@@ -150,7 +151,7 @@ pub fn remove_pose(path: &Path, name: &str) -> Result<(), PoseError> {
     })
 }
 
-/// Applies the same change to the table of poses in a file and to the arm of that file; both must give the same poses.
+/// Applies one change both to the table of poses in a file and to the arm of that file. Both must then have the same poses.
 fn edit(
     path: &Path,
     change: impl FnOnce(&mut dyn toml_edit::TableLike, &mut Arm) -> Result<(), PoseError>,
@@ -177,8 +178,8 @@ fn edit(
     Ok(())
 }
 
-/// Restores the byte order mark and the line ends of the old text in a changed text, because the TOML library does not keep them.
-/// Lines before and after the change keep their line ends; lines between them get the line end of the first line.
+/// Restores the byte order mark and the line ends of the old text in a changed text, because the TOML library does not keep
+/// them. Lines before and after the change keep their line ends. The lines between them get the line end of the first line.
 fn as_it_was(changed: &str, before: &str) -> String {
     const MARK: char = '\u{feff}';
     let (lines, old): (Vec<&str>, Vec<&str>) = (
@@ -249,7 +250,8 @@ mod tests {
         assert_eq!(Arm::load(&path).unwrap(), Arm::avena());
     }
 
-    /// Line ends, also mixed ones, and the byte order mark stay: after the pose is removed the file has its original bytes.
+    /// The byte order mark and the line ends are kept, even mixed ones. After the pose is removed, the file has its
+    /// original bytes.
     #[test]
     fn every_byte_of_the_rest_stays() {
         let with_home = format!("{AVENA_TOML}\n[poses]\nhome = [0, 0, 0, 0, 0, 0]\n# the end\n");
@@ -284,7 +286,7 @@ mod tests {
         let with = Arm { poses: Poses::from([("home".into(), HOME)]), ..Arm::avena() };
         assert_eq!(with.hash().unwrap(), plain.hash().unwrap());
         assert!(with.differences(&plain).is_empty());
-        // Poses survive a round trip through the file.
+        // The poses are unchanged when the file is written and read again.
         assert_eq!(Arm::parse(&with.to_toml()).unwrap().poses, with.poses);
     }
 
@@ -328,7 +330,7 @@ mod tests {
             let error = Arm::parse(&format!("{AVENA_TOML}\n[poses]\n{line}\n")).unwrap_err().to_string();
             assert!(error.contains(problem), "{line}: {error}");
         }
-        // The check finds a pose outside the limits, and its use is refused.
+        // The check reports a pose outside the limits, and the pose cannot be used.
         let arm = Arm::parse(&format!("{AVENA_TOML}\n[poses]\nfar = [0, 2, 0, 0, 0, 0]\n")).unwrap();
         assert_eq!(
             arm.pose("far").unwrap_err().to_string(),

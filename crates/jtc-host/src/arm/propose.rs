@@ -1,6 +1,6 @@
-//! Starting values for numbers that a robot description lacks, each by a documented rule.
+//! Starting values for numbers that a robot description lacks. Each is computed by a documented rule.
 //!
-//! With these values an arm can be simulated and brought up slowly; none of them is measured. An arm file marks them, and
+//! With these values an arm can be simulated and brought up slowly. None of them is measured. An arm file marks them, and
 //! `jtc arm check` lists them until the operator has replaced them.
 
 use jtc_core::settings::TOOL_SPEED;
@@ -66,34 +66,35 @@ pub const RULES: [Rule; 11] = [
 
 /// Highest rate at which the damping in Teaching reduces a speed, 1/s (J-25).
 const TEACH_DAMPING_RATE: f64 = 100.0;
-/// Tool speed limit of an imported arm, m/s: the limit for setting up a robot next to people (ISO 10218).
+/// Tool speed limit of an imported arm, m/s. It is the limit for setting up a robot next to people (ISO 10218).
 const TOOL_SPEED_MAX: f64 = 0.25;
-/// Kd divided by the least inertia, multiplied by the age of the derivative (J-71).
+/// Damping: Kd · (age of the derivative) / (least inertia) (J-71).
 const DAMPING: f64 = 0.7;
-/// Half of the derivative's time window plus half of a tick, for which a torque is held, s.
+/// Age of the derivative, s: half of its time window, plus the half tick by which the hold delays a torque.
 const DERIVATIVE_AGE: f64 = 3e-3;
-/// Kp over Kd, 1/s.
+/// Kp divided by Kd, 1/s.
 const STIFFNESS_RATE: f64 = 20.0;
-/// Ki over Kp, 1/s.
+/// Ki divided by Kp, 1/s.
 const INTEGRAL_RATE: f64 = 2.0;
-/// Share of the greatest Ki that is stable without friction.
+/// Proposed Ki as a share of the greatest Ki that is stable without friction.
 const INTEGRAL_PART: f64 = 1.0 / 3.0;
-/// Reserve of the gains at both ends of the range of rotor inertias that the gains must tolerate.
+/// Factor by which the gains must be stable beyond both ends of the range of rotor inertias.
 const RESERVE: f64 = 1.5;
 /// Steps of the search for gains with that reserve.
 const REDUCTIONS: usize = 60;
 /// Acceleration limit (rad/s²) for which a proposed torque limit is sufficient.
 const ENOUGH_ACCELERATION: f64 = 3.0;
-/// Share of the torque left by gravity that the acceleration limit uses.
+/// Share that the acceleration limit uses of the torque that gravity leaves.
 const ACCELERATION_PART: f64 = 1.0 / 3.0;
-/// Greatest lag of the heaviest assumed rotor, as a share of the position error limit.
+/// Maximum lag with the heaviest assumed rotor, as a share of the position error limit.
 const ERROR_PART: f64 = 0.2;
-/// Acceleration (rad/s²) of a drive without a load at full torque.
+/// Acceleration of a drive without a load at full torque, rad/s². Gives the proposed rotor inertia.
 const ROTOR_ACCELERATION: f64 = 200.0;
-/// Smallest acceleration limit that is proposed, rad/s²; used also if gravity leaves no torque.
+/// Smallest proposed acceleration limit, rad/s². Also used if gravity leaves no torque.
 const LEAST_ACCELERATION: f64 = 0.5;
 
-/// Rounds down to this number of significant digits: more digits would look measured, and rounding up could pass a limit.
+/// Rounds down to this number of significant digits. More digits would look like a measured value, and rounding up could
+/// exceed a limit.
 fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -144,7 +145,8 @@ impl Arm {
             if self.sources.of((Some(joint), "acceleration_max_rad_s2")) == Source::Default {
                 let j = joint.index();
                 let left = (to.torque_max - worst[j]) * ACCELERATION_PART / most[j];
-                // A position error supplies the torque of the heaviest rotor that the model does not contain.
+                // The model contains only the proposed rotor inertia. A position error must supply the torque for the
+                // excess inertia of the heaviest rotor.
                 let unknown = (PROPOSED_RANGE.up - 1.0) * to.rotor_inertia;
                 let kp = self.pid.map_or(f64::INFINITY, |pid| pid[j].kp);
                 let lag = ERROR_PART * to.position_error_max * kp / unknown;
@@ -164,7 +166,7 @@ impl Arm {
         }
     }
 
-    /// Returns gains that are stable with the lightest and the heaviest rotors to be expected.
+    /// Returns gains that are stable with the lightest and with the heaviest rotors of the assumed range.
     fn proposed_gains(&self, ranges: &Ranges) -> [PidGains; JOINTS] {
         let (delay, bounds) = (self.config().delay_ticks, self.config().parameter_bounds);
         let rotor = |factor: f64| self.joints.map(|j| factor * j.rotor_inertia);
@@ -197,7 +199,7 @@ impl Arm {
         of(damping, integral)
     }
 
-    /// Proposes the missing torque limits from this arm's own numbers; limits of another arm would not fit.
+    /// Proposes the missing torque limits from the numbers of this arm, because limits of another arm would not fit.
     fn propose_torques(&mut self, worst: &[f64; JOINTS], ranges: &Ranges) {
         let open = |joint: Joint| self.sources.of((Some(joint), "torque_max_nm")) == Source::Default;
         let open: Vec<usize> = Joint::ALL.into_iter().filter(|j| open(*j)).map(Joint::index).collect();

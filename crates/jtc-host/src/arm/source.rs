@@ -1,4 +1,4 @@
-//! Source of each number of an arm: its file, a proposal of `jtc arm import`, a default, or none.
+//! Source of each number of an arm: its file, a proposal of `jtc arm import`, a default, or no source.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// The file gives it.
+    /// The file gives the number.
     File,
-    /// The file gives the number and marks it as a starting value that was neither measured nor looked up.
+    /// The file gives the number and marks it as a starting value, which was neither measured nor taken from a data sheet.
     Proposed,
     /// The file does not give the number, and a default is used.
     Default,
-    /// The file does not give the number, and a default does not exist.
+    /// The file does not give the number, and it has no default.
     Missing,
 }
 

@@ -1,4 +1,5 @@
-//! Load of the drives of an arm at rest: the greatest gravity torque over all positions, and the inertia that a joint moves.
+//! Load on the drives of an arm at rest: the greatest gravity torque over all positions, and the inertia that each joint
+//! moves.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -8,14 +9,14 @@ pub(super) type Ranges = [(f64, f64); JOINTS];
 
 /// Number of start poses of the search for the greatest torque.
 const STARTS: usize = 24;
-/// Maximum rounds over all joints in one search; a search mostly ends after three.
+/// Maximum number of rounds over all joints in one search. A search usually ends after three.
 const ROUNDS: usize = 12;
 /// Number of poses in which inertia is computed.
 pub(super) const POSES: usize = 512;
-/// Relative increase of the torque up to which the search counts no gain.
+/// Relative increase of the torque below which the search treats two torques as equal.
 const GAIN: f64 = 1e-9;
 
-/// Greatest gravity torque of a joint (N·m, without sign), and a pose (rad) with this torque.
+/// Greatest gravity torque of a joint (N·m, magnitude), and a pose (rad) with this torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Worst {
     pub torque: f64,
@@ -25,7 +26,7 @@ pub(super) struct Worst {
 /// Least and greatest inertia (kg·m²) that a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Inertia {
-    /// Inertia while the other joints can move freely: the inertia that the drive feels at first.
+    /// Inertia while the other joints can move freely. The drive feels this inertia at the start of a motion.
     pub least: f64,
     /// Inertia while the other joints are held.
     pub most: f64,
@@ -45,8 +46,8 @@ pub(super) fn pose(n: usize, ranges: &Ranges) -> JointVec {
     })
 }
 
-/// Returns the x in a range at which a + b·cos x + c·sin x is greatest, from the values at `at` and a third of a turn to either
-/// side.
+/// Returns the x in a range at which a + b·cos x + c·sin x is greatest. `values` are the values at `at` and a third of a
+/// turn to either side.
 fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
     let third = std::f64::consts::TAU / 3.0;
     let angles = [at, at + third, at - third];
@@ -62,8 +63,8 @@ fn crest(values: [f64; 3], at: f64, (low, high): (f64, f64)) -> f64 {
 
 /// Returns the greatest gravity torque of each joint over the ranges.
 ///
-/// As a function of a single position each torque is a sine with an offset, so the greatest value along one position has a closed
-/// form. The search goes from joint to joint until no position gives more torque, from many start poses.
+/// As a function of one position each torque is a sine with an offset, so its maximum has a closed form. Each search goes
+/// from joint to joint until no position increases the torque. The searches start from many poses.
 pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges) -> [Worst; JOINTS] {
     let dynamics = Dynamics::new(model, gravity);
     let third = std::f64::consts::TAU / 3.0;
@@ -98,7 +99,8 @@ pub(super) fn worst_gravity(model: &ArmModel, gravity: [f64; 3], ranges: &Ranges
     })
 }
 
-/// Returns the pose with each position that does not change the torque set to 0, or as near to 0 as its range allows.
+/// Returns the pose after setting each position that does not change the torque to 0, or to the value nearest to 0 in its
+/// range.
 fn plain(
     q: &JointVec,
     sign: f64,
@@ -156,7 +158,7 @@ mod tests {
         arm.joints.map(|j| (j.position_min, j.position_max))
     }
 
-    /// Compares with the simplest search: a grid of all positions that change the torque.
+    /// Compares with a search on a grid of all positions that change the torque.
     #[test]
     fn the_greatest_gravity_torque_is_no_less_than_any_on_a_grid() {
         let arm = Arm::avena();

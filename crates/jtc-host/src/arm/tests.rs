@@ -9,7 +9,7 @@ use test_kit::existing;
 use super::*;
 use host_kit::Diagnose;
 
-/// The arm file as the host reads it equals the controller's built-in defaults.
+/// The arm file, as the host reads it, equals the built-in defaults of the controller.
 #[test]
 fn the_delivered_arm_is_the_controller_s_default() {
     let arm = Arm::avena();
@@ -32,10 +32,10 @@ fn a_file_of_another_kind_is_called_no_arm_file() {
 fn an_arm_file_says_its_format_and_an_unknown_one_is_refused_by_name() {
     let whole = Arm::avena();
     assert!(AVENA_TOML.contains("\nformat = 2\n") && whole.to_toml().starts_with("format = 2\n"));
-    // Files without a format key are older and mean the same.
+    // Older files have no format key. They are read in the same way.
     assert_eq!(Arm::parse(&AVENA_TOML.replace("\nformat = 2\n", "\n")).unwrap(), whole);
     for other in ["3", "1", "\"two\""] {
-        // The format error comes first, also if the file has unknown keys.
+        // The format error is reported before errors about unknown keys.
         let text = AVENA_TOML.replace("\nformat = 2\n", &format!("\nformat = {other}\nnew_key = 1\n"));
         let message = Arm::parse(&text).unwrap_err().to_string();
         assert!(message.contains(&format!("format = {other} is none")), "{message}");
@@ -85,7 +85,7 @@ fn a_plain_urdf_is_carried_over_exactly() {
     assert!(arm.warnings.is_empty(), "{:?}", arm.warnings);
 }
 
-/// An axis of −z inverts the direction of each joint: the torques are those of the mirrored motion, mirrored back.
+/// An axis of −z inverts the direction of each joint. The torques must be those of the mirrored motion with opposite sign.
 #[test]
 fn joints_about_minus_z_keep_positions_and_torques() {
     let (plain, turned) = (Arm::avena(), Arm::parse(&urdf("0 0 -1", "revolute")).unwrap());
@@ -101,7 +101,7 @@ fn joints_about_minus_z_keep_positions_and_torques() {
     }
 }
 
-/// A tool on the last link and a plate between two joints give the same arm as their combined masses.
+/// A tool on the last link and a plate between two joints give the same arm as links with the combined masses.
 #[test]
 fn fixed_bodies_become_part_of_their_link() {
     let tool = "<link name=\"tool\"><inertial><origin xyz=\"0 0 0.1\"/><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" \
@@ -123,7 +123,7 @@ fn what_no_arm_of_ours_can_be_is_refused_by_name() {
     let error_of = |text: &str| Arm::parse(text).expect_err("accepted").to_string();
     assert!(error_of(&urdf("0 0 0", "revolute")).contains("no direction"));
     assert!(error_of("<robot name=\"x\"></robot>").contains("0 rotary joints"));
-    // No file format and no option helps in this case.
+    // The hint does not suggest other file formats or options, because none of them helps here.
     let hint = Arm::parse("<robot name=\"x\"></robot>").expect_err("accepted").hint();
     assert!(hint.contains("six revolute or continuous joints") && !hint.contains("help files"), "{hint}");
     assert!(error_of(&"<a>".repeat(100_000)).contains("nested"));
@@ -165,7 +165,7 @@ fn a_continuous_joint_has_the_working_area_of_its_drive() {
     assert!(arm.warnings.iter().any(|w| w.place == "joint j2" && w.problem.contains("no position limits")));
 }
 
-/// Z1, UR with a gripper, a redundant arm: the error names the surplus joints and the command that selects six.
+/// Z1, UR with a gripper, a redundant arm: the error lists the surplus joints and the command that selects six.
 #[test]
 fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     let plain = urdf("0 0 1", "revolute");
@@ -207,7 +207,7 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert_eq!((arm.joint_names[5].as_str(), arm.model.joints[6]), ("j6", Arm::avena().model.joints[6]));
     let arm = import(&branch, None, Some("l6")).unwrap();
     assert_eq!(arm.model.joints[6], Origin::default(), "the flange is the tip");
-    // The tip is after a gripper that is held at zero.
+    // The tip is beyond a gripper whose joint is held at zero.
     let arm = import(&seven, names("j1,j2,j3,j4,j5,j6"), Some("of_gripper")).unwrap();
     assert_eq!(arm.model.joints[6], Arm::avena().model.joints[6]);
 
@@ -230,7 +230,7 @@ fn joints_beyond_the_arm_are_named_and_held_at_zero_once_the_arm_is_said() {
     assert!(import(&seven, None, Some("l5")).unwrap_err().to_string().contains("is --tip the last link"));
 }
 
-/// A seventh joint in the middle is held at zero: the result is the arm without it.
+/// A seventh joint in the middle of the chain is held at zero. The result equals the arm without this joint.
 #[test]
 fn a_joint_that_is_held_keeps_its_place() {
     let plain = urdf("0 0 1", "revolute");
@@ -332,7 +332,7 @@ fn the_existing_parameter_files_are_read() {
     }
     if let Some(file) = load("model_default.txt") {
         let model = file.model.unwrap();
-        // The only number whose sign differs in the old default.
+        // This is the only number whose sign differs in the old default.
         assert_eq!((model.joints[3].xyz[2], model.links), (0.005, arm.model.links));
     }
     if let Some(file) = load("avena_arm_id.urdf") {
@@ -357,7 +357,7 @@ fn the_existing_parameter_files_are_read() {
     }
 }
 
-/// Writes the gains of one joint as the existing programs do; each joint has its own Kp.
+/// Writes the gains of one joint in the format of the existing programs. Each joint has its own Kp.
 fn gains_file(dir: &Path, joint: usize) -> PathBuf {
     let path = dir.join(format!("PidParamJoint{joint}.csv"));
     std::fs::write(&path, format!("{},10,5,-1,1\n", 1000 + joint)).unwrap();
@@ -375,7 +375,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert_eq!(kp(ParameterFile::load_all(&backwards).unwrap()), expected);
     assert_eq!(kp(ParameterFile::load(dir.path()).unwrap()), expected);
 
-    // Only one file is named although all are present: the loader does not guess the intention.
+    // Only one of the six files is passed, although all exist. The loader does not guess that all are meant.
     let error_of = |paths: &[PathBuf]| ParameterFile::load_all(paths).unwrap_err().to_string();
     let text = error_of(&all[2..3]);
     assert!(
@@ -387,7 +387,7 @@ fn gains_of_one_joint_are_never_those_of_six() {
     assert!(text.contains("not named: ") && text.contains("PidParamJoint3.csv (joint 4). "), "{text}");
     assert!(error_of(&[&all[..], &all[..1]].concat()).contains("joint 1"));
 
-    // A file is missing in the directory.
+    // One file is missing in the directory.
     std::fs::remove_file(&all[3]).unwrap();
     let text = ParameterFile::load(dir.path()).unwrap_err().to_string();
     assert!(text.contains("PidParamJoint3.csv (joint 4)") && !text.contains("(joint 5)"), "{text}");

@@ -21,10 +21,10 @@ use super::source::{ARM_KEYS, JOINT_KEYS};
 use super::{Arm, Change, Source, Sources, Warning};
 use crate::file::{FileError, Place, short};
 
-/// Format number of the arm files that this program reads. Files without a number are older and mean the same.
+/// Format number of the arm files that this program reads. Older files have no number and are read in the same way.
 pub(super) const FORMAT: i64 = 2;
 
-/// Keys that decide how the rest is read.
+/// Keys that determine how the rest of the file is read.
 #[derive(Deserialize)]
 struct Head {
     format: Option<toml::Value>,
@@ -72,7 +72,7 @@ struct TableForm {
 }
 
 impl Arm {
-    /// Reads an arm from TOML; returns an error for numbers that the controller would refuse.
+    /// Reads an arm from TOML. Returns an error for numbers that the controller would refuse.
     ///
     /// # Errors
     ///
@@ -100,7 +100,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
         let problem = format!("neither TOML nor URDF: no arm file (it begins with \"{}\")", short(first));
         return Err(FileError::form(problem));
     }
-    // Checks the format before the keys, because another format may have other keys.
+    // The format is checked before the keys, because another format may have other keys.
     if let Some(format) = toml::from_str::<Head>(text).map_err(wrong)?.format
         && format.as_integer() != Some(FORMAT)
     {
@@ -179,7 +179,7 @@ pub(super) fn read(text: &str) -> Result<Arm, FileError> {
     })
 }
 
-/// Reads an array of exactly `N` numbers; as an array type it would be read without the surplus numbers.
+/// Reads an array of exactly `N` numbers. The array type of serde would ignore surplus numbers.
 fn exactly<'de, D: Deserializer<'de>, const N: usize>(from: D) -> Result<[f64; N], D::Error> {
     let numbers = Vec::<f64>::deserialize(from)?;
     let count = numbers.len();
@@ -222,7 +222,7 @@ fn others(given: &BTreeMap<String, toml::Value>) -> Result<Vec<SettingValue>, Fi
     Ok(all)
 }
 
-/// Returns a part of all six joints, `None` if no joint has the part, or an error if only some joints have it.
+/// Returns a parameter of all six joints, `None` if no joint has it, or an error if only some joints have it.
 fn all_or_none<T>(
     joints: &[JointForm],
     key: &str,
@@ -246,7 +246,7 @@ fn all_or_none<T>(
     }
 }
 
-/// Takes over the list of proposed numbers, either of the arm or of a joint.
+/// Stores the list of proposed numbers, either of the arm or of a joint.
 fn mark(sources: &mut Sources, of: Option<(Joint, &JointForm)>, names: &[String]) -> Result<(), FileError> {
     let number = of.map(|(number, _)| number);
     let keys: &[&'static str] = if of.is_some() { &JOINT_KEYS } else { &ARM_KEYS };
@@ -292,7 +292,7 @@ fn tables(forms: &[TableForm]) -> Result<Option<Box<[TableOf<f32>; JOINTS]>>, Fi
             )));
         }
     };
-    // Checks the tables also if polynomials are used, because an operator who changes to tables later does not expect an error in them.
+    // The tables are checked even if polynomials are used. An operator who changes to tables later expects valid tables.
     for (joint, table) in Joint::ALL.into_iter().zip(all.iter()) {
         check_table(joint, table).map_err(|e| FileError::at(Place::name("friction_table"), e.to_string()))?;
     }

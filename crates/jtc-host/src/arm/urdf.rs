@@ -1,8 +1,8 @@
-//! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the controller's arm model
-//! cannot carry.
+//! Arms from URDF: six rotary joints in a chain and a fixed flange. The reader reports properties that the arm model of the
+//! controller cannot represent.
 //!
-//! For a joint about another axis than +z the reader turns the frame of its link, which changes neither positions nor torques.
-//! Bodies attached by fixed joints, and by joints that are not among the six, become part of the link that carries them.
+//! If the axis of a joint is not +z, the reader turns the frame of its link. This changes neither positions nor torques.
+//! Bodies that are attached by fixed joints, or by joints other than the six, become part of the link that carries them.
 
 mod choice;
 mod frames;
@@ -62,14 +62,14 @@ pub(super) fn read(text: &str, choice: &ArmChoice) -> Result<Described, FileErro
         joints,
         warnings: chain.warnings,
         sources: chain.sources,
-        // URDF cannot carry the rest.
+        // URDF cannot give the other fields.
         ..Arm::nameless()
     };
     Ok(Described { arm, gravity, friction })
 }
 
-/// Checks that no two joints or links share a name and that no link has two parents, because the reader does not guess which is
-/// meant.
+/// Checks that joint names and link names are unique and that no link has two parents. The reader does not guess which one
+/// is meant.
 fn only_once(robot: &Robot) -> Result<(), FileError> {
     fn twice(mut names: Vec<&str>) -> Option<&str> {
         names.sort_unstable();
@@ -121,7 +121,7 @@ impl<'a> Chain<'a> {
         self.warnings.push(Warning::new(change, place, problem));
     }
 
-    /// Warns if the sixth joint is a gripper: five axes and a gripper are also six joints.
+    /// Warns if the sixth joint may be a gripper, because five axes and a gripper also have six joints.
     fn doubt_gripper(&mut self, choice: &ArmChoice) {
         let last = self.rotary[JOINTS - 1];
         let words = format!("{} {}", last.name, last.child.link).to_lowercase();
@@ -143,8 +143,8 @@ impl<'a> Chain<'a> {
         frame.inverse().direction(&GRAVITY).map(|v| if v.abs() < 1e-9 { 0.0 } else { v })
     }
 
-    /// Finds the joints from the last link to the flange: the path to `tip`, or else a fixed joint on the last link. If there are
-    /// several fixed joints, the joint with the name of a flange is used, else the first.
+    /// Finds the joints from the last link to the flange. They are the path to `tip`, or, without a tip, one fixed joint on
+    /// the last link. If the last link has several, the joint with a usual name of a flange is used, or else the first.
     fn find_flange(&mut self, tip: Option<&str>) {
         let last = &self.rotary[JOINTS - 1].child.link;
         if let Some(way) = tip.and_then(|tip| self.rigid_path(last, tip)) {
@@ -177,7 +177,7 @@ impl<'a> Chain<'a> {
         }
     }
 
-    /// Returns the joints on the path from link `from` to link `to`, first to last, if none of them moves.
+    /// Returns the joints on the path from link `from` to link `to`, first to last. Returns `None` if one of them moves.
     fn rigid_path(&self, from: &str, to: &str) -> Option<Vec<&'a Joint>> {
         let mut path = Vec::new();
         let mut at = to;
@@ -197,7 +197,7 @@ impl<'a> Chain<'a> {
         let mut model = ArmModel::default();
         let base = self.rotary[0].parent.link.clone();
         self.look_below(&base);
-        // Rotation of each link's frame relative to URDF.
+        // Rotation from the link's frame in URDF to its frame in the model.
         let mut turn = Frame::IDENTITY;
         model.links[0] = self.link(&base, &turn)?;
         for (i, joint) in self.rotary.into_iter().enumerate() {
@@ -241,7 +241,7 @@ impl<'a> Chain<'a> {
         Ok(model)
     }
 
-    /// Reports joints below the arm's own base: they do not move, but an offset changes the place of the base.
+    /// Reports joints below the base of the arm. They do not move, but an offset changes the place of the base.
     fn look_below(&mut self, base: &str) {
         let mut at = base.to_owned();
         for _ in 0..self.robot.joints.len() {

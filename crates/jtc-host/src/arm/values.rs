@@ -11,20 +11,21 @@ use super::{Arm, Source};
 /// Number of an arm.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArmValue {
-    /// Key in an arm file. For a number in a table or list the part follows a dot, as in `pid.kp` and `com_xyz_m.x`.
+    /// Key in an arm file. For a number in a table or list, the name of the part follows after a dot: `pid.kp`,
+    /// `com_xyz_m.x`.
     pub name: &'static str,
     /// Joint, if the number belongs to a joint; `None` for the flange.
     pub joint: Option<Joint>,
-    /// Link, 0 for the base, if the number belongs to a link. The origin of a joint has the number of the link that the joint
-    /// carries; the flange has 7.
+    /// Link (0 is the base), if the number belongs to a link. The origin of a joint has the number of the link that the
+    /// joint carries. The flange has number 7.
     pub link: Option<usize>,
     /// Value; `None` if the number is missing.
     pub value: Option<f64>,
     /// Unit of the value.
     pub unit: &'static str,
-    /// Least value that a controller accepts, if there is a bound.
+    /// Smallest value that a controller accepts, if there is a bound.
     pub min: Option<f64>,
-    /// Greatest value that a controller accepts, if there is a bound.
+    /// Largest value that a controller accepts, if there is a bound.
     pub max: Option<f64>,
     /// Default if the file does not give the number.
     pub default: Option<f64>,
@@ -70,8 +71,8 @@ const FRICTION: [(&str, &str); 6] = [
 /// Numbers of a type `T`: properties of each number, and a function that reads it.
 pub(super) type Numbers<T, const N: usize> = [(Kind, fn(&T) -> f64); N];
 
-/// Returns the properties of a setting of the joints or the controller; the range is that of the settings table, limited to the
-/// range of the drives.
+/// Returns the properties of a setting of the joints or of the controller. The range is that of the settings table,
+/// narrowed to the range of the drives.
 fn setting(row: &Setting, drives: &Config) -> Kind {
     let fastest = drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor;
     let (low, high) = match row.name {
@@ -87,7 +88,7 @@ fn setting(row: &Setting, drives: &Config) -> Kind {
         "torque_gain" => Some(1.0),
         // The default depends on the torque limit, which differs from joint to joint.
         "teach_damping_nm_s_rad" => None,
-        // These numbers are mandatory in an arm file.
+        // An arm file must give these numbers.
         _ if row.of_joint() => None,
         _ => row.get(drives, 0),
     };
@@ -106,13 +107,13 @@ pub(super) fn gains(bounds: &ParameterBounds) -> Numbers<PidGains, 5> {
     ]
 }
 
-/// Creates a number that belongs to no joint and no link.
+/// Creates a number that belongs neither to a joint nor to a link.
 fn value(kind: Kind, value: Option<f64>, from: Source) -> ArmValue {
     let Kind { name, unit, min, max, default } = kind;
     ArmValue { name, joint: None, link: None, value, unit, min, max, default, from }
 }
 
-/// Creates the numbers of a list that the file gives.
+/// Creates the numbers of a list in the file.
 fn listed(
     names: &[&'static str],
     unit: &'static str,
@@ -172,7 +173,7 @@ impl Arm {
             all.extend(listed(&COM_RPY, "rad", &link.origin.rpy, i, None));
             all.extend(listed(&INERTIA, "kg·m²", &link.inertia, i, Some(bounds.link_inertia_max)));
         }
-        // Settings of the controller itself; gravity is already in the list.
+        // Settings of the controller, except gravity, which is already in the list.
         let of_controller =
             |row: &&Setting| !row.of_joint() && row.of_arm() && !row.name.starts_with("gravity");
         for row in settings::TABLE.iter().filter(of_controller) {

@@ -1,4 +1,4 @@
-//! Changes made by reading a file: values changed, filled in or left out.
+//! Changes that the loader made to the values of a file: changed, filled in or left out.
 
 use serde::Serialize;
 
@@ -21,7 +21,7 @@ pub enum Change {
     LimitCut,
     /// A limit is missing or unusable, and another value is used.
     LimitAssumed,
-    /// An arm file has no place for the number.
+    /// An arm file has no key for the number.
     NotCarried,
     /// A number of a robot description is used only as a starting value.
     Doubtful,
@@ -52,14 +52,14 @@ impl Change {
     }
 }
 
-/// Item in a file that could not be carried over, or was filled in.
+/// Item of a file that the loader could not carry over, or filled in.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Warning {
     /// Kind of the change.
     pub change: Change,
     /// Name of the joint, link or key.
     pub place: String,
-    /// Problem, and the change that was made.
+    /// Problem, and the change that the loader made.
     pub problem: String,
 }
 

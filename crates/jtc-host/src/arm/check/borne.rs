@@ -1,4 +1,4 @@
-//! Checks of the gains: acceptance by a controller (J-71), and damping of the arm.
+//! Checks of the gains: will a controller accept them (J-71), and do they damp the arm?
 
 use host_kit::Severity;
 use jtc_core::{JOINTS, PidGains, inertia_needed, least_felt_inertia};
@@ -11,13 +11,14 @@ use crate::arm::statics::{POSES, pose};
 
 /// Heaviest payload for the check of the damping, kg.
 const PAYLOAD_MAX: f64 = 5.0;
-/// Delay of the position gain in addition to the controller's setting (half a tick, because a torque is held for one tick), and
-/// the length of a tick, s.
+/// Delay of the position gain in addition to the controller's setting, s: a torque is held for one tick, which delays it by
+/// half a tick on average. `TICK` is the length of a tick, s.
 const HALF_A_TICK: f64 = 0.5e-3;
 const TICK: f64 = 1e-3;
 
 impl Arm {
-    /// Finds joints that are too light for their gains, which a controller refuses, and joints that their gains do not damp.
+    /// Finds joints that are too light for their gains, so that a controller refuses the gains, and joints that the gains
+    /// do not damp.
     pub(super) fn find_borne(&self, findings: &mut Vec<ArmFinding>) {
         let Some(pid) = &self.pid else { return };
         let (config, delay) = (self.config(), self.config().delay_ticks);
@@ -74,7 +75,7 @@ impl Arm {
             "{}: Kd {kd} N·m·s/rad does not damp the joint{with}: {needed:.1} is needed",
             self.titled(joint)
         );
-        // The integral can use the part of Kd that the delay of Kp leaves.
+        // The delay of Kp uses up a part of Kd. The integral can use the rest.
         let ki = ki * ((kd - delayed) / (needed - delayed)).max(0.0);
         ArmFinding::new(Severity::Warning, "damping", what)
             .because(
@@ -89,8 +90,8 @@ impl Arm {
             .measured(*kd, needed, "N·m·s/rad")
     }
 
-    /// Returns the heaviest payload up to [`PAYLOAD_MAX`] that the torque limits hold in every pose, kg, and for each joint the
-    /// greatest inertia with this payload while the other joints are held, kg·m².
+    /// Returns the heaviest payload (kg, up to [`PAYLOAD_MAX`]) that the torque limits can hold in every pose. Also
+    /// returns, for each joint, the greatest inertia with this payload while the other joints are held, kg·m².
     fn heaviest_moved(&self) -> (f64, JointVec) {
         let ranges = self.ranges();
         let bare = Dynamics::new(&self.model, self.config().gravity);

@@ -10,7 +10,8 @@ use crate::arm::statics::{Worst, worst_gravity};
 
 /// Share of the torque limit above which gravity leaves little torque for motion.
 const LITTLE_LEFT: f64 = 0.8;
-/// Ratio of the greatest torque limit to the greatest gravity torque above which the unit of the limits is suspected to be wrong.
+/// If the greatest torque limit exceeds the greatest gravity torque by this factor, the unit of the limits is probably
+/// wrong.
 const FAR_ABOVE: f64 = 15.0;
 
 impl Arm {
@@ -66,7 +67,7 @@ impl Arm {
         holding
     }
 
-    /// Finds torque limits far above the gravity torques: a limit in kg·cm, for example, or an arbitrary number.
+    /// Finds torque limits far above the gravity torques, for example limits in kg·cm or arbitrary numbers.
     fn find_unit(&self, holding: &[Holding], findings: &mut Vec<ArmFinding>) {
         let most = |of: fn(&Holding) -> f64| holding.iter().map(of).fold(0.0, f64::max);
         let (torque, limit) = (most(|h| h.torque_nm), most(|h| h.limit_nm));

@@ -21,8 +21,8 @@ pub struct RotorMargins {
 }
 
 impl Arm {
-    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), as [`Arm::check`] does. If the arm has no
-    /// gains, there is nothing to check.
+    /// Rejects unstable gains, and gains that a controller refuses for this arm (J-71), with the rules of [`Arm::check`].
+    /// An arm without gains passes.
     ///
     /// # Errors
     ///
@@ -42,8 +42,8 @@ impl Arm {
         }
     }
 
-    /// Finds unstable gains for each joint. If all are stable, returns the tolerated factors of the rotor inertias; `None` if
-    /// gains or rotor inertias are not given.
+    /// Finds unstable gains for each joint. If all are stable, returns the tolerated factors of the rotor inertias. Returns
+    /// `None` if the file does not give gains or rotor inertias.
     pub(super) fn find_gains(&self, findings: &mut Vec<ArmFinding>) -> Option<RotorMargins> {
         let pid = self.pid.as_ref().filter(|_| self.rotors_given == [true; JOINTS])?;
         let delay = self.config().delay_ticks;
@@ -117,7 +117,7 @@ impl Arm {
         Some(found.of(joint, "pid"))
     }
 
-    /// Finds gains that do not tolerate the uncertainty of rotor inertias that were proposed, not measured.
+    /// Finds gains that are not stable over the uncertainty of proposed rotor inertias, which were not measured.
     fn proposed_rotors(&self, margin: impl Fn([bool; JOINTS]) -> Option<RotorMargin>) -> Option<ArmFinding> {
         let name = "rotor_inertia_kg_m2";
         let is_proposed = |joint: &Joint| self.sources.of((Some(*joint), name)) == Source::Proposed;
@@ -163,7 +163,7 @@ fn stable_gains(margins: &RotorMargins, rotor: &[f64; JOINTS]) -> ArmFinding {
 
 /// Formats a range such as `0.08..12`, with two digits, rounded to the safe side.
 fn range(down: f64, up: f64) -> String {
-    // Keeps a value that already has two digits.
+    // Prevents that a value with exactly two digits is rounded further.
     const ROUNDING: f64 = 1e-9;
     format!("{}..{}", digits(down * (1.0 - ROUNDING), f64::ceil), digits(up * (1.0 + ROUNDING), f64::floor))
 }

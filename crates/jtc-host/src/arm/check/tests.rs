@@ -1,4 +1,4 @@
-//! Each fault of an arm causes its finding, and no other.
+//! Each fault of an arm causes its own finding, and no other finding.
 
 use proptest::prelude::*;
 
@@ -11,7 +11,7 @@ fn of(from: &str, to: &str) -> Arm {
     toml_form::read(&AVENA_TOML.replacen(from, to, 1)).unwrap()
 }
 
-/// Returns the findings that are not good, as code, severity and joint.
+/// Returns the findings of a severity other than good, as code, severity and joint.
 fn found(arm: &Arm) -> Vec<(&'static str, Severity, Option<u8>)> {
     let bad = arm.check().findings.into_iter().filter(|f| f.finding.severity != Severity::Good);
     bad.map(|f| (f.code, f.finding.severity, f.joint.map(Joint::number))).collect()
@@ -74,7 +74,7 @@ fn what_is_missing_is_said_and_only_what_no_controller_starts_without_is_refused
     assert_eq!(lacking("gravity"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("rotor"), (vec![("missing", Warning, None)], false));
     assert_eq!(lacking("velocity_max"), (vec![("default", Warning, None)], false));
-    // The table is also friction.
+    // The file still has a friction table, so friction is not missing.
     assert_eq!(lacking("friction_polynomial"), (vec![], false));
 }
 
@@ -91,7 +91,7 @@ fn an_arm_that_its_drives_cannot_hold_is_named_with_joint_pose_and_share() {
     assert!(f.finding.what.contains("N·m of 100 N·m (132 %) at q = ("), "{}", f.finding.what);
     let tight = found(&of("torque_max_nm = 180.0", "torque_max_nm = 150.0"));
     assert_eq!(tight, [("holding", Severity::Warning, Some(2))]);
-    // With narrower position ranges gravity may need less torque.
+    // The narrower position ranges exclude the poses with the greatest gravity torque.
     let narrow = of("torque_max_nm = 180.0", "torque_max_nm = 100.0");
     let mut narrow = Arm { ..narrow };
     (narrow.joints[1].position_min, narrow.joints[1].position_max) = (-0.3, 0.3);
@@ -160,7 +160,7 @@ fn j71_the_rotor_margin_is_where_the_check_changes() {
     assert!(words(&arm).contains(" times the rotor inertias; each joint alone "), "{}", words(&arm));
 }
 
-/// The tolerance for proposed rotor inertias is wider than for measured ones.
+/// For proposed rotor inertias the check requires a wider stable range than for measured ones.
 #[test]
 fn gains_that_do_not_tolerate_a_proposed_rotor_are_refused() {
     let with = |proposed: bool, factor: f64| {
@@ -190,7 +190,7 @@ fn proposals_are_found_with_their_joints() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// The check handles every number without a panic, and refuses an arm with a number that is not finite.
+    /// The check does not panic for any number, and it refuses an arm with a number that is not finite.
     #[test]
     fn no_number_is_too_odd_for_the_check(place in 0..11usize, joint in 0..JOINTS, value in prop::num::f64::ANY) {
         let mut arm = Arm::avena();
@@ -224,7 +224,7 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     let findings = arm.check().findings;
     let light = findings.iter().find(|f| f.code == "too-light").expect("too light");
     assert_eq!((light.finding.severity, light.joint.map(Joint::number)), (Severity::Problem, Some(1)));
-    // The gains are stable with little reserve, so the stability check finds no problem.
+    // The gains are barely stable, so the stability check finds no problem.
     assert!(!findings.iter().any(|f| f.code == "gains" && f.finding.severity == Severity::Problem));
     assert!(arm.check_gains().unwrap_err().to_string().contains("kg·m²"));
     // The check also works if the rotor inertias are not given and stability is unknown.
@@ -235,7 +235,8 @@ fn j71_a_joint_that_is_too_light_for_its_gains_is_refused() {
     assert!(arm.check_gains().is_err());
 }
 
-/// An integral gain that is too strong for a heavy load causes a warning, and its advice removes the warning.
+/// An integral gain that is too strong for a heavy load causes a warning. With the gain that the warning advises, it
+/// disappears.
 #[test]
 fn j71_gains_that_do_not_damp_a_joint_with_a_load_are_warned_of() {
     let warned = |ki: f64| {

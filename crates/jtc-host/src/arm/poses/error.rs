@@ -12,7 +12,7 @@ use crate::file::FileError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
-    /// The name does not fit into a waypoint file or an option.
+    /// The name cannot be used in a waypoint file or an option.
     #[error(
         "\"{name}\" is no name of a pose: it begins with a letter, has letters, digits, _, - and . only, {NAME_MAX} at most, and is no number \
          (nan, inf)"
@@ -55,7 +55,7 @@ pub enum PoseError {
         /// Name of the pose.
         name: String,
     },
-    /// A robot description, which has no place for poses.
+    /// The file is a robot description, which cannot contain poses.
     #[error("{} is a robot description, which has no place for poses", path.display())]
     Description {
         /// The file.

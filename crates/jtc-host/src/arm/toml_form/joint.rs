@@ -12,8 +12,8 @@ use crate::file::{FileError, Place};
 pub(in crate::arm) const VELOCITY_DEFAULT: f64 = 1.5;
 pub(in crate::arm) const ACCELERATION_DEFAULT: f64 = 12.56637;
 pub(in crate::arm) const POSITION_ERROR_DEFAULT: f64 = 0.09;
-/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s this damping takes three tenths of the limit,
-/// the greatest torque that is found as a load.
+/// Damping in Teaching, N·m·s/rad for each N·m of the torque limit. At 0.6 rad/s this damping takes three tenths of the
+/// limit, which is also the greatest torque that the controller recognises as a load.
 pub(in crate::arm) const TEACH_DAMPING_DEFAULT: f64 = 0.5;
 
 #[derive(Serialize, Deserialize)]
@@ -51,7 +51,7 @@ pub(super) struct PidForm {
 }
 
 impl JointForm {
-    /// Returns `true` if the joint has this number, or a default replaces it.
+    /// Returns `true` if the file gives this number of the joint, or if the number has a default.
     pub(super) fn has(&self, key: &str) -> bool {
         match key {
             "rotor_inertia_kg_m2" => self.rotor_inertia_kg_m2.is_some(),

@@ -1,7 +1,8 @@
 //! Selection of the arm's six joints in a robot description.
 //!
-//! Terms: a *rotary* joint is a revolute or a continuous one; a joint that is not fixed and not among the six is *held* at
-//! zero, as if it were fixed: the finger of a gripper, the wheel of a cart, the seventh joint of a redundant arm.
+//! Terms: a *rotary* joint is a revolute or a continuous joint. A joint that is not fixed and is not one of the six is
+//! *held* at zero, like a fixed joint. Examples are the finger of a gripper, the wheel of a cart, and the seventh joint of
+//! a redundant arm.
 
 use std::path::PathBuf;
 
@@ -11,7 +12,7 @@ use urdf_rs::{Joint, JointType, Robot};
 use crate::arm::ArmChoice;
 use crate::file::{FileError, Place};
 
-/// Returns the six joints, base to wrist, each carried by the one before it.
+/// Returns the six joints, base to wrist. Each is carried by the joint before it.
 pub(super) fn choose<'a>(robot: &'a Robot, choice: &ArmChoice) -> Result<[&'a Joint; JOINTS], FileError> {
     no_loops(robot)?;
     let candidates: Vec<&Joint> = match (&choice.joints, &choice.tip) {
@@ -42,7 +43,7 @@ pub(super) fn about(joint: &Joint, problem: impl Into<String>) -> FileError {
     FileError::at(Place::name(format!("joint {}", joint.name)), problem)
 }
 
-/// Returns an error about the joints or links that the user named.
+/// Returns an error about the joints or links that the user selected.
 fn unfit(problem: impl Into<String>) -> FileError {
     FileError::choice(Place::default(), problem)
 }
@@ -59,12 +60,12 @@ fn above<'a>(robot: &'a Robot, link: &str) -> Option<&'a Joint> {
     robot.joints.iter().find(|j| j.child.link == link)
 }
 
-/// Returns the joints between `link` and the root, the nearest to `link` first. The description must have no loops.
+/// Returns the joints between `link` and the root, beginning at `link`. The description must have no loops.
 fn way_down<'a>(robot: &'a Robot, link: &str) -> impl Iterator<Item = &'a Joint> {
     std::iter::successors(above(robot, link), |j| above(robot, &j.parent.link))
 }
 
-/// Checks that each chain of parents ends.
+/// Checks that each chain of parents ends, so that the description has no loops.
 fn no_loops(robot: &Robot) -> Result<(), FileError> {
     for joint in &robot.joints {
         let mut at = joint;
@@ -90,7 +91,7 @@ fn way_to<'a>(robot: &'a Robot, link: &str) -> Result<Vec<&'a Joint>, FileError>
     Ok(way)
 }
 
-/// Returns the joints that are not fixed and do not follow another joint, those nearer to the root first.
+/// Returns the joints that are neither fixed nor mimic another joint, beginning at the root.
 fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     let driven = |j: &&Joint| j.joint_type != JointType::Fixed && j.mimic.is_none();
     let mut joints: Vec<&Joint> = joints.into_iter().filter(driven).collect();
@@ -98,7 +99,7 @@ fn moving<'a>(robot: &'a Robot, joints: Vec<&'a Joint>) -> Vec<&'a Joint> {
     joints
 }
 
-/// Returns the joints that the user named.
+/// Returns the joints that the user selected.
 fn named<'a>(robot: &'a Robot, wanted: &[String]) -> Result<Vec<&'a Joint>, FileError> {
     let find = |name: &String| -> Result<&'a Joint, FileError> {
         let joint = robot.joints.iter().find(|j| &j.name == name).ok_or_else(|| {
@@ -135,7 +136,7 @@ fn kind(joint: &Joint) -> String {
     format!("{:?}", joint.joint_type).to_lowercase()
 }
 
-/// Returns the error that says why the joints are not a six-axis arm, and how to select the joints.
+/// Returns an error with the reason why the joints are not a six-axis arm, and with the option that selects the joints.
 fn not_six(robot: &Robot, candidates: &[&Joint], choice: &ArmChoice) -> FileError {
     // Finds the longest chain of rotary joints.
     let chain_to = |end: &Joint| -> Vec<&Joint> {

@@ -28,7 +28,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
 impl Frame {
     pub const IDENTITY: Self = Self { rotation: UNIT, position: [0.0; 3] };
 
-    /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll), as URDF defines.
+    /// Creates the frame Rz(yaw)·Ry(pitch)·Rx(roll), which is the convention of URDF.
     pub fn of(origin: &Origin) -> Self {
         let [(sr, cr), (sp, cp), (sy, cy)] = origin.rpy.map(f64::sin_cos);
         Self {
@@ -41,7 +41,7 @@ impl Frame {
         }
     }
 
-    /// Returns xyz and rpy; if roll and yaw turn about the same axis, yaw is 0.
+    /// Returns xyz and rpy. If roll and yaw turn about the same axis, yaw is 0.
     pub fn origin(&self) -> Origin {
         let r = &self.rotation;
         let cos_pitch = r[0][0].hypot(r[1][0]);
@@ -78,7 +78,7 @@ impl Frame {
         applied(&self.rotation, direction)
     }
 
-    /// Returns a rotation that takes z to `axis`; `None` if the axis has no direction.
+    /// Returns a rotation that turns z to `axis`. Returns `None` if the axis is zero.
     pub fn turning_z_to(axis: [f64; 3]) -> Option<Self> {
         let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
         if !(norm > 1e-9 && norm.is_finite()) {
@@ -90,7 +90,7 @@ impl Frame {
         } else if z < -1.0 + 1e-12 {
             [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
         } else {
-            // Rodrigues about z × axis.
+            // Rotation about z × axis (Rodrigues).
             let k = 1.0 / (1.0 + z);
             [[1.0 - k * x * x, -k * x * y, x], [-k * x * y, 1.0 - k * y * y, y], [-x, -y, z]]
         };
@@ -140,7 +140,7 @@ impl Body {
         })
     }
 
-    /// Makes `other` part of this body.
+    /// Adds the mass and inertia of `other` to this body.
     pub fn add(&mut self, other: &Self) {
         let mass = self.mass + other.mass;
         let centre = if mass == 0.0 {

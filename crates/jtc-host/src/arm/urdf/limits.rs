@@ -11,12 +11,12 @@ use super::choice::about;
 use crate::arm::{Arm, Change};
 use crate::file::FileError;
 
-/// Largest position limit of a multi-turn joint to either side, rad. Larger numbers are taken for degrees.
+/// Largest position limit of a multi-turn joint in either direction, rad. Larger numbers are probably degrees.
 const TWO_TURNS: f64 = 4.0 * PI;
-/// A full turn, as descriptions round it, rad.
+/// A full turn with the rounding of typical descriptions, rad.
 const TURN: f64 = 6.3;
-/// Largest credible velocity limit of a joint, rad/s: the fastest wrists reach 900 °/s. Larger numbers are degrees per second, or
-/// placeholders.
+/// Largest credible velocity limit of a joint, rad/s. The fastest wrists reach 900 °/s. Larger numbers are degrees per
+/// second or placeholders.
 const BELIEVABLE_SPEED: f64 = 16.0;
 
 /// Rounds to four decimals.
@@ -34,8 +34,9 @@ fn fastest() -> f64 {
     drives.drive_speed_trip.min(drives.velocity_full_scale) / drives.overspeed_factor
 }
 
-/// Rejects position limits that are not a valid range in rad. The reader does not replace them, because the widest range of the
-/// drives would take the arm into its stops. Returns `true` if both limits are beyond one turn, as for some wrists.
+/// Rejects position limits that are not a valid range in rad. The reader does not replace them by the widest range of the
+/// drives, because the arm could then hit its end stops. Returns `true` if both limits are beyond one turn, which some
+/// wrists have.
 fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     if let Some(limit) = [lower, upper].into_iter().find(|limit| limit.is_nan()) {
@@ -75,8 +76,8 @@ fn turns_more_than_once(joint: &Joint) -> Result<bool, FileError> {
 }
 
 impl Chain<'_> {
-    /// Returns the limits of all six joints. Missing limits are those of the default arm or of the drives, and are marked as
-    /// such.
+    /// Returns the limits of all six joints. A missing limit is replaced by the limit of the default arm or of the drives,
+    /// and marked as a default.
     pub(super) fn limits(&mut self) -> Result<[JointConfig; JOINTS], FileError> {
         let mut all = Arm::avena().joints;
         for (number, joint) in Number::ALL.into_iter().zip(self.rotary) {
@@ -107,7 +108,8 @@ impl Chain<'_> {
                 self.sources.fill_in((Some(number), key));
             }
         }
-        // Without a limit, uses the range of the drives; the description does not say if the mechanism has a stop.
+        // A missing limit is replaced by the range of the drives. The description does not say if the joint has an end
+        // stop.
         let mut assumed = Vec::new();
         for (key, limit, end) in [
             ("position_min_rad", &mut to.position_min, -WORKING_AREA),
@@ -139,7 +141,8 @@ impl Chain<'_> {
         if is_limit(limit.velocity) && limit.velocity <= BELIEVABLE_SPEED {
             to.velocity_max = limit.velocity;
         } else if is_limit(limit.velocity) {
-            // Uses the slower of the two meanings; a limit that only the drives impose is marked as not given.
+            // The number may be in rad/s or in °/s. The slower meaning is used, limited to the speed of the drives, and
+            // marked as not given.
             let in_degrees = limit.velocity.to_radians();
             to.velocity_max = in_degrees.min(fastest());
             self.sources.fill_in((Some(number), "velocity_max_rad_s"));
@@ -169,8 +172,8 @@ impl Chain<'_> {
         }
     }
 
-    /// Narrows the limits to those of the drives. A description gives the limits of the mechanism, and the controller refuses
-    /// limits beyond those of the drives (J-35, J-43).
+    /// Narrows the limits to those of the drives. A description gives the limits of the mechanism, but the controller
+    /// refuses limits beyond those of the drives (J-35, J-43).
     fn narrow_to_drives(&mut self, joints: &mut [JointConfig; JOINTS]) -> Result<(), FileError> {
         let drives = Config::avena();
         let fastest = fastest();

@@ -1,4 +1,4 @@
-//! Typical robot descriptions: any axis, fixed joints, fingers, and numbers that are missing, doubled or wrong.
+//! Typical robot descriptions: arbitrary axes, fixed joints, fingers, and numbers that are missing, doubled or wrong.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -88,7 +88,7 @@ fn applied(a: &Matrix, v: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|i| (0..3).map(|k| a[i][k] * v[k]).sum())
 }
 
-/// Returns the rotation about an axis (Rodrigues), independent of the importer.
+/// Returns the rotation about an axis (Rodrigues). The test does not use the importer for this.
 fn turn(axis: [f64; 3], angle: f64) -> Matrix {
     let norm = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
     let [x, y, z] = axis.map(|v| v / norm);
@@ -149,7 +149,7 @@ proptest! {
     ) {
         let gravity = [0.7, -1.3, -9.6];
         let arm = Arm::from_urdf(&robot(&parts, "")).unwrap();
-        // The dynamics take an angle within 2 µrad of a multiple of π/2 as that multiple.
+        // If an angle is within 2 µrad of a multiple of π/2, the dynamics use the multiple.
         let off = |angle: f64| (angle - FRAC_PI_2 * (angle / FRAC_PI_2).round()).abs();
         let angles = arm.model.joints.iter().flat_map(|origin| origin.rpy);
         prop_assume!(angles.map(off).all(|off| !(1e-9..3e-6).contains(&off)));
@@ -166,7 +166,7 @@ proptest! {
     }
 }
 
-/// A plate between two joints and a tool on two fixed joints give the same masses as merged links.
+/// A plate between two joints and a tool on two fixed joints give the same masses as links that already contain them.
 #[test]
 fn fixed_joints_are_merged_into_the_link_that_carries_them() {
     let flange =
@@ -193,13 +193,13 @@ fn fixed_joints_are_merged_into_the_link_that_carries_them() {
     assert!(merged.contains(&"link plate: 0.2 kg: made part of link b2".to_owned()), "{merged:?}");
 }
 
-/// Fingers that follow each other, a wheel, a slide: none of them belongs to the arm.
+/// Fingers that mimic each other, a wheel and a slide are not part of the arm.
 #[test]
 fn j40_fingers_and_what_follows_them_are_left_out() {
     let finger = joint("left", "prismatic", ("b6", "l"), LIMIT) + &body("l", 0.1, &[0.0; 3]);
     let mimic = joint("right", "prismatic", ("b6", "r"), &format!("<mimic joint=\"left\"/>{LIMIT}"))
         + &body("r", 0.1, &[0.0; 3]);
-    // A joint that follows another joint needs no option; a joint that moves by itself does.
+    // A joint that mimics another joint needs no option. A joint that moves independently needs one.
     let follower = mimic.replace("\"left\"", "\"a1\"");
     let arm = Arm::from_urdf(&robot(&parts(), &follower)).unwrap();
     assert_eq!(
@@ -266,7 +266,7 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
             "{limit}: {assumed:?}"
         );
     }
-    // A proposed torque limit comes from this arm, not from another arm.
+    // A proposed torque limit is computed from this arm and not copied from another arm.
     let text = robot(&parts(), "").replace("effort=\"50\"", "");
     let arm = Arm::import_text(&text, &ArmChoice::default()).unwrap();
     assert!(arm.joints.iter().all(|j| j.torque_max < 60.0 && j.torque_max > 0.5), "{:?}", arm.joints);
@@ -277,7 +277,7 @@ fn limits_that_are_missing_or_none_are_filled_in_and_known_as_such() {
     assert!(assumed.contains(&format!("joint a2: {words}")), "{assumed:?}");
 }
 
-/// The widest range of the drives never replaces an invalid limit, because it would drive the joint into its stops.
+/// An invalid limit is never replaced by the widest range of the drives, because the joint could then hit its end stops.
 #[test]
 fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
     let with = |limits: &str| {
@@ -320,13 +320,14 @@ fn position_limits_that_are_no_range_in_rad_are_refused_with_joint_and_rad() {
             let error = error.to_string();
             assert!(error.starts_with(", joint a2: ") && error.contains(words), "{limits}: {error}");
         }
-        // A joint without stops is still accepted.
+        // A joint without end stops is still accepted.
         let endless = text.replacen("\"a2\" type=\"revolute\"", "\"a2\" type=\"continuous\"", 1);
         assert!(Arm::from_urdf(&endless).is_ok(), "{limits}");
     }
 }
 
-/// A narrower limit stays, a side without a limit is marked, and a wrist limit of more than one turn is cut and marked.
+/// A limit that is narrower than the drives is kept. A side without a limit is marked. A wrist limit of more than one turn
+/// is cut and marked.
 #[test]
 fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     let second = |limits: &str| {
@@ -361,8 +362,8 @@ fn position_limits_in_rad_are_taken_and_an_open_side_is_marked() {
     }
 }
 
-/// A velocity that no arm reaches is degrees per second or a placeholder. The slower of both meanings is used, and marked for the
-/// check.
+/// A velocity above the speed of any arm is in degrees per second, or is a placeholder. The reader uses the slower of both
+/// meanings, and marks it for the check.
 #[test]
 fn a_velocity_that_is_not_believed_is_marked_and_never_the_fastest_in_silence() {
     for (velocity, used, marked) in [
@@ -460,7 +461,7 @@ fn what_cannot_be_read_is_named_with_its_place() {
         error_of("axis xyz=\"0 1 0\"", "axis xyz=\"0 0 0\"")
             .contains("joint a2: axis 0 0 0 has no direction")
     );
-    // Words in a comment are not read as part of the file.
+    // Text in a comment is ignored.
     let text = good.replacen("<link", "<!-- <link name=\"b1\"> <limit> --><link", 1);
     assert_eq!(Arm::from_urdf(&text).unwrap().model, Arm::from_urdf(&good).unwrap().model);
 }
@@ -499,7 +500,7 @@ fn gravity_is_proposed_as_the_description_mounts_the_arm() {
     assert_eq!(mount("0 1.5707963267948966 0"), [9.81, 0.0, 0.0]);
 }
 
-/// The file that `jtc arm import` writes is read back with every mark, and its check finds no problem.
+/// The file that `jtc arm import` writes is read back with all marks, and its check finds no problem.
 #[test]
 fn proposals_are_marked_in_the_file_and_found_again() {
     let text = robot(&parts(), "").replacen(

@@ -1,14 +1,14 @@
-//! Text of a robot description before it is parsed: nesting depth, places of its elements, and faults for which the XML reader
-//! gives no place.
+//! Text of a robot description before it is parsed: nesting depth, positions of its elements, and faults for which the XML
+//! reader gives no position.
 
 use std::borrow::Cow;
 
 use crate::file::{FileError, Place, short};
 
-/// Maximum nesting depth; no description of an arm nests deeper.
+/// Maximum nesting depth. Descriptions of arms are less deep.
 const DEPTH_MAX: usize = 32;
 
-/// Tag of the text: begin, end, and depth of its element (the element of the whole description has depth 0).
+/// Tag in the text: begin, end, and depth of its element. The outermost element has depth 0.
 struct Tag<'a> {
     text: &'a str,
     begin: usize,
@@ -49,8 +49,8 @@ fn tags(text: &str) -> impl Iterator<Item = Tag<'_>> {
     })
 }
 
-/// Returns the end of a tag at the front of `rest`. A `>` in the value of an attribute does not end the tag; a closing tag has no
-/// attributes.
+/// Returns the end of the tag at the start of `rest`. In an opening tag, a `>` inside an attribute value does not end the
+/// tag. A closing tag has no attributes.
 fn end_of_tag(rest: &str) -> Option<usize> {
     if rest.starts_with("</") {
         return rest.find('>');
@@ -66,7 +66,7 @@ fn end_of_tag(rest: &str) -> Option<usize> {
     })
 }
 
-/// Rejects a text that nests too deep, because the reader is recursive.
+/// Rejects a text with too deep nesting, because the reader is recursive.
 pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     let deepest = tags(text).map(|tag| tag.depth + 1).max().unwrap_or(0);
     if deepest > DEPTH_MAX {
@@ -75,7 +75,8 @@ pub(super) fn check_depth(text: &str) -> Result<(), FileError> {
     Ok(())
 }
 
-/// Adds a velocity limit of 0, which means no limit, to each limit without a velocity, because the reader requires one.
+/// Adds the velocity limit 0 to each limit without a velocity, because the reader requires one. The value 0 means that
+/// there is no limit.
 pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     let lacks = |tag: &Tag| tag.text.starts_with("<limit") && !tag.text.contains("velocity");
     let places: Vec<usize> = tags(text).filter(lacks).map(|tag| tag.begin + "<limit".len()).collect();
@@ -92,7 +93,7 @@ pub(super) fn with_velocities(text: &str) -> Cow<'_, str> {
     Cow::Owned(out + &text[from..])
 }
 
-/// Returns the names of the joints whose limits give neither a lower nor an upper position; the reader sets both to 0.
+/// Returns the names of the joints whose limits have neither a lower nor an upper position. The reader would set both to 0.
 pub(super) fn without_ranges(text: &str) -> Vec<String> {
     let mut joints: Vec<(String, bool)> = Vec::new();
     for tag in tags(text).filter(|tag| !tag.closes) {
@@ -114,7 +115,7 @@ fn has_attribute(tag: &Tag, keys: &[&str]) -> bool {
     tag.text.split('=').any(|head| keys.iter().any(|key| head.trim_end().ends_with(key)))
 }
 
-/// Returns the reader's error with the element that causes it, because the reader gives no place.
+/// Returns the error of the reader with the element that causes it, because the reader does not report the place.
 pub(super) fn locate(text: &str, what: &str) -> FileError {
     let what = what.trim_start_matches("custom: ").replace("float literal", "number");
     let mut open = None;
@@ -136,7 +137,7 @@ pub(super) fn locate(text: &str, what: &str) -> FileError {
     FileError::form(format!("no URDF: {whole}"))
 }
 
-/// Returns the first attribute of an element that must be a number and is not a valid number.
+/// Returns the first attribute of an element that must be a number and is not.
 fn no_number(element: &str) -> Option<String> {
     const NUMBERS: [&str; 16] = [
         "value",

@@ -36,9 +36,9 @@ pub struct Observation {
     pub confirmed: Option<bool>,
     /// Another rate at which statuses were found.
     pub other_baud: Option<u32>,
-    /// Joints that are set absent (J-53).
+    /// Joints that the user has marked as absent (J-53).
     pub absent: Vec<Joint>,
-    /// Report of the controller about held stops and encoders (J-69); `None`: not requested, or not supported.
+    /// Report of the controller about held stops and encoders (J-69); `None` if it was not requested or is not supported.
     pub reactions: Option<Reactions>,
 }
 
@@ -159,7 +159,8 @@ fn link(seen: &Observation, all: &mut Findings) {
     }
 }
 
-/// Finds drives that answer although their joint is set absent: an error without its own bit (J-53).
+/// Finds drives that answer although the user has marked their joint as absent. The status has no error bit for this
+/// (J-53).
 fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     for joint in joints {
         let state = s.joints[joint.index()].state;
@@ -182,7 +183,7 @@ fn absent(s: &Status, joints: &[Joint], all: &mut Findings) {
     }
 }
 
-/// Finds a held stop with its cause, and joints whose encoder has jumped.
+/// Finds a held stop and its cause, and joints whose encoder has jumped.
 fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactions>, all: &mut Findings) {
     if let Some((cause, ago_ms)) = cause {
         all.add(
@@ -192,7 +193,7 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
             held_stop::next_step(s, Some(cause)),
         );
     }
-    // The finding of the cause already names its joint.
+    // The finding about the cause already contains this joint.
     let said = cause.filter(|(cause, _)| cause.kind == StopKind::EncoderJump);
     let said = said.and_then(|(cause, _)| held_stop::joint(cause));
     let jumped = held_stop::joints(reactions.map_or(0, |reactions| reactions.jumped));
@@ -206,14 +207,14 @@ fn held(s: &Status, cause: Option<(&StopCause, u32)>, reactions: Option<&Reactio
     }
 }
 
-/// Returns the cause of the present held stop, and its age, ms.
+/// Returns the cause of the present held stop, and its age in ms.
 fn cause<'a>(s: &Status, reactions: Option<&'a Reactions>) -> Option<(&'a StopCause, u32)> {
     let (cause, ago_ms) = reactions?.stop.as_ref()?;
     s.is_held_stop().then_some((cause, *ago_ms))
 }
 
-/// Finds errors in the status. `told`: the cause of a held stop already has its own finding, which says more than the errors of
-/// the joints.
+/// Finds errors in the status. If `told` is `true`, the cause of a held stop already has its own finding, which is more
+/// precise than the errors of the joints.
 fn errors(s: &Status, told: bool, all: &mut Findings) {
     use Severity::{Problem, Warning};
     if s.errors & error::EMERGENCY_INPUT != 0 {

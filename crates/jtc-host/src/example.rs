@@ -43,7 +43,7 @@ pub struct Example {
     pub file: &'static str,
     /// Description of the example.
     pub what: &'static str,
-    /// The command that uses it, with `{}` for the file.
+    /// Command that uses the example, with `{}` for the file.
     pub next: &'static str,
     text: fn() -> String,
 }
@@ -127,7 +127,7 @@ pub const EXAMPLES: [Example; 9] = [
     },
 ];
 
-/// Returns the point of `sin⁴` over the duration: velocity and acceleration are 0 at both ends.
+/// Returns the point at `t` of a `sin⁴` curve over the duration. Velocity and acceleration are 0 at both ends.
 fn point(t: f64) -> Point {
     // sin⁴x = (3 − 4 cos 2x + cos 4x) / 8
     let (x, w) = (PI * t / DURATION_S, PI / DURATION_S);
@@ -147,7 +147,7 @@ fn motion() -> Trajectory {
     Trajectory { step_ms: STEP_MS, points }
 }
 
-/// Returns the waypoints of the example motion, for files with rounded numbers.
+/// Returns the waypoints of the example motion. The files contain them with rounded numbers.
 fn waypoints() -> impl Iterator<Item = (f64, [f64; JOINTS])> {
     WAYPOINTS_S.into_iter().map(|t| (t, point(t).position))
 }
@@ -196,7 +196,7 @@ mod tests {
     use crate::waypoints::WaypointFile;
     use jtc_core::Config;
 
-    /// Each trajectory can run on the built-in arm from the start pose of `jtc sim`.
+    /// Each trajectory passes the check for the built-in arm from the start pose of `jtc sim`.
     #[test]
     fn the_trajectories_pass_the_check_from_the_zero_pose() {
         let arm = Arm::avena();

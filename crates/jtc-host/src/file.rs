@@ -1,4 +1,4 @@
-//! Reading of files with numbers. Errors always name file, line, column and value.
+//! Reading of files with numbers. Each error contains file, line, column and value.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
 /// Largest file that is read.
 pub const FILE_MAX: u64 = 64 << 20;
-/// Reason why the numbers of a file that names its units are not read as degrees.
+/// Reason why `--deg` is not allowed for a file that states its units.
 pub(crate) const UNITS_KNOWN: &str =
     "the units of this file are known: its numbers are not taken as degrees; leave --deg out";
 
@@ -30,7 +30,7 @@ pub enum FileError {
         /// Size of the file, bytes.
         bytes: u64,
     },
-    /// A place in the text is wrong.
+    /// The text has an error at one place.
     #[error("{}{place}: {problem}", path.display())]
     At {
         /// The file.
@@ -40,7 +40,7 @@ pub enum FileError {
         /// Problem at this place, with the value.
         problem: String,
     },
-    /// The robot description has more than six joints, and the caller must select the six of the arm.
+    /// The robot description has more than six joints, so the caller must select the six joints of the arm.
     #[error("{}: {problem}", path.display())]
     Joints {
         /// The file.
@@ -50,7 +50,7 @@ pub enum FileError {
         /// Six joints that could be the arm, separated by commas.
         six: String,
     },
-    /// The joints or the flange that the caller named do not form an arm in the robot description.
+    /// The joints or the flange that the caller selected do not form an arm.
     #[error("{}{place}: {problem}", path.display())]
     Choice {
         /// The file.
@@ -60,7 +60,7 @@ pub enum FileError {
         /// Problem of the selection.
         problem: String,
     },
-    /// A robot description without six rotary joints in a chain: with no option can this controller use it.
+    /// The robot description has no chain of six rotary joints. No option makes it usable for this controller.
     #[error("{}: {problem}", path.display())]
     FewJoints {
         /// The file.
@@ -189,7 +189,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
     String::from_utf8(bytes).map_err(|_| FileError::form("no text (its bytes are no UTF-8)").in_file(path))
 }
 
-/// Parses a number as these files write it (`20.`, `-9.e-6`, ` 1`); never returns NaN or infinity.
+/// Parses a number in the notations of these files (`20.`, `-9.e-6`, ` 1`). Never returns NaN or infinity.
 pub(crate) fn number(text: &str, place: impl Fn() -> Place) -> Result<f64, FileError> {
     match text.trim().parse::<f64>() {
         Ok(v) if v.is_finite() => Ok(v),
@@ -225,7 +225,7 @@ pub(crate) fn rows(text: &str) -> impl Iterator<Item = (usize, Vec<&str>)> {
 }
 
 fn cells(line: &str) -> Vec<&str> {
-    // If semicolons separate the cells, a comma belongs to a number, and is an error.
+    // If semicolons separate the cells, a comma is part of a number, and the number is then invalid.
     match [';', ','].into_iter().find(|c| line.contains(*c)) {
         Some(c) => line.split(c).map(str::trim).collect(),
         None => line.split_whitespace().collect(),

@@ -1,4 +1,4 @@
-//! Frames from the host to the controller, each in its own buffer; `jtc-wire` defines their layout.
+//! Frames from the host to the controller, each in its own buffer. `jtc-wire` defines their layout.
 
 use jtc_core::{Friction, JOINTS, PidGains};
 use jtc_dynamics::{ArmModel, Origin};

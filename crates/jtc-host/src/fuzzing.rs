@@ -1,4 +1,5 @@
-//! Bodies of the fuzz targets: every file reader with any bytes. A panic or a failed check is a finding.
+//! Bodies of the fuzz targets. Each passes arbitrary bytes to the readers of one file type. A panic or a failed check is a
+//! finding.
 
 use jtc_core::recorder::{Log, sealed_block};
 
@@ -13,13 +14,15 @@ fn text(data: &[u8]) -> Option<&str> {
     std::str::from_utf8(data).ok()
 }
 
-/// Checks a trajectory that was read: its values are finite, it has a step time, and our own formats read it back without a change.
+/// Checks a trajectory that was read: its values are finite, it has a step time, and the CSV and JSON writers keep it
+/// unchanged.
 fn sound(read: Result<Loaded, FileError>) {
     let Ok(loaded) = read else { return };
     let t = &loaded.trajectory;
     assert!(t.step_ms > 0 && !t.points.is_empty());
     let finite = |v: &[f64; 6]| v.iter().all(|v| v.is_finite());
-    // A spline through huge numbers may overflow; such a file fails the check by its scale.
+    // A spline through huge numbers may overflow. The check then rejects the trajectory because its numbers are out of
+    // range.
     if !t.points.iter().all(|p| finite(&p.position) && finite(&p.velocity) && finite(&p.acceleration)) {
         assert!(t.raw().is_err());
         return;
@@ -32,10 +35,10 @@ fn sound(read: Result<Loaded, FileError>) {
     let _: Result<_, _> = Trajectory::raw(t);
 }
 
-/// Checks that waypoints are read and lead to positions, or that an error refuses them.
+/// Checks that waypoints are read and converted to positions, or rejected with an error.
 fn waypoints(text: &str) {
     let Ok(file) = WaypointFile::parse(text) else { return };
-    // Inverse kinematics of thousands of waypoints would take long without finding more.
+    // Inverse kinematics of thousands of waypoints takes long and finds nothing more.
     if file.waypoints.len() < 50 {
         let _ = file.positions(&Arm::avena());
     }
@@ -50,7 +53,8 @@ pub fn trajectory_csv(data: &[u8]) {
     waypoints(text);
 }
 
-/// Reads a file of 19 columns without a header. Also uses `data` as numbers of such a file, whole or with decimals.
+/// Reads a file of 19 columns without a header. Then builds such a file from `data`, with integers or with decimals, and
+/// reads it.
 pub fn trajectory_table(data: &[u8]) {
     if let Some(text) = text(data) {
         sound(Loaded::parse(text, None));
@@ -85,7 +89,8 @@ pub fn trajectory_yaml(data: &[u8]) {
     sound(Loaded::parse(&format!("{text}\njoint_names: [a1, a2, a3, a4, a5, a6]\n"), None));
 }
 
-/// Checks an arm that was read: its model is physical, and the frames of its numbers are valid, or an error names the reason.
+/// Checks an arm that was read: its model is physical and its parameters fit into their frames, or an error gives the
+/// reason.
 fn sound_arm(read: Result<Arm, FileError>) {
     let Ok(arm) = read else { return };
     assert!(arm.model.check().is_ok());
@@ -134,7 +139,7 @@ pub fn flight_log(data: &[u8]) {
         .chunks(4)
         .map(|bytes| bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte)))
         .collect();
-    // The snapshot begins at one bit; the number of blocks depends on the data.
+    // The first two bytes select the bit at which the snapshot begins. The amount of data sets the number of blocks.
     let snapshot = u16::from_be_bytes([head[0], head[1]]);
     let blocks: Vec<_> = words
         .chunks(251)

@@ -1,4 +1,4 @@
-//! Held stop (J-69) as every front end shows it: cause, values and remedy.
+//! Held stop (J-69) in the form that every front end shows: cause, values and remedy.
 
 use host_kit::{Next, next};
 use jtc_wire::{ControllerState, Info, Joint, Reactions, Status, StopCause, StopKind};
@@ -21,7 +21,7 @@ pub fn after_encoder_jump() -> Next {
 /// Last held stop of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HeldStop {
-    /// Kind of the cause: its name with hyphens.
+    /// Name of the kind of cause, with hyphens.
     pub kind: String,
     /// Number of the kind on the wire.
     pub number: u8,
@@ -75,7 +75,7 @@ impl HeldStop {
 /// Reactions of a controller to faults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Reacting {
-    /// Last held stop; `None`: no held stop since the start, or since the occurred errors were cleared.
+    /// Last held stop; `None` if there was none since the start or since the occurred errors were cleared.
     pub last_held_stop: Option<HeldStop>,
     /// Joints, from 1, that yield or lower their loads.
     pub yields: Vec<u8>,
@@ -83,7 +83,7 @@ pub struct Reacting {
     pub encoder_jumped: Vec<u8>,
     /// Rate of path time, path seconds per second; 0 if no trajectory is executed.
     pub path_rate: f32,
-    /// Time for which this run has been held back because a torque was at its limit, s.
+    /// Total time for which this run has been slowed down because a torque was at its limit, s.
     pub held_back_s: f64,
 }
 

@@ -1,4 +1,5 @@
-//! A sample of a run, as recordings and reports store it, from the controller itself or from a status.
+//! Sample of a run, in the form that recordings and reports store. It is made from the controller's telemetry or from a
+//! status.
 
 use jtc_core::{JOINTS, JointTelemetry, Telemetry};
 use jtc_wire::{Code, ControllerState, NodeState, Status, TrajectoryState};
@@ -17,7 +18,7 @@ pub struct JointSample {
     pub set_acceleration: f64,
     /// Measured position, rad.
     pub position: f64,
-    /// Position error, rad: the position commanded for the time of the measurement minus the measured one (J-62).
+    /// Position error, rad: the position commanded for the time of the measurement, minus the measured position (J-62).
     pub error: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
@@ -31,7 +32,7 @@ pub struct JointSample {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque commanded on the bus (over a real link: the torque that the drive reports), N·m.
+    /// Torque commanded on the bus, N·m. Over a real link it is the torque that the drive reports.
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: f64,
@@ -61,14 +62,15 @@ impl JointSample {
         internal: 0,
     };
 
-    /// Returns the sample without the values that a silent joint cannot have sent: a gap, not a joint at 0 rad.
+    /// Returns the sample without the values that a silent joint cannot have sent. A plot then shows a gap instead of a
+    /// joint at 0 rad.
     fn not_measured(self) -> Self {
         let nan = f64::NAN;
         Self { position: nan, error: nan, velocity: nan, torque: nan, temperature: nan, ..self }
     }
 
-    /// Returns the position error, rad: the recorded one, else the commanded minus the measured position of this
-    /// sample; NaN if a value is unknown.
+    /// Returns the position error, rad: the recorded error, or, if it is unknown, the commanded minus the measured position
+    /// of this sample. NaN if a value is unknown.
     pub fn position_error(&self) -> f64 {
         if self.error.is_finite() { self.error } else { self.set_position - self.position }
     }
@@ -145,8 +147,8 @@ impl From<&Telemetry> for Sample {
     }
 }
 
-/// Returns `true` if the values of joint `j` (from 0) in a status are measured. The controller reports zero for an
-/// unknown joint: silent or not ready.
+/// Returns `true` if the values of joint `j` (from 0) in a status are measured. For a joint that is silent or not ready,
+/// the controller reports zeros.
 pub fn is_measured(status: &Status, j: usize) -> bool {
     let unknown = words::is_silent(status, j) || words::is_awaited(status, j);
     !unknown || status.joints.get(j).is_some_and(|s| s.position != 0.0 || s.velocity != 0.0)
@@ -178,15 +180,14 @@ impl Sample {
         }
     }
 
-    /// Returns `true` if the controller moves the arm along the trajectory (state Operate, trajectory Execute). Unlike
-    /// [`jtc_wire::Status::is_executing`], which checks the trajectory alone.
+    /// Returns `true` if the controller moves the arm along the trajectory (state Operate, trajectory Execute).
+    /// [`jtc_wire::Status::is_executing`] checks only the trajectory state.
     pub fn is_operating(&self) -> bool {
         self.state == ControllerState::Operate && self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the values of a status while `trajectory` is executed. The commanded values are those that the
-    /// controller computes for the reported point. The error is the one of measurements that are `delay_ticks` old
-    /// (J-62).
+    /// Returns the values of a status while `trajectory` is executed. The commanded values are computed for the reported
+    /// point, like the controller does. For the error the measurements are taken to be `delay_ticks` old (J-62).
     pub fn following(time_s: f64, status: &Status, trajectory: &Trajectory, delay_ticks: u8) -> Self {
         let mut sample = Self::from_status(time_s, status);
         if status.state == ControllerState::Operate
@@ -225,7 +226,8 @@ mod tests {
         assert!(Sample::from_status(0.0, &status).joints[2].position > 0.29);
     }
 
-    /// A measurement is compared with the position commanded at its time; if that is unknown, with the current one.
+    /// A measurement is compared with the position that was commanded for its time. If that position is unknown, the
+    /// current one is used.
     #[test]
     fn j62_the_error_of_a_sample_is_that_of_the_time_of_the_measurement() {
         let now = JointTelemetry {

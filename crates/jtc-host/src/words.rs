@@ -118,12 +118,13 @@ pub fn has_torque(s: &Status) -> bool {
     s.state.is_in(&[ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching])
 }
 
-/// Returns `true` if joint `j` (from 0) is set absent: under torque no other joint is in Start (J-20, J-53).
+/// Returns `true` if joint `j` (from 0) is marked as absent. While torque is on, only such a joint is in Start (J-20,
+/// J-53).
 pub fn is_absent(s: &Status, j: usize) -> bool {
     has_torque(s) && s.joints.get(j).is_some_and(|joint| joint.state == NodeState::START)
 }
 
-/// Returns the joints that are set absent, if torque is on.
+/// Returns the joints that are marked as absent, if torque is on.
 pub fn absent(s: &Status) -> Vec<Joint> {
     Joint::ALL.into_iter().filter(|joint| is_absent(s, joint.index())).collect()
 }
@@ -133,13 +134,13 @@ pub fn joints(joints: &[Joint]) -> String {
     joints.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns `true` if every joint except absent ones has its drive enabled.
+/// Returns `true` if the drives of all joints that are not absent are enabled.
 pub fn is_held(s: &Status) -> bool {
     let enabled = |joint: &Joint| s.joints[joint.index()].state == NodeState::ENABLED;
     Joint::ALL.iter().all(|joint| enabled(joint) || is_absent(s, joint.index()))
 }
 
-/// Returns the fastest joint and its velocity, rad/s, if the joint is faster than an arm at rest.
+/// Returns the fastest joint and its velocity (rad/s) if it moves faster than the limit for an arm at rest.
 pub fn moving_joint(s: &Status) -> Option<(Joint, f64)> {
     let fastest = Joint::ALL.into_iter().map(|joint| (joint, f64::from(s.joints[joint.index()].velocity)));
     fastest.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).filter(|(_, speed)| !AT_REST_RAD_S.contains(speed))
@@ -155,7 +156,7 @@ pub fn missing_parameters(jtc_init: u8) -> Vec<&'static str> {
     list(u32::from(jtc_init), &jtc_wire::words::JTC_INIT)
 }
 
-/// Returns the nodes of a mask with a bit for each, node 0 first.
+/// Returns the nodes of a mask with one bit for each node, node 0 first.
 pub fn nodes_in(mask: u8) -> impl Iterator<Item = usize> {
     (0..NODES).filter(move |n| mask >> n & 1 == 1)
 }
@@ -165,13 +166,14 @@ pub fn node_names(mask: u8) -> Vec<String> {
     nodes_in(mask).map(node).collect()
 }
 
-/// Returns all current errors of a status, the most specific ones first: nodes that do not answer, the safety input,
-/// errors of each joint and the gripper. The controller's other error bits follow from these.
+/// Returns all current errors of a status, the most specific first: nodes that do not answer, the safety input, errors of
+/// each joint and the gripper. The other error bits of the controller are consequences of these.
 pub fn causes(s: &Status) -> Vec<String> {
     let mut all = can_flags(s.can_current);
     all.extend(errors(s.errors & error::EMERGENCY_INPUT).into_iter().map(String::from));
     for (number, joint) in Joint::ALL.into_iter().zip(&s.joints) {
-        // The drive switches its torque off. An unconfigured drive also sets this bit; ignore it until the drive is configured.
+        // An active safety line switches the torque of a drive off. An unconfigured drive also sets this bit, so it is
+        // ignored until then.
         let line_active = joint.warnings & warning::SAFETY_LINE != 0 && !is_awaited(s, number.index());
         let words = joint_errors(joint.internal)
             .into_iter()
@@ -184,7 +186,7 @@ pub fn causes(s: &Status) -> Vec<String> {
     if let Some(g) = s.gripper {
         all.extend(node_errors(g.errors).into_iter().map(|w| format!("gripper: {w}")));
     }
-    // In a held stop the bit adds no information to the errors of the joints.
+    // In a held stop this bit says no more than the errors of the joints.
     let own = if s.is_held_stop() { 0 } else { s.errors & !error::EMERGENCY_INPUT };
     all.extend(errors(own).into_iter().map(String::from));
     all
@@ -195,7 +197,7 @@ pub fn held_stop(s: &Status) -> String {
     causes(s).join(", ")
 }
 
-/// Returns the reason why the arm is held: the cause that the device found, else the causes in its status.
+/// Returns the reason why the arm is held: the cause that the device found, or, without it, the errors in the status.
 pub fn why_held(s: &Status, cause: Option<&StopCause>) -> String {
     cause.map_or_else(|| held_stop(s), ToString::to_string)
 }
@@ -246,7 +248,7 @@ pub fn waiting_for(s: &Status) -> String {
     if missing.is_empty() { head } else { format!("{head}; {}", missing.join(", ")) }
 }
 
-/// Returns the next step after a held stop whose cause needs this act.
+/// Returns the next step after a held stop, beginning with the action `cause` that removes its cause.
 pub(crate) fn after_removing(cause: &str) -> Next {
     let then =
         next!(", wait until the arm stands, then {}: it is held, and nothing is executed until then", Clear);
@@ -289,7 +291,7 @@ pub fn next_step(s: &Status) -> Next {
 mod tests {
     use super::*;
 
-    /// The cause precedes its consequences, and the safety line of an unconfigured drive does not count as active.
+    /// The cause is listed before its consequences, and the safety line of an unconfigured drive is ignored.
     #[test]
     fn the_most_particular_cause_stands_first() {
         let mut s = Status {

@@ -25,7 +25,7 @@ pub enum ExtensionError {
     Incomplete {
         /// Name of the arm.
         arm: String,
-        /// Parts that a controller needs and the file does not give.
+        /// Parts that a controller needs and that are missing in the file.
         missing: Vec<&'static str>,
     },
     /// The device has another arm than the file gives (J-55).
@@ -36,7 +36,7 @@ pub enum ExtensionError {
         /// Every value that differs.
         differences: Vec<Difference>,
     },
-    /// Storing needs an arm without torque, because it changes the parameters that hold the arm.
+    /// An arm can be stored only while the torque is off, because storing changes the parameters that hold the arm.
     #[error("the arm cannot be stored in {state}; nothing was sent")]
     Powered {
         /// State of the device.
@@ -58,7 +58,7 @@ pub enum ExtensionError {
     TooHeavy {
         /// Mass of the payload, kg.
         mass: f64,
-        /// Joint that lacks the most torque.
+        /// Joint whose torque exceeds its limit the most.
         joint: Joint,
         /// Torque to hold the payload, N·m.
         torque: f64,
@@ -83,7 +83,7 @@ pub enum ExtensionError {
     },
 }
 
-/// Formats the first difference and the number of the others.
+/// Formats the first difference and the number of further differences.
 fn listed(differences: &[Difference]) -> String {
     match differences {
         [] => "it reports no difference".into(),

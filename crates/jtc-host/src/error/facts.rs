@@ -16,12 +16,12 @@ fn cause(words: &str) -> Option<&'static str> {
     explain::find(words).first().map(|page| page.cause)
 }
 
-/// Returns the facts of a value of a joint beyond its limit, with the usual cause for its kind of problem.
+/// Returns the facts of a joint value that exceeds its limit, with the usual cause of this kind of problem.
 fn problem(joint: Joint, value: f64, limit: f64, kind: ProblemKind) -> Facts {
     Facts { cause: cause(kind.words()), ..Facts::beyond(value, limit).at_joint(joint.number()) }
 }
 
-/// Returns facts that name only a joint.
+/// Returns facts that contain only a joint.
 pub(super) fn of_joint(joint: Joint) -> Facts {
     Facts::default().at_joint(joint.number())
 }
@@ -83,7 +83,8 @@ pub(crate) fn of_pose(error: &PoseError) -> Facts {
     }
 }
 
-/// Returns the facts of a held stop (J-69): the cause that the controller reports, else the facts in its status.
+/// Returns the facts of a held stop (J-69): the cause that the controller reports, or, without a report, the errors in its
+/// status.
 pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts {
     let Some(cause) = cause else { return of_status(status) };
     let stop = HeldStop::new(cause, 0);
@@ -97,7 +98,7 @@ pub(super) fn of_held_stop(status: &Status, cause: Option<&StopCause>) -> Facts 
     }
 }
 
-/// Returns the facts of a setting that is refused.
+/// Returns the facts of a rejected setting.
 pub(super) fn of_setting(error: &SettingError) -> Facts {
     match *error {
         SettingError::Unknown { joint, .. } => {
@@ -159,8 +160,8 @@ mod tests {
         assert!(facts.cause.is_some_and(|cause| !cause.is_empty()));
     }
 
-    /// A position outside the limits, a position with too much torque, and a path from outside the limits: a refused plan has the
-    /// same facts as a refused check.
+    /// A rejected plan has the same facts as a rejected check. Covers a position outside the limits, a position that needs
+    /// too much torque, and a path that starts outside the limits.
     #[test]
     fn what_planning_refuses_has_joint_value_limit_and_cause() {
         let arm = Arm::avena();

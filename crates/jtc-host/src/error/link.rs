@@ -175,7 +175,7 @@ impl LinkError {
     }
 }
 
-/// Returns advice for a refused execute, pause or stop that has its own reason.
+/// Returns special advice for some refused Execute, Pause and Stop commands; `None` if the general advice applies.
 fn after_refused_execution(
     code: DataStatus,
     state: Code<ControllerState>,
@@ -198,7 +198,7 @@ fn after_refused_execution(
             TrajCheck
         ));
     }
-    // In these states execute is refused for another reason, and resume is not sent.
+    // In these states the controller refuses Execute with another code, and the session does not send Resume.
     let idle = state == ControllerState::HoldPos && trajectory.is_in(&[Null, Stop, Finish]);
     (idle && code == DataStatus::NotAllowed).then(|| {
         next!(
@@ -209,13 +209,13 @@ fn after_refused_execution(
     })
 }
 
-/// Returns `true` if the code means that the arm is in the wrong position. Without extended codes on the line, code 6 stands for
-/// 7 and 8 (J-51).
+/// Returns `true` if the code means that the arm is in the wrong position. Without extended codes on the line, the
+/// controller sends code 6 instead of 7 and 8 (J-51).
 fn is_place(code: DataStatus) -> bool {
     matches!(code, DataStatus::StartPositionMismatch | DataStatus::IncorrectValue)
 }
 
-/// Returns advice after a refusal with this code in this state.
+/// Returns advice for a refusal with this code in this state.
 pub(super) fn after_refusal(code: DataStatus, state: Code<ControllerState>) -> Next {
     match (code, state.known()) {
         (DataStatus::NotAllowed, Some(ControllerState::Start | ControllerState::Init)) => {

@@ -1,5 +1,5 @@
-//! Errors of this library, with the facts, the kind of failure and the command that helps: one enum for each operation, and one
-//! type for all errors.
+//! Errors of this library, each with its facts, the kind of failure and the next command. Each operation has its own error
+//! enum, and [`Error`] covers all of them.
 
 mod check;
 mod extension;
@@ -55,7 +55,7 @@ pub enum Error {
     /// A file cannot be read or understood.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A number or a count that no frame carries.
+    /// A number or a count does not fit into its frame.
     #[error(transparent)]
     Frame(#[from] jtc_wire::EncodeError),
     /// The caller's callback cancelled the operation.

@@ -65,8 +65,8 @@ pub enum MotionError {
     },
 }
 
-/// Returns the cause of the held stop in one line; if the status no longer shows it, the errors that have occurred since the
-/// start.
+/// Returns the cause of the held stop in one line. If the status no longer shows it, returns the errors that have occurred
+/// since the start.
 fn why_held(before: &[u16; 6], status: &Status, cause: Option<&StopCause>) -> String {
     if status.is_held_stop() || cause.is_some() {
         words::why_held(status, cause)
@@ -115,7 +115,8 @@ fn where_the_arm_is(last: Option<&Status>, stop_sent: bool) -> String {
     }
 }
 
-/// Returns the reason why nothing is paused. Right after a pause the trajectory state is Execute until the arm stands.
+/// Returns the reason why no motion is paused. Right after a Pause request the trajectory state stays Execute until the arm
+/// is at rest.
 fn not_paused(trajectory: Code<TrajectoryState>) -> &'static str {
     if trajectory == TrajectoryState::Execute {
         "nothing is paused yet: the motion is still slowing down after a pause, or nobody paused it"
@@ -191,7 +192,8 @@ impl Diagnose for MotionError {
 mod tests {
     use super::*;
 
-    /// J-34: right after a pause, resume finds the state Execute until the arm stands.
+    /// J-34: after a Pause request the trajectory state stays Execute until the arm is at rest. A Resume in this time has
+    /// its own message.
     #[test]
     fn a_resume_too_early_is_told_from_one_without_a_pause() {
         let early = MotionError::NotPaused {

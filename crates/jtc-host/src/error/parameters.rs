@@ -31,7 +31,7 @@ pub enum ParametersError {
         /// Next step for the operator.
         next: Next,
     },
-    /// The controller needs parameters, but no source was named.
+    /// The controller needs parameters, but the caller gave no source for them.
     #[error("the controller has not been given: {}; nothing was sent", missing.join(", "))]
     NoSource {
         /// Missing parameters.

@@ -34,14 +34,14 @@ pub enum StateError {
         /// The last status.
         status: Box<Status>,
     },
-    /// The arm is not held, and the controller is not on the way to that state.
+    /// The controller is not in HoldPos, and it is not starting up to that state.
     #[error("{}", words::waiting_for(status))]
     NotReady {
         /// Status at that time.
         status: Box<Status>,
     },
-    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the speed has another scale. No trajectory is
-    /// executed until the drives have been configured again.
+    /// The two encoders of a joint disagree (J-35): one encoder has jumped, or the drive's speed has another scale. The
+    /// controller executes no trajectory until the drives have been configured again.
     #[error(
         "{}: the position is not to be trusted, because the encoder has jumped or its speed does not fit; no trajectory is executed until its drive was reset",
         words::joints(joints)
@@ -53,7 +53,7 @@ pub enum StateError {
     /// The arm moves, but a pose must be saved at rest.
     #[error("{what}, and a pose is where the arm stands; nothing was saved")]
     Moving {
-        /// Part that moves.
+        /// Description of the moving part.
         what: String,
     },
     /// The position of a joint is unknown.
@@ -62,25 +62,25 @@ pub enum StateError {
         /// Joint with the unknown position.
         joint: Joint,
     },
-    /// The arm moves, and would fall without the torque of these nodes.
+    /// The arm is moving and would fall if these nodes lost their torque.
     #[error("{nodes} cannot be reset in {state}: the arm would fall")]
     WouldFall {
-        /// Nodes in words.
+        /// Names of the nodes.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The arm has torque, and a reset of these nodes can remove the torque.
+    /// The arm has torque, and a reset of these nodes can remove it.
     #[error(
         "the arm has torque ({state}), and a reset of {nodes} can take it away: the arm may fall; nothing was sent"
     )]
     MayFall {
-        /// Nodes in words.
+        /// Names of the nodes.
         nodes: String,
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// Joints are set absent, so the controller executes no motion.
+    /// The user has marked joints as absent, so the controller executes no motion.
     #[error("{}: set absent; no motion is executed, and nothing was sent", words::joints(joints))]
     Absent {
         /// Absent joints.

@@ -1,4 +1,4 @@
-//! Summary of problems by cause: joints, number of points, first place and worst place.
+//! Summary of the problems of one cause: joints, number of points, first place and worst place.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -16,11 +16,11 @@ pub struct Cause {
     pub kind: ProblemKind,
     /// Kind in words.
     pub words: &'static str,
-    /// Unit of values and limits; empty for numbers.
+    /// Unit of values and limits. Empty for counts.
     pub unit: &'static str,
     /// Joints with this problem; empty if the problem concerns the whole trajectory.
     pub joints: Vec<Joint>,
-    /// Number of points in the file at which the problem occurs, or after which it occurs before the next point.
+    /// Number of points in the file with the problem at the point or between it and the next point.
     pub points: usize,
     /// First place along the path.
     pub first: Seen,
@@ -71,7 +71,7 @@ pub(super) fn causes(problems: &[Problem], places: &Places) -> Vec<Cause> {
 }
 
 impl fmt::Display for Cause {
-    /// Writes one line for a single place, else three lines.
+    /// Writes one line if the cause has a single place, otherwise three lines.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.warning {
             f.write_str("warning: ")?;
@@ -84,7 +84,7 @@ impl fmt::Display for Cause {
         if self.points > 1 {
             write!(f, ", at {} points", self.points)?;
         }
-        // The line above already contains the words.
+        // Omits the words that the line above already contains.
         let short = |words: &str| words.replacen(&format!("{}: ", self.words), "", 1);
         write!(f, "\n    worst: {}", short(&worst))?;
         if self.first != self.worst {

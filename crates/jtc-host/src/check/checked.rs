@@ -1,4 +1,4 @@
-//! Trajectory that passed the check; a session uploads and executes no other kind.
+//! Trajectory that passed the check. A session uploads and executes only this type.
 
 use std::fmt;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use crate::error::CheckError;
 use crate::plan::{PlanError, Planner};
 use crate::trajectory::{Trajectory, UploadOptions};
 
-/// Number of the next check that passes, so that two trajectories are never confused.
+/// Number for the next check that passes. It distinguishes trajectories that are otherwise equal.
 static PASSED: AtomicU64 = AtomicU64::new(1);
 
 /// Options for the check of a trajectory before a run.
@@ -21,18 +21,19 @@ static PASSED: AtomicU64 = AtomicU64::new(1);
 pub struct CheckOptions {
     /// Division into segments for the upload; the check includes the number of segments.
     pub upload: UploadOptions,
-    /// `true` if the values that no frame carries (limits, gravity, rotor inertia) may differ between arm file and controller,
-    /// and the controller's values are safe for this arm. If `false`, such an arm is refused (J-55).
+    /// `true` if the settings that cannot be sent in a frame (limits, gravity, rotor inertia) may differ between arm file
+    /// and controller. The caller thereby confirms that the controller's values are safe for this arm. If `false`, the
+    /// check refuses such an arm (J-55).
     pub accept_device_limits: bool,
-    /// Settings of the controller. The default is the built-in settings; for a controller with extensions use the result of
+    /// Settings of the controller. The default is the built-in settings. For a controller with extensions use the result of
     /// [`Session::device_config`](crate::Session::device_config).
     pub device: Config,
 }
 
-/// Trajectory that may run: it passed the check against an arm, from the pose of the arm at that time.
+/// Trajectory that may run: it passed the check for an arm, starting at the pose that the arm had at that time.
 ///
-/// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) accept only this type, and only
-/// [`CheckedTrajectory::check`] creates it. So a program that runs an unchecked trajectory does not compile:
+/// [`Session::upload`](crate::Session::upload) and [`Session::execute`](crate::Session::execute) accept only this type, and
+/// only [`CheckedTrajectory::check`] creates it. So a program that runs an unchecked trajectory does not compile:
 ///
 /// ```compile_fail,E0308
 /// fn run<P: jtc_host::Port>(session: &mut jtc_host::Session<P>, trajectory: &jtc_host::Trajectory) {
@@ -40,7 +41,7 @@ pub struct CheckOptions {
 /// }
 /// ```
 ///
-/// A program cannot build one from its parts, or change one after the check:
+/// A program cannot build a `CheckedTrajectory` from parts, or change one after the check:
 ///
 /// ```compile_fail,E0616
 /// fn faster(checked: &mut jtc_host::CheckedTrajectory) {
@@ -51,12 +52,13 @@ pub struct CheckOptions {
 /// # Start pose
 ///
 /// The check compares the first point with the given pose: no joint may deviate by more than the start tolerance, 0.02 rad
-/// (J-34). Pass a pose that was measured just before, from the status that [`Session::wait_ready`](crate::Session::wait_ready)
-/// returns. If the arm is in another pose, [`Planner::to`](crate::plan::Planner::to) plans a trajectory to the first point, which
-/// is checked in the same way. Then check the motion from the final pose of that approach.
+/// (J-34). Pass a pose that was measured just before, from the status that
+/// [`Session::wait_ready`](crate::Session::wait_ready) returns. If the arm is in another pose,
+/// [`Planner::to`](crate::plan::Planner::to) plans a trajectory to the first point. Check and run this approach in the same
+/// way. Then check the motion from the final pose of the approach.
 ///
-/// The controller repeats the comparison at the moment of execution. If the arm was moved after the check, execution is refused
-/// with data status 8 and the arm does not move.
+/// The controller compares again when it executes the trajectory. If the arm was moved after the check, the controller
+/// refuses the execution with data status 8, and the arm does not move.
 #[derive(Clone)]
 pub struct CheckedTrajectory {
     trajectory: Arc<Trajectory>,
@@ -65,12 +67,12 @@ pub struct CheckedTrajectory {
     verdict: Verdict,
     delay_ticks: u8,
     number: u64,
-    /// Arm and settings that the check used.
+    /// Arm and settings with which the trajectory was checked.
     basis: Arc<(Arm, Config)>,
 }
 
 impl fmt::Debug for CheckedTrajectory {
-    /// Writes a summary without the points (up to 12 000).
+    /// Writes a summary without the up to 12 000 points.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Verdict { points, step_ms, duration_s, .. } = self.verdict;
         write!(
@@ -84,22 +86,23 @@ impl fmt::Debug for CheckedTrajectory {
 impl CheckedTrajectory {
     /// Checks `trajectory` for a run by `arm` from the measured pose `start` (rad, base to wrist).
     ///
-    /// The limits are the tighter ones of the arm and the controller ([`Arm::config_on_device`]). The torques come from the arm
-    /// model, with the arm's friction and with the gravity and rotor inertia of the controller.
+    /// Of the limits of arm and controller the tighter one is used ([`Arm::config_on_device`]). The torques come from the
+    /// arm model with the arm's friction, and with the gravity and rotor inertia of the controller.
     ///
     /// # Errors
     ///
-    /// [`CheckError::DeviceLimits`] if the controller has other values than the arm, and the options do not accept that.
-    /// [`CheckError::Refused`] with the verdict if the trajectory may not run: a limit is exceeded at or between points, a jump,
-    /// motion at its ends, too much torque, no way to stop in time, too many points or segments, or an arm that is not at the
-    /// first point. [`CheckError::Arm`] if the numbers of the arm are not physical. In each case no frame was sent.
+    /// [`CheckError::DeviceLimits`] if the controller and the arm have different values, and the options do not accept
+    /// that. [`CheckError::Refused`] with the verdict if the trajectory may not run. Reasons are: a limit is exceeded at or
+    /// between points, a jump, motion at an end, too much torque, a stop that would take too long, too many points or
+    /// segments, or an arm that is not at the first point. [`CheckError::Arm`] if the numbers of the arm are not physical.
+    /// In each case no frame was sent.
     pub fn check(
         trajectory: &Trajectory,
         arm: &Arm,
         start: &[f64; JOINTS],
         options: &CheckOptions,
     ) -> Result<Self, CheckError> {
-        // The fields of an arm are public: with numbers that are not physical, any torque could pass.
+        // The fields of an arm are public. Numbers that are not physical could make any torque pass.
         arm.is_physical()?;
         let differences = arm.device_differences(&options.device);
         if !differences.is_empty() && !options.accept_device_limits {
@@ -124,20 +127,20 @@ impl CheckedTrajectory {
                 number: PASSED.fetch_add(1, Ordering::Relaxed),
                 basis: Arc::new((arm.clone(), config)),
             }),
-            // The verdict already contains a problem for a number that no frame carries.
+            // The verdict already contains a problem for each number that does not fit into a frame.
             _ => Err(CheckError::Refused(Box::new(verdict))),
         }
     }
 
-    /// Checks the remainder of the path from `from_ms` on, starting at rest. If neither the settings of the controller nor the
-    /// payload have changed since the check, there is nothing to do (J-36, J-60).
+    /// Checks the remainder of the path from `from_ms` on, starting at rest. Does nothing if the settings of the controller
+    /// and the payload are the same as in the check (J-36, J-60).
     ///
     /// # Errors
     ///
     /// [`PlanError::Refused`] with the verdict on the remainder.
     pub fn check_rest(&self, device: &Config, from_ms: u32) -> Result<(), PlanError> {
         let (arm, checked_with) = &*self.basis;
-        // A change of the path speed needs no check, because the speed can only be lower.
+        // A change of the path speed needs no check, because it can only slow the motion down.
         let config = Config { speed: checked_with.speed, ..arm.config_on_device(device) };
         if config == *checked_with {
             return Ok(());
@@ -163,12 +166,12 @@ impl CheckedTrajectory {
         &self.options
     }
 
-    /// Returns the age of the controller's measurements, ticks (J-62).
+    /// Returns the age of the controller's measurements in ticks (J-62).
     pub(crate) fn delay_ticks(&self) -> u8 {
         self.delay_ticks
     }
 
-    /// Returns the points as the wire carries them.
+    /// Returns the points in the form in which they are sent.
     pub(crate) fn raw(&self) -> &[RawPoint] {
         &self.raw
     }

@@ -1,8 +1,9 @@
-//! Check that the drives can hold the arm wherever the path stands still: at the start, at the end, and at rests between them.
+//! Check that the drives can hold the arm wherever the path stands still: at its start, at its end, and at rests on the
+//! way.
 //!
-//! An arm that is held close to a torque limit falls after some time, even without a motion. Encoder noise, multiplied by the
-//! gains, takes the commanded torque over the limit repeatedly, and more than 10 ms over the limit within 100 ms is an error
-//! (J-43). A path that only passes such a pose is not refused, although a pause could stop in that pose.
+//! An arm that is held close to a torque limit falls after some time, even without a motion. The gains amplify the encoder
+//! noise, so that the commanded torque exceeds the limit again and again. More than 10 ms over the limit within 100 ms is
+//! an error (J-43). A path may pass such a pose without a rest, although a pause could stop the arm there.
 
 use jtc_core::{Config, JOINTS, SetPoint, interpolate};
 use jtc_dynamics::Dynamics;
@@ -10,11 +11,11 @@ use jtc_wire::Joint;
 
 use super::{HOLD_SHARE, ProblemKind, Verdict};
 
-/// Joint speed up to which a joint counts as standing, rad/s. The smallest velocity on the wire is about 0.1 mrad/s.
+/// Joint speed up to which a joint is considered at rest, rad/s. The smallest velocity in a frame is about 0.1 mrad/s.
 const STANDS: f64 = 0.001;
 
-/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit at a standstill of the path. If
-/// `stands_at_start` is set, the start is left out, because the arm is held there with or without the motion.
+/// Adds a problem for every joint that needs more than [`HOLD_SHARE`] of its torque limit where the path stands still. If
+/// `stands_at_start` is set, the start is not checked, because the arm is held there even without the motion.
 pub(super) fn holds(
     config: &Config,
     dynamics: &Dynamics,

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-/// Share of a joint's torque limit that holding the arm may need, without friction; at 98 % arms have fallen.
+/// Maximum share of a joint's torque limit for holding the arm, without friction. At 98 % arms have fallen.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Declares the kinds: meaning, name, words, and the unit of the numbers if there is one.
+/// Declares the kinds: meaning, name, words, and the unit of value and limit if they have one.
 macro_rules! kinds {
     ($($(#[$meaning:meta])* $name:ident, $words:literal $(in $unit:literal)?;)+) => {
         /// Kind of a problem.
@@ -19,7 +19,7 @@ macro_rules! kinds {
             /// All kinds.
             pub const ALL: [Self; [$($words),+].len()] = [$(Self::$name),+];
 
-            /// Returns the kind in words, without the facts.
+            /// Returns the kind as text, without the facts.
             pub fn words(self) -> &'static str {
                 match self {
                     $(Self::$name => $words,)+
@@ -47,11 +47,11 @@ kinds! {
     SegmentPoints, "points per segment";
     /// The step time is 0.
     StepTime, "step time of 0 ms";
-    /// A position that no frame carries.
+    /// A position does not fit into a frame.
     PositionScale, "position outside what a frame carries" in "rad";
-    /// A velocity that no frame carries.
+    /// A velocity does not fit into a frame.
     VelocityScale, "velocity outside what a frame carries" in "rad/s";
-    /// An acceleration that no frame carries.
+    /// An acceleration does not fit into a frame.
     AccelerationScale, "acceleration outside what a frame carries" in "rad/s²";
     /// Two points are too far apart for the arm to move from one to the other in one step.
     Jump, "jump" in "rad";
@@ -61,17 +61,17 @@ kinds! {
     Velocity, "velocity over its limit" in "rad/s";
     /// Acceleration over its limit.
     Acceleration, "acceleration over its limit" in "rad/s²";
-    /// Torque by the arm model over its limit.
+    /// Torque of the arm model over its limit.
     Torque, "torque over its limit" in "N·m";
-    /// Holding the arm at a standstill of the path needs nearly all of a joint's torque, so the arm would fall later.
+    /// Where the path stands still, holding the arm needs nearly all of a joint's torque, so the arm would fall later.
     HoldTorque, "nearly all torque to stand" in "N·m";
     /// A velocity is outside the friction table (J-36).
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
     /// From this place Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).
     NoStop, "no stop in time" in "N·m";
-    /// Positions move faster than the velocity limit, independent of the velocities in the file.
+    /// The positions move faster than the velocity limit, whatever the velocities in the file are.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
-    /// Positions move at another speed than the velocities in the file; a warning if this happens at single places.
+    /// The positions move at another speed than the velocities in the file. It is a warning if this happens at few places.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";
     /// The first or last point is not at rest.
     NotAtRest, "not at rest at an end" in "rad/s";
@@ -90,7 +90,7 @@ impl ProblemKind {
         }
     }
 
-    /// Returns `true` if the problem ends the motion before an operator can stop it, or leaves no motion to stop.
+    /// Returns `true` if the problem ends the motion before an operator could stop it, or if the path cannot run at all.
     pub(super) fn stops_at_once(self) -> bool {
         use ProblemKind::*;
         !matches!(

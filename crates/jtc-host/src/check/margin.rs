@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use super::Verdict;
 
-/// Torque margin below which a check warns, % of the limit. With less margin, 10 % more mass and 20 % more friction than in the
-/// model bring an arm to the limit on its path.
+/// Torque margin below which a check warns, % of the limit. With less margin, the torque may reach the limit if the arm has
+/// 10 % more mass and 20 % more friction than its model.
 pub const MARGIN_LOW_PCT: f64 = 10.0;
 
-/// Smallest share of a torque limit that a motion leaves unused, and its place.
+/// Smallest share of a torque limit that a motion leaves unused, and the place on the path.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TorqueMargin {
     /// Margin, % of the limit; negative if the torque is above the limit.
@@ -24,7 +24,7 @@ pub struct TorqueMargin {
     pub torque_nm: f64,
     /// Torque limit, N·m.
     pub limit_nm: f64,
-    /// Bearing temperature for the friction, °C: of the temperatures checked, the one with the greater torque.
+    /// Bearing temperature of the friction, °C. Of the checked temperatures, it is the one with the greater torque.
     pub temperature_c: f64,
 }
 
@@ -58,7 +58,8 @@ impl fmt::Display for TorqueMargin {
 }
 
 impl Verdict {
-    /// Updates the margin with the torque of a joint, computed at a bearing temperature (°C), at a millisecond of the path.
+    /// Updates the margin with the torque of a joint, computed for a bearing temperature (°C) and a millisecond of the
+    /// path.
     pub(super) fn take_margin(
         &mut self,
         joint: Joint,
@@ -73,7 +74,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the verdict with the smaller of its own margin and `other`, a margin of the same trajectory.
+    /// Returns the verdict with the smaller margin: its own or `other`. Both belong to the same trajectory.
     pub(crate) fn or_less(mut self, other: Option<TorqueMargin>) -> Self {
         if let Some(other) = other
             && self.margin.is_none_or(|margin| other.percent < margin.percent)

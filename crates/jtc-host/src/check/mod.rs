@@ -1,9 +1,9 @@
-//! Check of a trajectory before it is sent: limits at and between its points, jumps, contradictions, torque, torque to hold the
-//! arm at a standstill of the path, ability to stop, start pose.
+//! Check of a trajectory before it is sent. It covers limits at and between the points, jumps, contradictions, torque, the
+//! torque to hold the arm at rest, the ability to stop, and the start pose.
 //!
-//! Between points the check runs the controller's own interpolation once per millisecond, on the numbers as the wire carries
-//! them. So the check computes what the controller will compute. The controller's own check (J-36) uses the same numbers, so a
-//! trajectory that passes here is not refused there.
+//! Between points the check runs the controller's own interpolation once per millisecond, with the rounded numbers of the
+//! frames. So the check gets the same values as the controller. The controller's own check (J-36) uses them too, so it
+//! accepts every trajectory that passes here.
 
 mod cause;
 mod checked;
@@ -56,7 +56,7 @@ pub struct Checker<'a> {
 /// Positions that the path may have (J-36).
 struct Positions {
     ranges: [PathRange; JOINTS],
-    /// Positions of the first point of the path.
+    /// Positions at the first point of the path.
     first: [f64; JOINTS],
 }
 
@@ -69,12 +69,12 @@ impl Positions {
     }
 }
 
-/// Least significant bit of positions and velocities on the wire.
+/// Least significant bit of positions and velocities in a frame.
 pub(crate) const POSITION_BIT: f64 = jtc_wire::POSITION_SCALE / 32767.0;
 const VELOCITY_BIT: f64 = jtc_wire::VELOCITY_SCALE / 32767.0;
 
 impl<'a> Checker<'a> {
-    /// Creates a check against the limits of `config` only.
+    /// Creates a check against the limits of `config`, without a model, friction or start pose.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self { config, model: None, friction: None, temperature: TEMPERATURE, start: None, upload }
@@ -84,8 +84,8 @@ impl<'a> Checker<'a> {
     pub fn check(&self, trajectory: &Trajectory) -> Verdict {
         let mut verdict = Verdict::new(trajectory);
         self.counts(trajectory, &mut verdict);
-        // Points as the controller will receive them. A number that no frame carries is a problem, and the check continues
-        // without rounding.
+        // Points as the controller will receive them. A number that does not fit into a frame is a problem; the check then
+        // continues with the number before rounding.
         let points: Vec<SetPoint> = trajectory
             .points
             .iter()
@@ -110,7 +110,7 @@ impl<'a> Checker<'a> {
             let stands_there = self.start.is_some();
             holding::holds(self.config, dynamics, trajectory.step_ms, &points, stands_there, &mut verdict);
         }
-        // A path that cannot run has no motion to stop.
+        // A path that cannot run at all is not checked for stops.
         if let Some(dynamics) = dynamics.filter(|_| verdict.problems.iter().all(|p| !p.kind.stops_at_once()))
         {
             stopping::stops(self.config, &dynamics, trajectory.step_ms, &points, &mut verdict);
@@ -118,7 +118,8 @@ impl<'a> Checker<'a> {
         verdict.done()
     }
 
-    /// Adds the problems that the controller's own check will find during the upload (J-36); known problems stay as they are.
+    /// Adds the problems that the controller's own check will find during the upload (J-36). Problems that are already
+    /// known are unchanged.
     fn controller(&self, trajectory: &Trajectory, verdict: &mut Verdict) {
         let tables = match self.friction {
             Some(Friction::Table(tables)) => Some(tables),
@@ -221,7 +222,7 @@ impl<'a> Checker<'a> {
             self.moment(a, i, 0.0, &places, dynamics, verdict);
             let Some(b) = points.get(i + 1) else { break };
             let senseless = self.step(a, b, i, h, verdict);
-            // A step of 1 ms has no millisecond inside, so its middle is checked.
+            // A step of 1 ms contains no further millisecond, so its middle is checked.
             for k in 1..step_ms.max(2) {
                 let u = f64::from(k) / f64::from(step_ms.max(2));
                 for (figures, speed) in verdict.joints.iter_mut().zip(position_speed(a, b, h, u)) {
@@ -234,14 +235,14 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Finds jumps and contradictions between two points; returns `true` if the motion between them is not meaningful.
+    /// Finds jumps and contradictions between two points. Returns `true` if the motion between them makes no sense.
     fn step(&self, a: &SetPoint, b: &SetPoint, i: usize, h: f64, verdict: &mut Verdict) -> bool {
         let mut senseless = false;
         for (joint, limit) in Joint::ALL.into_iter().zip(&self.config.joints) {
             let j = joint.index();
             let (moved, v0, v1) = (b.position[j] - a.position[j], a.velocity[j], b.velocity[j]);
             let (a0, a1) = (a.acceleration[j], b.acceleration[j]);
-            // Displacement that the velocities of both points allow, including rounding.
+            // Displacement that follows from the velocities of both points. `slack` covers their rounding.
             let expected = 0.5 * h * (v0 + v1);
             let slack = 3.0 * POSITION_BIT
                 + h * (0.5 * (v1 - v0).abs() + 2.0 * VELOCITY_BIT)

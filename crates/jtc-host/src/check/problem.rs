@@ -20,7 +20,7 @@ pub struct Seen {
     pub time_s: f64,
     /// Value, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit of the value, or the value of the other channel.
+    /// Limit of the value. For two channels that disagree, the value of the other channel.
     pub limit: f64,
 }
 
@@ -41,11 +41,11 @@ pub struct Problem {
     pub time_s: f64,
     /// Worst value, in the unit of the kind of problem.
     pub value: f64,
-    /// Limit of the value, or the value of the other channel.
+    /// Limit of the value. For two channels that disagree, the value of the other channel.
     pub limit: f64,
     /// Number of milliseconds (or points, or steps) with the problem.
     pub count: usize,
-    /// `true` if the trajectory can run despite the problem; only the feed-forward is less good.
+    /// `true` if the trajectory can run despite the problem. Then only the feed-forward is less accurate.
     pub warning: bool,
 }
 
@@ -56,7 +56,7 @@ impl Problem {
         Seen { joint, point, ms, time_s, value, limit }
     }
 
-    /// Returns the excess over the limit, as a multiple of the limit if there is one.
+    /// Returns the excess over the limit, relative to the limit if the problem has one.
     pub(super) fn excess(&self) -> f64 {
         match self.kind {
             ProblemKind::VelocityMismatch | ProblemKind::AccelerationMismatch => {
@@ -129,7 +129,7 @@ impl Seen {
 /// Formats a number with three significant digits.
 fn three_digits(value: f64) -> String {
     let before = if value > 0.0 { value.log10().floor() } else { 0.0 };
-    // A tenth of a micro-unit is finer than the resolution of every frame.
+    // Seven decimals are finer than the resolution of every frame.
     let decimals = (2.0 - before).clamp(0.0, 7.0) as usize;
     format!("{value:.decimals$}")
 }

@@ -1,8 +1,8 @@
 //! Check that the arm can stop from every place of a path within the stop time of Pause and Stop (J-33).
 //!
-//! Along a path that runs at the rate r with the slope s, the model's torque is g + r²·f + s·h: the torque to hold the arm, the
-//! torque of its motion at full speed, and the torque of a rate change (Bobrow 1985; Pham & Pham 2018). All three are computed
-//! once per place, so that a ramp to standstill from each place needs only a few sums.
+//! If a path runs at the rate r, and r changes with the slope s, the model's torque is g + r²·f + s·h. Here g holds the
+//! arm, f is for the motion at full speed, and h for the change of rate (Bobrow 1985; Pham & Pham 2018). All three are
+//! computed once per place. A ramp to standstill then needs only a few sums.
 
 use std::collections::VecDeque;
 
@@ -12,11 +12,11 @@ use jtc_wire::Joint;
 
 use super::{ProblemKind, Verdict};
 
-/// Distance between the places checked, along the path and along each ramp, ms.
+/// Distance between the checked places, along the path and along each ramp, ms.
 const SPACING: f64 = 10.0;
-/// Lengths of the ramps tried from every place, as shares of the allowed time; one possible ramp is sufficient.
+/// Lengths of the ramps that are tried from every place, as shares of the allowed time. One feasible ramp is sufficient.
 const LENGTHS: [f64; 3] = [1.0, 0.7, 0.4];
-/// Share of a ramp over which its slope rises, and over which the slope falls.
+/// Share of a ramp's time in which its slope rises, and in which it falls again.
 const CORNER: f64 = 0.2;
 
 /// Parts of the torque at a place of the path, N·m.
@@ -29,7 +29,7 @@ struct Place {
     slope: [f64; JOINTS],
 }
 
-/// Load of the joint that comes closest to its limit on a ramp.
+/// Torque of the joint that comes closest to its limit on a ramp.
 #[derive(Clone, Copy)]
 struct Load {
     share: f64,
@@ -37,8 +37,8 @@ struct Load {
     torque: f64,
 }
 
-/// Adds a problem for every place from which no ramp of `config.stop_ms` keeps the model's torque, without friction, within the
-/// limits.
+/// Adds a problem for every place from which no tried ramp within `config.stop_ms` keeps the model's torque, without
+/// friction, within the limits.
 pub(super) fn stops(
     config: &Config,
     dynamics: &Dynamics,
@@ -49,7 +49,7 @@ pub(super) fn stops(
     let end = points.len().saturating_sub(1) as f64 * f64::from(step_ms);
     let last = (end / SPACING).ceil() as usize;
     let stop_ms = f64::from(config.stop_ms).max(SPACING);
-    // A ramp covers half of its time at full speed.
+    // A ramp advances the path by half of the ramp's time.
     let ahead = (0.5 * stop_ms / SPACING).ceil() as usize + 1;
     let mut window = VecDeque::with_capacity(ahead + 1);
     let mut next = 0;
@@ -90,7 +90,7 @@ fn place(config: &Config, dynamics: &Dynamics, step_ms: u16, points: &[SetPoint]
     }
 }
 
-/// Returns the highest load of a ramp of `length` ms from the first place of `window`.
+/// Returns the greatest load on a ramp of `length` ms from the first place of `window`.
 fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     let mut worst = Load { share: 0.0, joint: Joint::ALL[0], torque: 0.0 };
     let samples = (length / SPACING).ceil().max(2.0);
@@ -120,7 +120,8 @@ fn ramp(config: &Config, window: &VecDeque<Place>, length: f64) -> Load {
     worst
 }
 
-/// Returns the completed share of a ramp at the share `x` of its time, and its slope there: a straight line with rounded ends.
+/// Returns the completed share of a ramp when the share `x` of its time has passed, and the slope at that time. The ramp is
+/// a straight line with rounded ends.
 fn profile(x: f64) -> (f64, f64) {
     let steepest = 1.0 / (1.0 - CORNER);
     let end = 1.0 - x;

@@ -31,7 +31,7 @@ fn a_planned_move_passes_with_torque_and_start_pose() {
     assert!(verdict.joints[1].torque_peak_nm.unwrap() > 1.0);
 }
 
-/// J-34.
+/// J-34: the start pose is checked.
 #[test]
 fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     let config = Config::avena();
@@ -47,7 +47,7 @@ fn j34_the_start_pose_is_checked_with_the_device_s_tolerance() {
     assert!(!Checker { start: Some(start), ..Checker::new(&config) }.check(&smooth()).is_ok());
 }
 
-/// J-32: both points are within the limits, but the controller's interpolation between them is not.
+/// J-32: both points are within the limits, but the controller's interpolation between them exceeds one.
 #[test]
 fn j32_limits_are_checked_between_points() {
     let at = |q: f64, v: f64| Point {
@@ -55,7 +55,7 @@ fn j32_limits_are_checked_between_points() {
         velocity: [0.0, v, 0.0, 0.0, 0.0, 0.0],
         ..Point::default()
     };
-    // A swing over the position limit of joint 2 (1.57 rad); both points stay below the limit.
+    // Joint 2 swings over its position limit (1.57 rad), although both points are below the limit.
     let t =
         Trajectory { step_ms: 1000, points: vec![at(1.5, 0.0), at(1.5, 1.0), at(1.5, -1.0), at(1.5, 0.0)] };
     let verdict = check(&t);
@@ -102,7 +102,7 @@ fn channels_that_contradict_each_other_all_along_are_refused() {
     assert!(verdict.refusals().any(|p| p.kind == ProblemKind::VelocityMismatch), "{verdict}");
 }
 
-/// J-30.
+/// J-30: the numbers of points and segments are checked.
 #[test]
 fn j30_counts_are_checked() {
     let t = Trajectory { step_ms: 10, points: vec![Point::default(); 12_001] };
@@ -135,7 +135,7 @@ fn torque_along_the_path_is_held_against_the_limits() {
     );
 }
 
-/// Two points that no arm can follow are reported as too fast, with the speed that works.
+/// Two points that are too far apart are reported as too fast, with the speed that passes.
 #[test]
 fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
     let to = Point { position: [0.0, 0.0, 2.5, 0.0, 0.0, 0.0], ..Point::default() };
@@ -147,12 +147,13 @@ fn a_move_that_is_too_fast_is_named_with_the_speed_that_works() {
         (ProblemKind::PositionSpeed, Joint::from_number(3)),
         "{verdict}"
     );
-    // 15/8 of 2.5 rad in 0.3 s, along the path and not at its points.
+    // The peak is 15/8 of 2.5 rad in 0.3 s. It lies between the points.
     assert!((verdict.joints[2].velocity_peak_rad_s - 15.625).abs() < 0.01);
     assert!(verdict.hint().to_string().contains("--speed 9`"), "{}", verdict.hint());
     let slow = check(&plan::at_speed(&t, 9.0).unwrap());
     assert!(slow.is_ok(), "{slow}");
-    // At half of the file's speed, the advised percentage still refers to the file's own speed.
+    // The trajectory was checked at half of the file's speed. The advised percentage must still refer to the file's own
+    // speed.
     let half = check(&plan::at_speed(&t, 50.0).unwrap());
     assert!(
         half.hint_for("my.csv", 50.0).to_string().contains("traj check my.csv --speed 9`"),
@@ -174,7 +175,7 @@ fn degrees_are_recognised() {
     assert!(verdict.to_string().lines().count() < 30, "{verdict}");
 }
 
-/// A single cause covers all joints and all points, with its first and its worst place.
+/// A single cause summarises all joints and points, with the first and the worst place.
 #[test]
 fn long_lists_are_summed_by_cause() {
     let mut t = smooth();
@@ -194,7 +195,7 @@ fn long_lists_are_summed_by_cause() {
         "{verdict}"
     );
     assert!((cause.worst.value + 1.9).abs() < 1e-3, "{verdict}");
-    // The controller's velocity exceeds the limit between points, before it reaches the point.
+    // The controller's velocity exceeds the limit before the point is reached.
     assert_eq!((cause.first.joint, cause.first.point), (Joint::from_number(6), n / 4 - 1), "{verdict}");
     let time = (cause.first.point as f64 * f64::from(t.step_ms) + cause.first.ms) * 1e-3;
     assert_eq!(cause.first.time_s, time);
@@ -212,7 +213,7 @@ fn long_lists_are_summed_by_cause() {
     assert_eq!(config.joints[1].velocity_max, 1.5);
 }
 
-/// J-36: a trajectory that the controller refuses is refused here, with the same words in all cases.
+/// J-36: the check refuses a trajectory that the controller refuses, with the same words in all cases.
 #[test]
 fn j36_nothing_passes_that_the_controller_refuses() {
     let mut t = smooth();
@@ -230,8 +231,8 @@ fn j36_nothing_passes_that_the_controller_refuses() {
     assert_eq!((verdict.problems[0].kind, verdict.problems[0].limit), (ProblemKind::Position, 2.9905));
 }
 
-/// Returns settings in which the limits of joint 2 lie between two positions of the wire: the nearest ones are 1.150041 and
-/// -0.550044 rad, outside the limits.
+/// Returns settings in which the limits of joint 2 lie between two positions that a frame can carry. The nearest ones,
+/// 1.150041 and −0.550044 rad, are outside the limits.
 fn between_steps() -> Config {
     let mut config = Config::avena();
     (config.joints[1].position_min, config.joints[1].position_max) = (-0.55, 1.15);
@@ -251,12 +252,12 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
             let verdict = Checker::new(&config).check(&t);
             assert!(verdict.is_ok() && verdict.problems.is_empty(), "{verdict}");
         }
-        // The next position of the wire is outside.
+        // The next position that a frame can carry is outside.
         let verdict = Checker::new(&config).check(&of_joint_2(from, limit + 96e-6 * f64::signum(limit)));
         let [problem] = &verdict.problems[..] else { panic!("{verdict}") };
         assert_eq!((problem.kind, problem.limit), (ProblemKind::Position, limit));
     }
-    // A planned motion also exists, and its end stays the limit.
+    // A motion to the limit can also be planned, and it ends exactly at the limit.
     let planned = plan::joint_move(&[0.0; 6], &[0.0, 1.15, 0.0, 0.0, 0.0, 0.0], &config, 50.0).unwrap();
     assert_eq!(planned.points.last().unwrap().position[1], 1.15);
 }
@@ -264,7 +265,7 @@ fn j36_a_path_that_ends_on_a_limit_passes() {
 #[test]
 fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     let config = between_steps();
-    // Positions 11 997, -5 739, 12 100 and 15 000 of the wire; rounding of the velocities adds some µrad.
+    // The frames contain the positions 11 997, −5 739, 12 100 and 15 000. The rounding of the velocities adds some µrad.
     for (end, excess) in [(1.150233, 0.000233), (-0.550236, 0.000236), (1.160108, 0.0101), (1.438151, 0.288)]
     {
         let verdict = Checker::new(&config).check(&of_joint_2(0.2, end));
@@ -279,7 +280,8 @@ fn j36_what_is_beyond_a_limit_is_named_with_three_digits() {
     }
 }
 
-/// Like the controller, the check accepts a path that leads back inside from up to the start tolerance outside the limits.
+/// Like the controller, the check accepts a path that starts outside the limits by up to the start tolerance and leads back
+/// inside.
 #[test]
 fn j36_j58_a_path_from_outside_the_limits_inwards_passes() {
     let config = between_steps();
@@ -317,7 +319,7 @@ fn j36_the_friction_table_bounds_the_speed() {
     assert!(verdict.hint().to_string().contains("--speed"), "{}", verdict.hint());
 }
 
-/// Returns a quintic from rest to rest.
+/// Returns a motion along a quintic, at rest at both ends.
 fn gentle(from: &[f64; 6], to: &[f64; 6], seconds: f64) -> Trajectory {
     let steps = (seconds * 100.0).round() as usize;
     let point = |k: usize| {
@@ -360,7 +362,7 @@ fn j33_a_path_that_cannot_be_stopped_in_time_is_refused() {
     assert!(verdict(&config).is_ok(), "{}", verdict(&config));
 }
 
-/// An arm that stands at nearly all of a torque limit falls later, even without a motion.
+/// An arm that is held with nearly all of a torque limit falls later, even without a motion.
 #[test]
 fn j43_torque_is_in_hand_where_the_arm_stands() {
     let arm = Arm::avena();
@@ -387,7 +389,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
     let last = there.points.len() - 1;
     for share in [0.98, 0.975] {
         let (joint, point, over, hint) = refusal(&there, share, None).expect("at its end");
-        // The last points are slow enough to count as standing.
+        // In the last points the arm is already slow enough to be considered at rest.
         assert!(
             joint == Joint::from_number(2) && over && (last - 5..=last).contains(&point),
             "{point} of {last}"
@@ -404,7 +406,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
             "{point} of {last}"
         );
         assert!(refusal(&back, share, None).is_some(), "at its start");
-        // If the arm already stands in that pose, a motion away is accepted.
+        // If the arm is already in that pose, a motion out of it is accepted.
         assert_eq!(refusal(&back, share, Some(high)), None);
         assert!(refusal(&there, share, Some(low)).is_some());
     }
@@ -416,7 +418,7 @@ fn j43_torque_is_in_hand_where_the_arm_stands() {
         text.contains("joint 2: standing still at point") && text.contains("98.0 % of the torque limit"),
         "{text}"
     );
-    // While joint 1 turns about the vertical, the arm does not stand still in that pose.
+    // Joint 1 turns about the vertical meanwhile, so the arm is not at rest in that pose.
     let (n, h) = ((both.points.len() - 1) as f64, f64::from(both.step_ms) * 1e-3);
     for (i, point) in both.points.iter_mut().enumerate() {
         let (sin, cos) = (std::f64::consts::PI * i as f64 / n).sin_cos();

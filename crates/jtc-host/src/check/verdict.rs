@@ -1,4 +1,4 @@
-//! Result of a check: all problems, grouped, the worst first.
+//! Result of a check: all problems in groups, the worst first.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use super::margin::TorqueMargin;
 use super::problem::{Problem, Seen};
 use crate::trajectory::Trajectory;
 
-/// Number of places with contradicting channels that is tolerated, because existing files have them between their pieces.
+/// Number of places with contradicting channels that is tolerated. Existing files have such places where their pieces meet.
 const SEAMS: usize = 20;
 
 /// Values of a joint along the path.
@@ -60,7 +60,7 @@ impl JointFigures {
 pub enum Suspicion {
     /// No particular fault.
     Nothing,
-    /// Positions far outside the range of a joint, which would be normal after a division by 57.3.
+    /// Positions are far outside the range of a joint. Divided by 57.3 they would be normal.
     Degrees,
     /// The trajectory consists of pieces that do not meet.
     Pieces,
@@ -79,17 +79,18 @@ pub struct Verdict {
     pub duration_s: f64,
     /// Problems, worst first: one for each kind and joint, and each jump.
     pub problems: Vec<Problem>,
-    /// Problems summarised by kind: the kind with the strongest effect on an arm first.
+    /// Problems summarised by kind. The kind with the strongest effect on an arm comes first.
     pub causes: Vec<Cause>,
     #[serde(skip)]
     places: Places,
     /// Values of the joints along the path.
     pub joints: [JointFigures; JOINTS],
-    /// Smallest torque margin by the model, with friction at 20 °C and at the temperature of the check; `None`: not computed.
+    /// Smallest torque margin of the model, with friction at 20 °C and at the temperature of the check. `None`: not
+    /// computed.
     pub margin: Option<TorqueMargin>,
 }
 
-/// Step time, ms, from which points are waypoints and not samples of a motion.
+/// Step time from which the points are considered waypoints instead of samples of a motion, ms.
 const WAYPOINTS_MS: u16 = 100;
 
 impl Verdict {
@@ -134,7 +135,7 @@ impl Verdict {
         }
     }
 
-    /// Sorts the problems: kinds by their effect on an arm, jumps along the path, other problems by their excess.
+    /// Sorts the problems: kinds by their effect on an arm, jumps along the path, and other problems by their excess.
     pub(super) fn done(mut self) -> Self {
         self.part_haste_from_seams();
         let seams = SEAMS.max(self.points / 50);
@@ -156,17 +157,17 @@ impl Verdict {
         self
     }
 
-    /// Separates moves that are too fast from pieces that do not meet. Pieces that do not meet cause single jumps from one sample
-    /// to the next. If at least every fifth step has a jump, the whole path is too fast, or not in radians. A jump in a step of
-    /// 100 ms or more between waypoints, or one of three or more jumps in a row, is a move that is too fast. Such moves become
-    /// one problem per joint.
+    /// Distinguishes moves that are too fast from pieces that do not meet. Pieces that do not meet cause single jumps
+    /// between two samples. Jumps are moves that are too fast in three cases. At least every fifth step has a jump, because
+    /// the whole path is too fast or not in radians. Or the step is 100 ms or more, so that the points are waypoints. Or
+    /// there are three or more jumps in a row. Such moves become one problem per joint.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();
         places.sort_unstable();
         places.dedup();
         let all = 5 * places.len() >= self.points || self.step_ms >= WAYPOINTS_MS;
-        // Pieces meet at one step; jumps in many steps in a row are one move.
+        // Pieces meet at one step. Jumps in many consecutive steps belong to one move.
         let on_the_way = |point: usize| {
             let has = |p: Option<usize>| p.is_some_and(|p| places.binary_search(&p).is_ok());
             let (before, after) = (point.checked_sub(1), Some(point + 1));
@@ -192,12 +193,12 @@ impl Verdict {
         self.problems.iter().all(|p| p.warning)
     }
 
-    /// Returns `true` if the only problem that prevents the run is an arm that is not at the first point.
+    /// Returns `true` if the only problem that prevents the run is that the arm is not at the first point.
     pub fn is_only_elsewhere(&self) -> bool {
         !self.is_ok() && self.refusals().all(|p| p.kind == ProblemKind::StartPose)
     }
 
-    /// Returns the fault that the problems together suggest.
+    /// Returns the fault that probably causes all problems.
     pub fn suspicion(&self) -> Suspicion {
         use ProblemKind::*;
         let too_fast = |p: &Problem| {
@@ -227,7 +228,7 @@ impl Verdict {
         }
     }
 
-    /// Returns the joint that goes furthest from zero, and its position there, rad.
+    /// Returns the joint whose position is furthest from zero, and this position, rad.
     fn furthest(&self) -> Option<(Joint, f64)> {
         let ends = Joint::ALL.into_iter().zip(&self.joints);
         let ends = ends.flat_map(|(j, f)| [(j, f.position_min_rad), (j, f.position_max_rad)]);
@@ -253,7 +254,7 @@ impl fmt::Display for Verdict {
         let (mut shown, mut left) = (self.causes.len(), 0);
         if let (Suspicion::Degrees, Some(far)) = (self.suspicion(), self.furthest()) {
             write!(f, "\n  the positions look like degrees: {} is at {:.1}", far.0, far.1)?;
-            // The other problems follow from the degrees.
+            // The other problems are consequences of the wrong unit.
             shown = self.causes.iter().take_while(|c| c.kind <= ProblemKind::Position).count().max(1);
             left = self.causes.len().saturating_sub(shown);
         }

@@ -27,8 +27,8 @@ pub(super) const MISSING: &[Page] = &[
     ),
 ];
 
-/// Declares the pages of the check: kind and name, then meaning, usual cause, remedy, and the next command if it is not another
-/// check.
+/// Declares the pages of the check: kind and name, then meaning, usual cause, remedy, and the next command. The default
+/// command is another check.
 macro_rules! found {
     (@next) => { "jtc traj check FILE" };
     (@next $command:literal) => { $command };

@@ -1,4 +1,5 @@
-//! Pages for the codes that a controller, a drive or this library reports, each with meaning, cause, remedy and next command.
+//! Pages for the codes that a controller, a drive or this library reports. Each page has meaning, cause, remedy and next
+//! command.
 
 mod check;
 mod controller;
@@ -11,7 +12,7 @@ use jtc_wire::{Code, ControllerState, DataStatus, FrameStatus, NodeState, StopKi
 use crate::check::ProblemKind;
 use crate::words;
 
-/// Declares the families of numbers: meaning, name, key before the colon in `can:0x100`, title.
+/// Declares the families of numbers: meaning, name, key before the colon (as in `can:0x100`), title.
 macro_rules! families {
     ($($(#[$meaning:meta])* $name:ident $key:literal, $title:literal;)+) => {
         /// Family of the number that a page explains.
@@ -22,17 +23,17 @@ macro_rules! families {
         }
 
         impl Family {
-            /// All families, in the order of the search for a bare number.
+            /// All families, in the order in which a number without a family is searched.
             pub const ALL: [Self; [$($key),+].len()] = [$(Self::$name),+];
 
-            /// Returns the key before the colon in `can:0x100`.
+            /// Returns the key before the colon, as in `can:0x100`.
             pub fn key(self) -> &'static str {
                 match self {
                     $(Self::$name => $key,)+
                 }
             }
 
-            /// Returns the family in words.
+            /// Returns the title of the family.
             pub fn title(self) -> &'static str {
                 match self {
                     $(Self::$name => $title,)+
@@ -74,7 +75,7 @@ families! {
 }
 
 impl Family {
-    /// Returns `true` if the number is a set of bits, `false` if it is one code.
+    /// Returns `true` if the number is a set of bits, and `false` if it is a single code.
     pub fn is_bits(self) -> bool {
         matches!(
             self,
@@ -109,12 +110,12 @@ pub struct Page {
 }
 
 impl Page {
-    /// Returns the number as in its word: a mask for bits.
+    /// Returns the number as in its word. For a bit this is a mask.
     pub fn number(&self) -> u32 {
         if self.family.is_bits() { 1 << self.code } else { self.code }
     }
 
-    /// Returns the words that a screen shows for the code, or the name if no screen shows the code.
+    /// Returns the words that a screen shows for the code. If no screen shows it, returns the name.
     pub fn title(&self) -> String {
         own_words(self).unwrap_or_else(|| self.name.replace('-', " "))
     }
@@ -168,7 +169,7 @@ pub fn names(family: Family, word: u32) -> Vec<&'static str> {
 
 /// Returns the words that commands print for this code.
 fn shown(page: &Page) -> Vec<String> {
-    // A decoded frame uses the wire's numbers of the nodes.
+    // A decoded frame has the node numbers of the wire.
     let decoded = jtc_wire::words::CAN_FLAGS.get(page.code as usize).filter(|_| page.family == Family::Can);
     own_words(page).into_iter().chain(decoded.map(|name| (*name).to_owned())).collect()
 }
@@ -195,21 +196,22 @@ fn own_words(page: &Page) -> Option<String> {
     }
 }
 
-/// Reduces a text to lower-case letters and digits, so that case, spaces and signs do not count.
+/// Reduces a text to lower-case letters and digits. Case, spaces and punctuation are then ignored in a comparison.
 fn letters(text: &str) -> String {
     text.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
-/// Finds pages for a name (`joint-position-error`), the words on a screen (`HoldPos`, `over-current`), a number of one family
-/// (`can:0x100`, `data:7`), a bare number (searched in every family), or words of a name. Returns an empty list if no page fits.
+/// Finds pages for a query. The query is a name (`joint-position-error`), the words on a screen (`HoldPos`,
+/// `over-current`), a number of one family (`can:0x100`, `data:7`), a number without a family, or some words of a name.
+/// Returns an empty list if no page fits.
 pub fn find(query: &str) -> Vec<&'static Page> {
-    // In a line of errors each error begins with its joint.
+    // In a list of errors each error begins with its joint.
     let query = match query.split_once(": ") {
         Some((node, rest)) if node.starts_with("joint ") || node == "gripper" => rest,
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // A query for a whole family, also if its key is also a word on a screen.
+    // The query names a whole family. This has priority over a word on a screen that equals the key.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }
@@ -222,7 +224,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         return exact;
     }
     let by_name = by_name_or_number(query);
-    // The query is a part of the words on a screen: "does not answer".
+    // The query is a part of the words on a screen, such as "does not answer".
     if by_name.is_empty() && as_shown.len() > 3 {
         on_screen(|text, asked| text.contains(asked))
     } else {
@@ -259,7 +261,7 @@ fn by_name_or_number(query: &str) -> Vec<&'static Page> {
     pages().filter(in_family).filter(|p| text.split('-').all(|word| p.name.contains(word))).collect()
 }
 
-/// Returns `true` if all set bits have a page; if not, the number belongs to another family.
+/// Returns `true` if all set bits have a page. If not, the number belongs to another family.
 fn known_bits(family: Family, number: u32) -> bool {
     let known = pages().filter(|p| p.family == family).fold(0, |m, p| m | p.number());
     number & !known == 0
@@ -348,7 +350,7 @@ mod tests {
         assert_eq!(find("HoldPos").len(), 1);
     }
 
-    /// A word has as many names as set bits, in the same order as the texts, and each name finds only its page.
+    /// Each set bit of a word has one name, in the order of the texts, and each name finds only its page.
     #[test]
     fn the_bits_of_a_word_have_the_names_of_their_pages() {
         for (family, word, words) in [

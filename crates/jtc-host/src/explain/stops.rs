@@ -1,11 +1,11 @@
-//! Pages about the causes of a held stop (J-69). Number 0 is the held stop itself, independent of its cause.
+//! Pages about the causes of a held stop (J-69). Number 0 is the page about the held stop itself.
 
 use jtc_wire::StopKind;
 
 use super::{Family, Page, page};
 
-/// Declares the pages of the causes: kind and name, then meaning, usual cause, remedy, and the next command if it is
-/// not `jtc clear`.
+/// Declares the pages of the causes: kind and name, then meaning, usual cause, remedy, and the next command. The default
+/// command is `jtc clear`.
 macro_rules! stops {
     (@next) => { "jtc clear" };
     (@next $command:literal) => { $command };
@@ -16,7 +16,7 @@ macro_rules! stops {
     };
 }
 
-/// Page of the held stop itself.
+/// Page about the held stop itself.
 pub(super) const HELD_STOP: &[Page] = &[page(
     Family::Stop,
     0,
@@ -30,7 +30,7 @@ pub(super) const HELD_STOP: &[Page] = &[page(
     ],
 )];
 
-/// Pages of the causes, by their numbers.
+/// Pages about the causes, in the order of their numbers.
 pub(super) const CAUSES: &[Page] = &KINDS;
 
 stops! {

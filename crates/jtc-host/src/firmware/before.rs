@@ -1,8 +1,8 @@
-//! Check of a board before it is flashed: the state of its controller, and whether the controller may be stopped.
+//! Check of a board before it is flashed: the state of its controller, and whether it is safe to stop the controller.
 //!
-//! A flash resets the processor. Then the drives receive no more frames, and an arm that the drives hold falls. So a board whose
-//! controller reports torque is never flashed. If the report is incomplete, or may come from another controller, an operator must
-//! confirm the flash.
+//! A flash resets the processor. The drives then receive no more frames, and an arm that they hold falls. So a board whose
+//! controller reports torque is never flashed. If the report is incomplete, or may come from another controller, an
+//! operator must confirm the flash.
 
 use std::time::Duration;
 
@@ -14,13 +14,13 @@ use crate::error::LinkError;
 use crate::port::Port;
 use crate::session::{Session, Timeouts};
 
-/// Time without a status after which no controller runs on the line; a controller sends a status every 40 ms.
+/// If no status arrives for this time, no controller runs on the line. A controller sends a status every 40 ms.
 const SILENT: Duration = Duration::from_millis(1_500);
 
 /// Report of the controller on a serial line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
-    /// No readable data: no firmware, another firmware, or another rate.
+    /// No readable data: the board has no firmware, another firmware, or another rate.
     Nothing {
         /// Number of bytes received.
         bytes: u64,
@@ -35,7 +35,7 @@ pub enum Answers {
         silent: Vec<Joint>,
         /// `true` if the gripper is on, so that it may hold a part.
         grips: bool,
-        /// Identity of the controller; `None` if it was not reported (no extensions), or not understood.
+        /// Identity of the controller. `None` if it has no extensions, or if the report was not understood.
         info: Option<Box<Info>>,
     },
 }
@@ -45,7 +45,8 @@ pub enum Answers {
 pub struct Asked {
     /// Name of the port.
     pub port: String,
-    /// `true` if line and drive belong to one USB device, so to one board; `None` if the system does not know.
+    /// `true` if line and drive belong to one USB device, and so to one board. `None` if the operating system does not
+    /// know.
     pub same_device: Option<bool>,
     /// Report of the controller on the line.
     pub answers: Answers,
@@ -64,7 +65,7 @@ impl Asked {
         self.same_device == Some(true)
     }
 
-    /// Returns the reasons against a flash without confirmation, apart from the question whose line it is.
+    /// Returns the reasons why the flash needs a confirmation. Whether the line belongs to the board is checked elsewhere.
     fn doubts(&self) -> Option<String> {
         match &self.answers {
             Answers::Nothing { bytes: 0 } => None,
@@ -86,7 +87,7 @@ impl Asked {
     }
 }
 
-/// Knowledge about a board before it is flashed: the report on each line that was asked. Without lines, no controller was asked.
+/// Facts about a board before it is flashed: the report on each requested line. Without lines, no controller was asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Before {
     /// Lines that were asked.
@@ -94,12 +95,12 @@ pub struct Before {
 }
 
 impl Before {
-    /// Returns the identities of the controllers on the board's own lines.
+    /// Returns the identities of the controllers on the lines of the board itself.
     pub fn own_info(&self) -> impl Iterator<Item = &Info> {
         self.lines.iter().filter(|line| line.is_own()).filter_map(Asked::info)
     }
 
-    /// Returns the identity of the controller: the board's own, or else another controller that was asked.
+    /// Returns the identity of the board's own controller, or, if it is unknown, of another controller that was asked.
     pub fn info(&self) -> Option<&Info> {
         self.own_info().next().or_else(|| self.lines.iter().find_map(Asked::info))
     }
@@ -109,8 +110,8 @@ impl Before {
         self.info().map(|info| info.store == StoreState::Stored)
     }
 
-    /// Returns the statement that an operator must confirm before the board is flashed with this image. `None` if the board's own
-    /// controller reports that the arm has no torque, each joint answers, and the gripper is off.
+    /// Returns the statement that an operator must confirm before the board is flashed with this image. Returns `None` if
+    /// the board's own controller reports that the arm has no torque, that each joint answers, and that the gripper is off.
     pub fn to_confirm(&self, image: &Image) -> Option<String> {
         let reports = |line: &Asked| matches!(line.answers, Answers::Controller { .. });
         let mut doubts: Vec<String> = self.lines.iter().filter_map(Asked::doubts).collect();
@@ -143,9 +144,9 @@ impl Before {
 /// Statements that the operator has confirmed beforehand.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Permissions {
-    /// The drive without a board name belongs to the image's board.
+    /// A drive whose board is unknown belongs to the image's board.
     pub assume_board: bool,
-    /// The board's solder bridges are set for the core supply of the image.
+    /// The solder bridges of the board are set for the core supply that the image needs.
     pub accept_supply: bool,
 }
 
@@ -162,7 +163,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     if answered(session.poll(SILENT))?.flatten().is_none() {
         return silent(session);
     }
-    // The wait for the answer skips all statuses buffered while the line was not read, which may be minutes during a question.
+    // The statuses may have been buffered for minutes while the operator was asked. Waiting for this answer skips them.
     let info = answered(session.info())?.flatten().map(Box::new);
     match answered(session.fresh_status())? {
         Some(status) => Ok(controller(&status, info)),
@@ -170,7 +171,7 @@ pub fn look<P: Port>(session: &mut Session<P>) -> Result<Answers, FirmwareError>
     }
 }
 
-/// Returns the result of the line; `None` if the answer was not understood. A lost port is an error.
+/// Returns the result of a request, or `None` if no usable answer arrived. A lost port is an error.
 fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError> {
     match result {
         Ok(value) => Ok(Some(value)),
@@ -181,7 +182,7 @@ fn answered<T>(result: Result<T, LinkError>) -> Result<Option<T>, FirmwareError>
 
 fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     let flag = |joint: &Joint| status.can_current & can_flag::no_answer(joint.index()) != 0;
-    // A joint that has not answered yet is in the state in which all joints begin.
+    // All joints begin in Start. A joint that is still in this state has not answered yet.
     let begins = |joint: &Joint| status.joints[joint.index()].state == NodeState::START;
     let grips = status.gripper.is_some_and(|gripper| gripper.pump != 0 || !is_idle(gripper.state));
     Answers::Controller {
@@ -193,14 +194,15 @@ fn controller(status: &Status, info: Option<Box<Info>>) -> Answers {
     }
 }
 
-/// Returns `true` if the arm has torque, or may have torque, by the state of the controller or of a drive.
+/// Returns `true` if the arm has or may have torque. This is derived from the states of the controller and the drives.
 fn has_torque(status: &Status) -> bool {
     let idle = [ControllerState::Init, ControllerState::Error].into_iter().any(|idle| status.state == idle);
     !idle || status.joints.iter().any(|joint| !is_idle(joint.state))
 }
 
-/// Returns `true` if the motor of this node is off. In the transitions to and from *enabled*, in the reaction to a fault, and in
-/// unknown states of later drives, a motor may hold, align or calibrate, so the result is `false`.
+/// Returns `true` if the motor of this node is off. Returns `false` in the transitions to and from *enabled*, in the
+/// reaction to a fault, and in states of later drives that this program does not know, because the motor may hold, align or
+/// calibrate then.
 fn is_idle(state: NodeState) -> bool {
     [
         NodeState::START,
@@ -213,7 +215,7 @@ fn is_idle(state: NodeState) -> bool {
     .contains(&state)
 }
 
-/// Checks that this image may be written to this drive's board.
+/// Checks that this image may be written to the board of this drive.
 ///
 /// # Errors
 ///
@@ -242,7 +244,7 @@ pub fn may_flash(
         let named = drive.board().map(|(name, _)| name.to_owned()).unwrap_or_default();
         return Err(FirmwareError::OtherBoard { drive: drive.path.clone(), named, board: board.clone() });
     }
-    // A controller on the drive's own USB device also names the board.
+    // A controller on the USB device of the drive also identifies the board.
     let named = fit == Fit::Same || before.own_info().next().is_some();
     if !named && !permissions.assume_board {
         return Err(FirmwareError::UnnamedBoard {
@@ -251,7 +253,7 @@ pub fn may_flash(
             board: board.clone(),
         });
     }
-    // A running program shows that the board has its supply; the solder bridges cannot be read in another way.
+    // If the program of this board runs, the supply of the board is right for it. The solder bridges cannot be read.
     let mut runs = before.own_info().map(|info| info.board.as_str());
     let runs_this = runs.next().is_some_and(|runs| runs == board) && runs.all(|runs| runs == board);
     let supply_known = !has_two_supplies(board) || runs_this;

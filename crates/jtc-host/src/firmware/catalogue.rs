@@ -24,7 +24,7 @@ pub struct CatalogueImage {
     pub file: String,
     /// SHA-256 of the file, hexadecimal.
     pub sha256: String,
-    /// Address of its first byte.
+    /// Address of the first byte.
     pub address: u32,
     /// Size of the file, bytes.
     pub bytes: u64,
@@ -59,8 +59,8 @@ pub struct Catalogue {
 }
 
 impl Catalogue {
-    /// Returns the folders in which a catalogue is searched: the folder in the environment variable, or else the installation
-    /// prefix of the program and the install folder of packages.
+    /// Returns the folders in which a catalogue is searched. If the environment variable is set, it gives the only folder.
+    /// Otherwise they are the installation prefix of the program and the install folder of packages.
     pub fn folders() -> Vec<PathBuf> {
         if let Some(folder) = env::var_os(VARIABLE).filter(|folder| !folder.is_empty()) {
             return vec![folder.into()];
@@ -113,12 +113,12 @@ impl Catalogue {
         Ok(catalogue)
     }
 
-    /// Returns `true` if a catalogue in the folder of this file lists the file, and the content matches. A folder without a
-    /// readable catalogue lists no file.
+    /// Returns `true` if a catalogue in the folder of this file lists the file, and the content matches. Returns `false` if
+    /// the folder has no readable catalogue.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::Damaged`] if the catalogue lists another content for this name.
+    /// [`FirmwareError::Damaged`] if the content differs from the content in the catalogue.
     pub(super) fn lists(path: &Path, bytes: &[u8]) -> Result<bool, FirmwareError> {
         let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return Ok(false) };
         let Ok(catalogue) = Self::read(folder) else { return Ok(false) };

@@ -1,19 +1,19 @@
-//! Drive that an ST-LINK shows on USB: its board, and its files.
+//! Drive that an ST-LINK presents on USB: its board and its files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::FirmwareError;
 
-/// Longest label in the file system of the drive; longer labels are cut.
+/// Maximum length of a label in the file system of the drive. Longer labels are cut.
 const LABEL_MAX: usize = 11;
 /// Maximum number of bytes read from the drive's small files.
 const TEXT_MAX: usize = 4096;
 
-/// Prefixes of the board name in a label: ST-LINK firmware from 2019 on, and older firmware.
+/// Prefixes of the board name in a label: first of ST-LINK firmware from 2019 on, then of older firmware.
 const PREFIXES: [&str; 2] = ["NOD_", "NODE_"];
 
-/// Board numbers as in `MBED.HTM`, and the board names in labels.
+/// Board numbers in `MBED.HTM`, with the board names in labels.
 const CODES: [(&str, &str); 6] = [
     ("0813", "H743ZI"),
     ("0836", "H743ZI2"),
@@ -23,7 +23,7 @@ const CODES: [(&str, &str); 6] = [
     ("0847", "H745I-DISCO"),
 ];
 
-/// Drive with its own description.
+/// Drive with the description that it gives of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drive {
     /// Mount point.
@@ -38,17 +38,17 @@ pub struct Drive {
     pub device: Option<PathBuf>,
     /// USB device to which the drive belongs, if the system knows it.
     pub usb: Option<UsbDevice>,
-    /// Number of the file system at the path, if the system numbers file systems. After the drive was removed, the path has
-    /// another file system.
+    /// Number of the file system at the path, if the operating system has such numbers. After the drive is removed, the
+    /// path belongs to another file system.
     pub volume: Option<u64>,
 }
 
 /// USB device of the ST-LINK of a board, which is a drive, a serial port and a debugger at the same time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UsbDevice {
-    /// Folder in the system's device tree; the folder names the USB connector.
+    /// Folder in the device tree of the operating system. Its name contains the USB connector.
     pub folder: PathBuf,
-    /// Number on the bus, which changes each time the device is plugged in.
+    /// Number on the bus. It changes each time the device is plugged in.
     pub number: String,
 }
 
@@ -58,7 +58,7 @@ pub struct UsbDevice {
 pub enum Fit {
     /// The drive belongs to the board.
     Same,
-    /// The drive does not name its board, or not with the whole name.
+    /// The drive does not give its board, or gives only a part of the name.
     Unknown,
     /// The drive belongs to another board.
     Other,
@@ -81,7 +81,7 @@ impl Drive {
         }
         Ok(Self {
             path: path.to_owned(),
-            // The system names the folder of an automatic mount after the label.
+            // For an automatic mount, the operating system uses the label as the name of the folder.
             label: path.file_name().map(|name| name.to_string_lossy().into_owned()),
             code: page.as_deref().and_then(code),
             details: details.unwrap_or_default(),
@@ -91,14 +91,15 @@ impl Drive {
         })
     }
 
-    /// Adds the system's knowledge of the drive. For a known device only its own label counts, not a folder name. A second drive
-    /// with the same label is mounted with a digit appended, and `NODE_H743ZI2` would be the first board of that name.
+    /// Adds what the operating system knows about the drive. The label of the device replaces the folder name, which can be
+    /// misleading. A second drive with the same label is mounted with a digit appended, so that the folder `NODE_H743ZI2`
+    /// may belong to a NUCLEO-H743ZI.
     pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {
         Self { device: Some(device), label, usb, ..self }
     }
 
-    /// Returns the board name as in labels (`H745ZIQ`), and `true` if the name is complete; `None` if the drive does not name its
-    /// board.
+    /// Returns the board name in the form of labels (`H745ZIQ`), and `true` if the name is complete. Returns `None` if the
+    /// drive does not give its board.
     pub fn board(&self) -> Option<(&str, bool)> {
         let by_code =
             |code: &String| CODES.iter().find(|(known, _)| known == code).map(|(_, name)| (*name, true));
@@ -115,12 +116,12 @@ impl Drive {
         })
     }
 
-    /// Compares the drive with a board, which is named as in its firmware: `nucleo-h745zi-q`.
+    /// Compares the drive with a board. `board` has the form of the firmware: `nucleo-h745zi-q`.
     pub fn fit(&self, board: &str) -> Fit {
         let wanted = short_name(board);
         match self.board() {
             Some((name, _)) if name == wanted => Fit::Same,
-            // A label of full length may be the beginning of a name.
+            // A label of full length may be only the beginning of a name.
             Some((name, false)) if wanted.starts_with(name) => Fit::Unknown,
             Some(_) => Fit::Other,
             None => Fit::Unknown,
@@ -151,7 +152,7 @@ pub(super) fn volume(_: &fs::Metadata) -> Option<u64> {
     None
 }
 
-/// Returns the board name as in labels: `nucleo-h745zi-q-ldo` is the same board as `nucleo-h745zi-q`, `H745ZIQ`.
+/// Returns the board name in the form of labels. `nucleo-h745zi-q-ldo` and `nucleo-h745zi-q` are the same board, `H745ZIQ`.
 fn short_name(board: &str) -> String {
     let name = same_board(board);
     name.strip_prefix("nucleo-").unwrap_or(name).replace('-', "").to_uppercase()
@@ -162,8 +163,8 @@ pub(super) fn same_board(board: &str) -> &str {
     board.strip_suffix("-ldo").unwrap_or(board)
 }
 
-/// Returns `true` if the core of this board can be supplied in two ways; an image is built for one of them. In ST's names `-q`
-/// stands for a switching regulator in addition to the linear one.
+/// Returns `true` if the core of this board can be supplied in two ways. An image is built for one of them. In ST's board
+/// names, `-q` means that the board has a switching regulator in addition to the linear one.
 pub(super) fn has_two_supplies(board: &str) -> bool {
     same_board(board).ends_with("-q") || same_board(board) != board
 }
@@ -173,7 +174,7 @@ fn text(folder: &Path, file: &str) -> Option<String> {
     Some(String::from_utf8_lossy(&bytes[..bytes.len().min(TEXT_MAX)]).into_owned())
 }
 
-/// Returns the first four digits after `code=`, which are the number of the board.
+/// Returns the first four digits after `code=`. They are the number of the board.
 fn code(page: &str) -> Option<String> {
     let (_, behind) = page.split_once("code=")?;
     let code = behind.get(..4)?;
@@ -208,8 +209,8 @@ mod tests {
         for (label, code, of_h745, of_h743) in [
             ("NOD_H745ZIQ", None, Same, Other),
             ("NOD_H743ZI2", None, Other, Same),
-            // The older board of this name is a different board with other LEDs; its label equals the cut label of the newer
-            // board.
+            // The older board of this name is a different board with other LEDs. Its label equals the cut label of the
+            // newer board.
             ("NODE_H743ZI", None, Other, Unknown),
             ("NODE_H743ZI", Some("0836"), Other, Same),
             ("NODE_H743ZI", Some("0813"), Other, Other),

@@ -8,7 +8,7 @@ use jtc_wire::{Code, ControllerState};
 use super::{CatalogueImage, DriveAfter};
 use crate::port::PortError;
 
-/// Reason why a board was not flashed, or is not known to run the flashed image.
+/// Reason why a board was not flashed, or why it is not certain that the board runs the flashed image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
@@ -42,7 +42,7 @@ pub enum FirmwareError {
         /// Fault of the catalogue.
         why: String,
     },
-    /// No image of the catalogue is for this board.
+    /// The catalogue has no image for this board.
     #[error("no image for the board {board}; there are those for {}", known.join(", "))]
     NoBoard {
         /// Requested board.
@@ -50,7 +50,7 @@ pub enum FirmwareError {
         /// The boards of the catalogue.
         known: Vec<String>,
     },
-    /// A file differs from the released file.
+    /// A file differs from the file of the release.
     #[error(
         "{}: {bytes} bytes with the SHA-256 {sha256}, and {} with {} were released", path.display(), listed.bytes, listed.sha256
     )]
@@ -75,13 +75,13 @@ pub enum FirmwareError {
     /// No drive is mounted.
     #[error("no drive of an ST-LINK is mounted")]
     NoneFound,
-    /// No drive was named, and several are mounted.
+    /// The user selected no drive, and several are mounted.
     #[error("several drives of ST-LINKs are mounted: {}", listed(drives))]
     Several {
         /// Mount points of the drives.
         drives: Vec<PathBuf>,
     },
-    /// The board must be asked over a serial port before it is flashed, and the port cannot be used.
+    /// The board must be asked over a serial port before it is flashed, but the port cannot be used.
     #[error("the board has to be asked over {port} before it is flashed: {source}")]
     NotAsked {
         /// The port.
@@ -105,7 +105,7 @@ pub enum FirmwareError {
         /// State of the controller.
         state: Code<ControllerState>,
     },
-    /// The controller on the line runs on a board for which the image is not built.
+    /// The controller on the line runs on another board than the board of the image.
     #[error("the controller at {port} runs on {runs}, and the image is for {board}")]
     OtherController {
         /// Port of the controller.
@@ -125,7 +125,7 @@ pub enum FirmwareError {
         /// Board of the image.
         board: String,
     },
-    /// The drive does not name its board.
+    /// The drive does not give its board.
     #[error("{}: the drive{} does not report its board; the image is for {board}", drive.display(), of_label(label))]
     UnnamedBoard {
         /// The drive.
@@ -135,7 +135,7 @@ pub enum FirmwareError {
         /// Board of the image.
         board: String,
     },
-    /// The image may use another core supply than the board is wired for.
+    /// The board may be wired for another core supply than the image needs.
     #[error("the image is for {board}, {}", as_supplied(board, runs))]
     Supply {
         /// Board of the image.
@@ -181,7 +181,7 @@ pub enum FirmwareError {
         /// Content of `FAIL.TXT`.
         text: String,
     },
-    /// The drive does not behave like a drive that has accepted an image.
+    /// The drive does not behave as after accepting an image.
     #[error("the image was copied, and {seen}{}", with_doubt(doubt))]
     NotTaken {
         /// Behaviour of the drive.
@@ -189,7 +189,7 @@ pub enum FirmwareError {
         /// Error that the system reported during the copying.
         doubt: Option<String>,
     },
-    /// Another program than the image runs.
+    /// The running program is not the image.
     #[error("the board does not run {}: {why}; it reports {runs}", path.display())]
     OtherProgram {
         /// The image.

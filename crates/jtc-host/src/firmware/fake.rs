@@ -17,13 +17,13 @@ use crate::port::{Port, PortError};
 /// Size of the program in an image, bytes.
 const PROGRAM: usize = 0x1000;
 
-/// Returns an image of a board, with a content that depends on `seed`; includes a program for the second core if the board has
-/// one.
+/// Returns an image of a board with a content that depends on `seed`. If the board has a second core, the image contains a
+/// program for it.
 pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     let mut bytes = vec![0; PROGRAM];
     bytes[0..4].copy_from_slice(&0x2001_2000u32.to_le_bytes());
     bytes[4..8].copy_from_slice(&0x0800_0601u32.to_le_bytes());
-    // Entry of an interrupt at the end of the program.
+    // Interrupt handler at the end of the program.
     bytes[20..24].copy_from_slice(&0x0800_0F05u32.to_le_bytes());
     let record = &mut bytes[0x400..0x460];
     record[..8].copy_from_slice(b"OPENJTC\0");
@@ -44,7 +44,7 @@ pub fn image_bytes(board: &str, seed: u8) -> Vec<u8> {
     bytes
 }
 
-/// Returns the report of a device with this image in flash; the CRC is computed bit by bit, as defined.
+/// Returns the flash report of a device with this image. The CRC is computed bit by bit, from its definition.
 pub fn program_of(image: &[u8]) -> Program {
     let bytes = &image[..PROGRAM];
     let mut register = u32::MAX;
@@ -75,7 +75,7 @@ pub fn catalogue(folder: &Path, boards: &[&str]) {
     fs::write(folder.join("firmware.json"), text).unwrap();
 }
 
-/// Processor and the content of its flash.
+/// Processor of a board, with the content of its flash.
 #[derive(Clone)]
 pub struct Board(Arc<Mutex<Flashed>>);
 
@@ -85,13 +85,13 @@ struct Flashed {
     program: Option<Program>,
     board: String,
     started: Instant,
-    /// Running time before the test began, ms.
+    /// Running time at the beginning of the test, ms.
     before_ms: u64,
     status: Status,
 }
 
 impl Board {
-    /// Creates a board that has run this image for an hour; the arm is configured and has no torque.
+    /// Creates a board that has run this image for an hour. The arm is configured and has no torque.
     pub fn running(board: &str, program: Option<Program>) -> Self {
         let mut status = Status { state: jtc_wire::ControllerState::Init.into(), ..Status::default() };
         status.joints.iter_mut().for_each(|joint| joint.state = jtc_wire::NodeState::READY);
@@ -105,7 +105,7 @@ impl Board {
         })))
     }
 
-    /// Changes the status that the board sends from now on.
+    /// Changes the status that the board sends from then on.
     pub fn set_status(&self, change: impl FnOnce(&mut Status)) {
         change(&mut self.0.lock().unwrap().status);
     }
@@ -115,7 +115,7 @@ impl Board {
         self.0.lock().unwrap().held = held;
     }
 
-    /// Like [`Board::hold`]; returns the program that ran until then, and its board name.
+    /// Like [`Board::hold`]. Returns the program that was running, and its board name.
     fn hold_with(&self, held: bool) -> (Option<Program>, String) {
         self.hold(held);
         let flashed = self.0.lock().unwrap();
@@ -145,7 +145,7 @@ impl Board {
         (!flashed.held).then_some(flashed.status)
     }
 
-    /// Returns a line to the board.
+    /// Returns a serial line to the board.
     pub fn port(&self) -> Box<dyn Port> {
         let board = self.clone();
         let mut next = Duration::ZERO;
@@ -176,9 +176,9 @@ impl Board {
 /// Reaction of an ST-LINK to a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Behaviour {
-    /// Writes the file into the flash; the drive vanishes and comes back.
+    /// Writes the file into the flash. The drive vanishes and comes back.
     Takes,
-    /// Like `Takes`, but leaves a part of the flash empty, as happens if the bytes arrive in another order.
+    /// Like `Takes`, but a part of the flash stays empty. This happens if the bytes arrive in another order.
     LeavesHole,
     /// Like `Takes`, but the previous program restarts before the ST-LINK stops it.
     StartsBeforeAnew,
@@ -209,12 +209,12 @@ impl StLink {
             let mut length = 0;
             while !end.load(Ordering::Relaxed) {
                 thread::sleep(Duration::from_millis(5));
-                // A device at this path has no end, and reading it would take all memory of the computer.
+                // If the path leads to a device such as `/dev/full`, reading it would never end and use all memory.
                 let file = at.join("openjtc.bin");
                 if !file.symlink_metadata().is_ok_and(|data| data.is_file()) {
                     continue;
                 }
-                // A file that still grows is not complete.
+                // A file that is still growing is not complete.
                 let Ok(bytes) = fs::read(&file) else { continue };
                 if Image::parse(&file, bytes.clone()).is_err() || bytes.len() != length {
                     length = bytes.len();
@@ -228,7 +228,7 @@ impl StLink {
         Self { _folder: folder, path, stop, thread: Some(thread) }
     }
 
-    /// Returns the drive as a program sees it.
+    /// Returns the drive in the form in which a program finds it.
     pub fn drive(&self) -> Drive {
         Drive::at(&self.path).unwrap()
     }
@@ -257,7 +257,7 @@ fn work(path: &Path, board: &Board, behaviour: &Behaviour, mut bytes: Vec<u8>) {
             if *behaviour == Behaviour::LeavesHole {
                 bytes[0x800..0xA00].fill(0);
             }
-            // The start must be later than the tolerance between the clocks.
+            // The start must be later than the tolerance for different clocks.
             thread::sleep(Duration::from_millis(400));
             if *behaviour == Behaviour::StartsBeforeAnew {
                 board.start_with(&name, before);

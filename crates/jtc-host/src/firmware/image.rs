@@ -1,4 +1,4 @@
-//! Flash image of a board: read from a file, and checked before it is used.
+//! Flash image of a board. It is read from a file and checked before it is used.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,21 +14,21 @@ use super::{Catalogue, FirmwareError};
 pub const FLASH: u32 = 0x0800_0000;
 /// Size of bank 1, which holds the program, in bytes.
 pub(super) const BANK1: usize = 1024 * 1024;
-/// Offset of the memory for the stored arm; an image must end before it.
+/// Offset of the memory for the stored arm. An image must end before this offset.
 pub(super) const STORED_ARM: usize = 0x1C_0000;
-/// Number of words in the vector table at the beginning of a program: stack, and entries of the core and of the chip's
-/// interrupts.
+/// Number of words in the vector table at the beginning of a program: the stack, and the entries of the core's and the
+/// chip's interrupts.
 const VECTORS: usize = 166;
 /// Value of erased flash.
 pub(super) const ERASED: u8 = 0xFF;
 
-/// Memories that can hold a stack: the tightly coupled memory and the memory on the AXI bus; first address, and first address
-/// after the end.
+/// Memories that can hold a stack: the tightly coupled memory and the memory on the AXI bus. Each has its first address and
+/// the first address after its end.
 const STACKS: [(u32, u32); 2] = [(0x2000_0000, 0x2002_0000), (0x2400_0000, 0x2408_0000)];
 
 static CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
-/// Record in the image that describes it.
+/// Record in the image with a description of the image.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Record {
     /// Version of the firmware.
@@ -45,7 +45,7 @@ impl Record {
     /// Offset of the record in the image.
     pub const OFFSET: usize = 0x400;
     const MAGIC: &[u8] = b"OPENJTC\0";
-    /// Size of the first version of the record, bytes; later versions are longer.
+    /// Size of the first version of the record, bytes. Later versions are longer.
     const LEN: usize = 96;
     /// Valid rates of a build, Bd.
     const RATES: std::ops::RangeInclusive<u32> = 9_600..=15_000_000;
@@ -86,13 +86,13 @@ impl std::fmt::Debug for Image {
 }
 
 impl Image {
-    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in its folder
-    /// lists the file, the content must match the catalogue.
+    /// Reads a binary or an ELF file, and checks that it is firmware for a board of this project. If a catalogue in the
+    /// same folder lists the file, the content must match it.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if it is not such firmware, and
-    /// [`FirmwareError::Damaged`].
+    /// [`FirmwareError::File`] if the file cannot be read, [`FirmwareError::NoImage`] if it is not firmware for these
+    /// boards, and [`FirmwareError::Damaged`] if it differs from the catalogue.
     pub fn read(path: &Path) -> Result<Self, FirmwareError> {
         let bytes = fs::read(path).map_err(|source| FirmwareError::File { path: path.to_owned(), source })?;
         let listed = Catalogue::lists(path, &bytes)?;
@@ -100,13 +100,13 @@ impl Image {
         Ok(if listed { image.listed() } else { image })
     }
 
-    /// Like [`Image::read`], from the content of the file at `path` and without a catalogue.
+    /// Like [`Image::read`], but with the content of the file at `path`, and without a catalogue.
     ///
     /// # Errors
     ///
     /// [`FirmwareError::NoImage`].
     pub fn parse(path: &Path, bytes: Vec<u8>) -> Result<Self, FirmwareError> {
-        // An ELF file contains the end of each of its parts.
+        // An ELF file contains the lengths of all its parts, so a cut is detected.
         let whole = elf::is_elf(&bytes);
         let flat = if whole { elf::flat(&bytes) } else { Ok(bytes) };
         let looked_at = flat.and_then(|bytes| Ok((examine(&bytes)?, bytes)));
@@ -115,13 +115,13 @@ impl Image {
         Ok(Self { path: path.to_owned(), bytes, record, whole })
     }
 
-    /// Marks the image as complete, because a catalogue lists its length and digest.
+    /// Marks the image as complete, because a catalogue contains its length and digest.
     pub(super) fn listed(self) -> Self {
         Self { whole: true, ..self }
     }
 
-    /// Returns `true` if the image is known to be complete, either by the file format or by a catalogue. For a binary file alone,
-    /// the check finds only some cuts.
+    /// Returns `true` if the image is known to be complete, because of the file format or a catalogue. In a binary file
+    /// alone, only some cuts are detected.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
@@ -131,7 +131,7 @@ impl Image {
         &self.path
     }
 
-    /// Returns the bytes that are written from [`FLASH`] on.
+    /// Returns the bytes that are written at [`FLASH`].
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -141,8 +141,8 @@ impl Image {
         &self.record
     }
 
-    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read must
-    /// be that of the image. After those bytes the image may contain only filler in bank 1.
+    /// Checks that the flash report of a device matches this image (J-67). The CRC over the bytes that the device has read
+    /// must equal the CRC of these bytes in the image. The rest of bank 1 in the image may contain only filler.
     ///
     /// # Errors
     ///
@@ -204,11 +204,11 @@ fn examine(bytes: &[u8]) -> Result<Record, String> {
     Ok(record)
 }
 
-/// Returns `true` if the program of the second core is present at the beginning of bank 2, including its first instructions.
+/// Returns `true` if the program of the second core is at the beginning of bank 2, with its first instructions.
 fn starts_second_core(bytes: &[u8]) -> bool {
     let bank2 = FLASH + BANK1 as u32;
     let reset = bytes.get(BANK1 + 4..BANK1 + 8).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    // Two instructions; the second one jumps back to the first.
+    // The program begins with two instructions; the second one jumps back to the first.
     reset.is_some_and(|reset| {
         reset % 2 == 1 && reset >= bank2 && (reset & !1) + 4 <= FLASH + bytes.len() as u32
     })
@@ -280,14 +280,14 @@ mod tests {
         let path = folder.path().join("nucleo-h743zi2.bin");
         fs::write(&path, image_bytes("nucleo-h743zi2", 7)).unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
-        // A catalogue of other files, or an invalid catalogue, says nothing about the file.
+        // A catalogue of other files and an invalid catalogue do not affect the file.
         catalogue(folder.path(), &["nucleo-h745zi-q"]);
         assert!(!Image::read(&path).unwrap().is_whole());
         fs::write(folder.path().join("firmware.json"), "{").unwrap();
         assert!(!Image::read(&path).unwrap().is_whole());
         catalogue(folder.path(), &["nucleo-h743zi2"]);
         assert!(Image::read(&path).unwrap().is_whole());
-        // Cuts the file at a place that the file itself does not reveal.
+        // Cuts the file at a place where the file itself does not show the cut.
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..0xFF0]).unwrap();
         assert!(parsed(bytes[..0xFF0].to_vec()).is_ok());
@@ -299,7 +299,7 @@ mod tests {
         let image = parsed(image_bytes("nucleo-h743zi2", 7)).unwrap();
         let program = program_of(image.bytes());
         assert_eq!(image.is_what_runs(program), Ok(()));
-        // The two words of the second core, far after the program, do not matter, and neither does filler in the gap.
+        // The two words of the second core, far after the program, and the filler in the gap are not compared.
         for gap in [0, 0xFF] {
             let mut longer = image.bytes().to_vec();
             longer.resize(BANK1, gap);
@@ -317,7 +317,7 @@ mod tests {
         assert!(image.is_what_runs(less).unwrap_err().contains("ends after"));
     }
 
-    /// The published check value of CRC-32/ISO-HDLC.
+    /// Compares with the published check value of CRC-32/ISO-HDLC.
     #[test]
     fn j67_the_crc_is_that_of_ethernet_and_zlib() {
         assert_eq!(CRC.checksum(b"123456789"), 0xCBF4_3926);

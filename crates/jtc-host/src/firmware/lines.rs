@@ -1,7 +1,8 @@
-//! Serial lines over which the controller of a board is asked before the board is flashed.
+//! Serial lines on which the controller of a board is asked before the board is flashed.
 //!
-//! Drive and serial port of an ST-LINK belong to the same USB device. So this port leads to the board that is flashed, and is
-//! always asked. The caller can name another port in addition, because the controller may be in use over its RS422 line.
+//! The drive and the serial port of an ST-LINK belong to the same USB device. So this port leads to the board that is
+//! flashed, and is always asked. The caller can give another port in addition, because the controller may be in use over
+//! its RS422 line.
 
 use std::fs;
 use std::path::PathBuf;
@@ -11,11 +12,11 @@ use super::{Drive, FirmwareError, Places};
 use crate::port::{Port, PortError};
 use crate::session::Session;
 
-/// Function that opens a serial port for this program alone.
+/// Function that opens a serial port exclusively for this program.
 pub type OpenLine<'a> = dyn FnMut(&str) -> Result<Box<dyn Port>, PortError> + 'a;
 
-/// Lines over which controllers are asked. While they are open, no other program and no agent can reach the controller through
-/// them.
+/// Lines on which controllers are asked. While they are open, neither another program nor an agent can reach a controller
+/// through them.
 pub struct Lines(Vec<Line>);
 
 struct Line {
@@ -25,12 +26,12 @@ struct Line {
 }
 
 impl Lines {
-    /// Opens the serial ports of the drive's own USB device, and the named port.
+    /// Opens the serial ports of the drive's own USB device, and the port `named` if there is one.
     ///
     /// # Errors
     ///
-    /// [`FirmwareError::NotAsked`] if a port of the drive's own device cannot be opened, or the named port is in use;
-    /// [`FirmwareError::Port`] if the named port cannot be opened for another reason.
+    /// [`FirmwareError::NotAsked`] if a port of the drive's own device cannot be opened, or the port `named` is in use;
+    /// [`FirmwareError::Port`] if the port `named` cannot be opened for another reason.
     pub fn open(
         places: &Places,
         drive: &Drive,
@@ -54,7 +55,7 @@ impl Lines {
         Ok(Self(lines))
     }
 
-    /// Returns the present report on each line.
+    /// Returns the current report on each line.
     ///
     /// # Errors
     ///
@@ -70,8 +71,8 @@ impl Lines {
         Ok(Before { lines: self.0.iter_mut().map(ask).collect::<Result<_, FirmwareError>>()? })
     }
 
-    /// Returns the line over which the board verifies its program: its own line, or else the named one. The second value is
-    /// `true` if the line belongs to the drive's device.
+    /// Returns the serial line on which the new program is verified: the line of the board itself, or, if it has none, the
+    /// line that the user gave. The second value is `true` if the line belongs to the drive's USB device.
     pub fn proving(&self) -> Option<(&str, Option<bool>)> {
         self.0.first().map(|line| (line.port.as_str(), line.same_device))
     }
@@ -81,7 +82,7 @@ fn not_asked(port: &str, source: PortError) -> FirmwareError {
     FirmwareError::NotAsked { port: port.to_owned(), source }
 }
 
-/// Returns the device node to which a name leads.
+/// Returns the device node to which a port name leads, through symbolic links.
 fn real(port: &str) -> PathBuf {
     fs::canonicalize(port).unwrap_or_else(|_| port.into())
 }

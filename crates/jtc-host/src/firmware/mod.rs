@@ -1,11 +1,11 @@
-//! Firmware images of the controller's boards: content of a file, writing to a board through the drive of its ST-LINK, and
-//! verification that the running program is that file (J-67).
+//! Firmware images of the controller's boards: reading a file, writing it to a board through the drive of the ST-LINK, and
+//! verifying that the board runs it (J-67).
 //!
-//! The debugger on a Nucleo board shows a *drive* on USB. The ST-LINK writes a binary file that is copied there to the flash of
-//! the processor, from the first byte of the flash on, and then resets the processor. The drive is not a real memory: it shows
-//! two small files about itself, and `FAIL.TXT` after a failure. A missing `FAIL.TXT` is not a verification: if the bytes arrive
-//! in an unexpected order, parts of the flash stay empty without a report. So the controller itself must report its flash over
-//! its serial line.
+//! The debugger on a Nucleo board presents a *drive* on USB. If a binary file is copied to the drive, the ST-LINK writes it
+//! to the flash of the processor, beginning at the first byte, and then resets the processor. The drive is not a real
+//! memory. It contains two small files about itself, and `FAIL.TXT` after a failure. A missing `FAIL.TXT` does not prove
+//! success: if the bytes arrive in an unexpected order, parts of the flash stay empty without a report. So the controller
+//! itself must report the content of its flash over its serial line.
 //!
 //! The order of a flash is [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
 //! [`prove`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated

@@ -1,11 +1,11 @@
-//! Mount points of the drives of boards, and serial ports on the same USB device.
+//! Mount points of the drives of boards, and the serial ports on the same USB devices.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{Drive, FirmwareError, UsbDevice};
 
-/// Places of the operating system in which drives and ports are searched.
+/// Locations where the operating system lists drives and ports.
 #[derive(Clone, Debug)]
 pub struct Places {
     /// Mount table in the format of Linux.
@@ -21,7 +21,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// Returns the places of this computer.
+    /// Returns the locations on this computer.
     pub fn of_system() -> Self {
         let mut folders: Vec<PathBuf> = vec!["/Volumes".into()];
         if cfg!(windows) {
@@ -53,7 +53,7 @@ impl Places {
         drives
     }
 
-    /// Returns the drive at a named folder, with the system's knowledge of the drive.
+    /// Returns the drive at a given folder, with what the operating system knows about it.
     ///
     /// # Errors
     ///
@@ -68,7 +68,7 @@ impl Places {
         })
     }
 
-    /// Checks that the drive is still present and was not replaced by another one.
+    /// Checks that the drive is still present and that it was not replaced by another one.
     ///
     /// # Errors
     ///
@@ -82,8 +82,8 @@ impl Places {
         Err(FirmwareError::Changed { what: format!("{}: {what}", drive.path.display()) })
     }
 
-    /// Returns the drive in its present state: at its path, or in another folder if the drive was replugged and its USB device is
-    /// known.
+    /// Returns the current state of the drive. It is found at its path. If its USB device is known, it is also found in
+    /// another folder after it was plugged in again.
     pub fn again(&self, drive: &Drive) -> Option<Drive> {
         let connector = |found: &Drive| found.usb.as_ref().map(|usb| usb.folder.clone());
         let own = connector(drive);
@@ -100,8 +100,8 @@ impl Places {
         drive.of_system(device, label, usb)
     }
 
-    /// Returns devices and mount points of file systems that such a drive can have. Only the last of
-    /// several mounts at one place is visible.
+    /// Returns devices and mount points of file systems of the types that such a drive can have. If several are mounted at
+    /// one place, only the last one is visible.
     fn mounted(&self) -> Vec<(PathBuf, PathBuf)> {
         let table = fs::read(&self.mounts).unwrap_or_default();
         let mount = |line: &[u8]| {
@@ -131,8 +131,8 @@ impl Places {
         links.into_iter().find_map(label)
     }
 
-    /// Returns the names of the serial ports that belong to the drive's USB device, so to its own board. Empty if the system does
-    /// not know; Linux does.
+    /// Returns the names of the serial ports on the drive's USB device, and so on its board. The list is empty if the
+    /// operating system does not report the USB devices. Linux does.
     pub fn ports_of(&self, drive: &Drive) -> Vec<String> {
         let Some(usb) = &drive.usb else { return Vec::new() };
         let entries = fs::read_dir(self.classes.join("tty")).into_iter().flatten().flatten();
@@ -143,8 +143,8 @@ impl Places {
         ports
     }
 
-    /// Returns `true` if a serial port and a drive belong to one USB device, so to one board. `None` if the system does not know;
-    /// Linux does.
+    /// Returns `true` if a serial port and a drive belong to one USB device, and so to one board. Returns `None` if the
+    /// operating system does not report the USB devices. Linux does.
     pub fn same_usb_device(&self, port: &str, drive: &Drive) -> Option<bool> {
         let of_port = self.usb_device("tty", Path::new(port))?;
         Some(of_port.folder == drive.usb.as_ref()?.folder)
@@ -154,7 +154,7 @@ impl Places {
     fn usb_device(&self, class: &str, node: &Path) -> Option<UsbDevice> {
         let node = fs::canonicalize(node).unwrap_or_else(|_| node.to_owned());
         let mut folder = fs::canonicalize(self.classes.join(class).join(node.file_name()?)).ok()?;
-        // The USB device is the folder with the vendor id.
+        // The USB device is the folder that has a vendor id.
         while !folder.join("idVendor").exists() {
             folder = folder.parent()?.to_owned();
         }
@@ -163,7 +163,7 @@ impl Places {
     }
 }
 
-/// Decodes the bytes of a path from the mount table: `\040` is a blank.
+/// Decodes the bytes of a path in the mount table. `\040` is a space.
 fn unescaped(text: &[u8]) -> Vec<u8> {
     let mut plain = Vec::new();
     let mut rest = text;
@@ -183,14 +183,14 @@ fn unescaped(text: &[u8]) -> Vec<u8> {
     plain
 }
 
-/// Returns a path of these bytes, whether or not they are valid text.
+/// Returns a path with these bytes. They need not be valid text.
 #[cfg(unix)]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     use std::os::unix::ffi::OsStringExt as _;
     Some(std::ffi::OsString::from_vec(bytes).into())
 }
 
-/// Returns a path of these bytes if they are valid text.
+/// Returns a path with these bytes if they are valid text.
 #[cfg(not(unix))]
 fn path_of(bytes: Vec<u8>) -> Option<PathBuf> {
     String::from_utf8(bytes).ok().map(Into::into)
@@ -205,7 +205,7 @@ mod tests {
     use super::super::Fit;
     use super::*;
 
-    /// Two boards on USB, each with a drive and a serial port, and the places of a system with them.
+    /// Two boards on USB, each with a drive and a serial port, and the locations of a system that has them.
     struct Desk {
         folder: tempfile::TempDir,
         places: Places,
@@ -246,7 +246,7 @@ mod tests {
             self.folder.path().join(name)
         }
 
-        /// Creates a drive at a folder of this name.
+        /// Creates a drive in a folder of this name.
         fn mount(&mut self, device: &str, name: &[u8], kind: &str) -> PathBuf {
             let path = self.folder.path().join(OsStr::from_bytes(name));
             fs::create_dir_all(&path).unwrap();
@@ -282,7 +282,7 @@ mod tests {
             found,
             [(one.clone(), Some("NOD_H745ZIQ")), (desk.at("more/NOD_H743ZI2"), Some("NOD_H743ZI2"))]
         );
-        // A named drive is the same drive, with the label of its device.
+        // The drive at a given path is the same drive, with the label of its device.
         let named = desk.places.at(&one).unwrap();
         assert_eq!((&named, named.fit("nucleo-h745zi-q")), (&drives[0], Fit::Same));
         assert_eq!(desk.places.at(&other).unwrap().label.as_deref(), Some("usb"));
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn the_name_of_a_folder_is_no_label_where_the_device_is_known() {
         let mut desk = Desk::new();
-        // The second NUCLEO-H743ZI at a desk: its folder has the label of the first board with an appended digit.
+        // The second NUCLEO-H743ZI of a computer. Its folder has the label of the first board with a digit appended.
         let path = desk.mount("dev/sdb", b"NODE_H743ZI2", "vfat");
         let drive = desk.places.at(&path).unwrap();
         assert_eq!((drive.label.as_deref(), drive.fit("nucleo-h743zi2")), (None, Fit::Unknown));
@@ -332,7 +332,7 @@ mod tests {
         let drive = desk.places.at(&path).unwrap();
         let again = |desk: &Desk| desk.places.again(&drive).map(|found| found.path);
         assert_eq!(again(&desk), Some(path));
-        // The device was removed, but the system still has the drive mounted.
+        // The device was removed, but the drive is still mounted.
         fs::remove_file(desk.at("class/block/sda")).unwrap();
         assert_eq!(again(&desk), None);
         let elsewhere = desk.mount("dev/sdd", b"one1", "vfat");

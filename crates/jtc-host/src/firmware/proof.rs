@@ -1,5 +1,4 @@
-//! Verification after an image was copied to a drive: the report of the drive, and the report of the running program about its
-//! flash.
+//! Verification after an image was copied to a drive: the report of the drive, and the flash report of the running program.
 
 use std::fmt;
 use std::thread::sleep;
@@ -12,14 +11,14 @@ use crate::error::LinkError;
 use crate::port::{Port, PortError};
 use crate::session::{Session, Timeouts};
 
-/// Time after its start within which a device has read its flash (J-67).
+/// Time after its start in which a device reads its flash (J-67).
 const READ_WITHIN: Duration = Duration::from_secs(3);
-/// Tolerance between two clocks: a relative difference, and the delay until a start is observed.
+/// Tolerance between two clocks: a relative difference, and a delay until the start is observed.
 const CLOCKS_DIFFER: (f64, Duration) = (0.1, Duration::from_millis(250));
 
-/// Time after the copying in which another program may still run: the previous program, which the ST-LINK stops only then.
+/// Time after the copying in which the previous program may still run, until the ST-LINK stops it.
 const OTHER_STOPS: Duration = Duration::from_secs(10);
-/// Longest wait for a controller to read its flash, by the clock of the line.
+/// Longest wait for a controller to read its flash, on the clock of the line.
 const READS_NOW: Duration = Duration::from_secs(5);
 
 /// Waiting times.
@@ -32,8 +31,8 @@ pub struct Limits {
 }
 
 impl Default for Limits {
-    /// Returns 120 s and 250 ms: the ST-LINK needs half a minute for a megabyte, and a system needs some more seconds to mount a
-    /// drive.
+    /// Returns 120 s and 250 ms. The ST-LINK needs half a minute for a megabyte, and an operating system needs some more
+    /// seconds to mount a drive.
     fn default() -> Self {
         Self { wait: Duration::from_secs(120), pause: Duration::from_millis(250) }
     }
@@ -46,9 +45,9 @@ pub type OpenPort<'a> = dyn FnMut() -> Result<Box<dyn Port>, PortError> + 'a;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DriveAfter {
-    /// The drive vanished and came back, as after an accepted image.
+    /// The drive vanished and came back, which is normal after an accepted image.
     CameBack,
-    /// The drive vanished and has not come back, as on a system that does not mount drives automatically.
+    /// The drive vanished and has not come back. This happens on a system that does not mount drives automatically.
     Gone,
     /// The drive was present all the time.
     Stayed,
@@ -64,7 +63,7 @@ impl fmt::Display for DriveAfter {
     }
 }
 
-/// Controller that has proved that it runs the image.
+/// Result of the verification that a controller runs the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Proof {
     /// Identity of the controller.
@@ -84,7 +83,7 @@ impl Proof {
     }
 }
 
-/// Observes a drive repeatedly.
+/// Observes a drive again and again.
 struct Watch<'a> {
     places: &'a Places,
     drive: &'a Drive,
@@ -104,7 +103,7 @@ impl Watch<'_> {
             (Some(_), _) => DriveAfter::CameBack,
         };
         let Some(now) = now else { return Ok(()) };
-        // A previous report, which the drive shows until it vanishes, is not about this image.
+        // The drive shows an old report until it vanishes. Such a report is not about this image.
         let stale = |text: &String| {
             self.seen == DriveAfter::Stayed && self.written.failure_before.as_ref() == Some(text)
         };
@@ -115,13 +114,13 @@ impl Watch<'_> {
     }
 }
 
-/// Waits until the drive has come back, or until the time limit; for boards without a serial line. The result is not a
-/// verification.
+/// Waits until the drive has come back, or until the time limit. Used for boards without a serial line. The result does not
+/// prove that the image runs.
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not vanished, or has not come back and the system
-/// could not confirm that all bytes were written.
+/// [`FirmwareError::Refused`]; [`FirmwareError::NotTaken`] if the drive has not vanished, or if it has not come back and
+/// the operating system could not confirm that all bytes were written.
 pub fn wait_for_drive(
     places: &Places,
     drive: &Drive,
@@ -139,7 +138,7 @@ pub fn wait_for_drive(
     let (seen, doubt) = (watch.seen, written.doubt.clone());
     match seen {
         DriveAfter::CameBack => Ok(seen),
-        // On a system without automatic mounting the drive does not come back.
+        // On a system that does not mount drives automatically, the drive does not come back.
         DriveAfter::Gone if doubt.is_none() => Ok(seen),
         DriveAfter::Gone | DriveAfter::Stayed => Err(FirmwareError::NotTaken { seen, doubt }),
     }
@@ -149,9 +148,9 @@ pub fn wait_for_drive(
 ///
 /// # Errors
 ///
-/// [`FirmwareError::Refused`] by the drive, [`FirmwareError::OtherProgram`] if another program runs,
-/// [`FirmwareError::NotReported`] if the program does not report its flash, [`FirmwareError::NotStarted`] if no program started
-/// in time.
+/// [`FirmwareError::Refused`] if the drive reports a failure, [`FirmwareError::OtherProgram`] if another program runs,
+/// [`FirmwareError::NotReported`] if the program does not report its flash, [`FirmwareError::NotStarted`] if no program
+/// started in time.
 pub fn prove(
     places: &Places,
     image: &Image,
@@ -170,7 +169,7 @@ pub fn prove(
             Ok(Some(info)) if still_reads(&info) => "it still reads its flash".into(),
             Ok(Some(info)) => match compare(image, &info) {
                 Ok(program) => {
-                    // The drive may have come back in the meantime, with a report.
+                    // The drive may have come back in the meantime, and it may contain a report.
                     watch.look()?;
                     return Ok(Proof { info, program, drive: watch.seen, took: written.began.elapsed() });
                 }
@@ -188,8 +187,8 @@ pub fn prove(
     }
 }
 
-/// Returns `true` if the running program is final. Before the ST-LINK begins to write, and after a reset alone, the previous
-/// program restarts.
+/// Returns `true` if the running program will not be replaced any more. The previous program restarts before the ST-LINK
+/// begins to write, and after a reset without a write.
 fn settled(watch: &Watch<'_>, limits: Limits) -> bool {
     let written = watch.written;
     watch.seen == DriveAfter::CameBack
@@ -203,13 +202,13 @@ fn started_since(info: &Info, time: Duration) -> bool {
     Duration::from_millis(info.uptime_ms) + time.mul_f64(share) + late < time
 }
 
-/// Returns `true` if the device has started a moment ago, and may still report its flash.
+/// Returns `true` if the device has just started and may still be reading its flash.
 fn still_reads(info: &Info) -> bool {
     info.program.is_none() && Duration::from_millis(info.uptime_ms) < READ_WITHIN
 }
 
-/// Returns the identity of the controller after it has read its flash, or after five seconds; `None` for a device without
-/// extensions.
+/// Returns the identity of the controller after it has read its flash, at the latest after five seconds. Returns `None` for
+/// a device without extensions.
 ///
 /// # Errors
 ///
@@ -224,7 +223,7 @@ pub fn info_with_program<P: Port>(session: &mut Session<P>) -> Result<Option<Inf
     }
 }
 
-/// Returns the identity of the controller, with short timeouts because the caller repeats the request.
+/// Returns the identity of the controller. The timeouts are short, because the caller repeats the request.
 fn ask(port: Box<dyn Port>, limits: Limits) -> Result<Option<Info>, LinkError> {
     let mut session = Session::new(port);
     session.timeouts = Timeouts { status: limits.pause * 4, confirmation: limits.pause * 2, tries: 2 };
@@ -258,7 +257,7 @@ mod tests {
         let since = |uptime_ms, time_s| {
             started_since(&Info { uptime_ms, ..Info::default() }, Duration::from_secs_f64(time_s))
         };
-        // The device had just started when the copying began, and its clock is 5 % slow.
+        // The device started just before the copying began, and its clock is 5 % slow.
         assert!(!since(50 + 9_500, 10.0) && !since(10, 0.2) && !since(3_600_000, 10.0));
         assert!(since(1_000, 10.0) && since(0, 0.4));
     }

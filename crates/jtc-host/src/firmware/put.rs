@@ -8,34 +8,35 @@ use std::time::Instant;
 use super::drive::volume;
 use super::{Drive, FirmwareError, Image};
 
-/// Name of the file on the drive. The file does not last, because the ST-LINK consumes its bytes as they arrive.
+/// Name of the file on the drive. The ST-LINK consumes the bytes when they arrive, so the file does not remain.
 const FILE: &str = "openjtc.bin";
-/// Number of bytes per write, so that the progress can be shown. The system decides in which order the bytes reach the drive. A
-/// flush after each piece would write the length of a partial file into the directory, and the ST-LINK may take that part for the
-/// whole file. The flash report of the program reveals damage from another order.
+/// Number of bytes per write. Small writes make it possible to show the progress. The operating system decides in which
+/// order the bytes reach the drive. A flush after each write would also write the length of a partial file into the
+/// directory, and the ST-LINK might consider that part the whole file. The flash report of the program reveals damage from
+/// a wrong order.
 const PIECE: usize = 32 * 1024;
 
-/// Image that was handed over to the drive.
+/// Image that was passed to the drive.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// Time when the copying began; a controller that started before runs the previous program.
+    /// Time when the copying began. A controller that started before this time runs the previous program.
     pub began: Instant,
-    /// Time when this computer had handed over all bytes.
+    /// Time when this computer had passed on all bytes.
     pub ended: Instant,
     /// Content of `FAIL.TXT` before the copying.
     pub failure_before: Option<String>,
-    /// Reason why the system could not confirm that all bytes were written. The drive vanishes after the last byte, and some
-    /// systems report that as an error; the content of the flash shows the truth.
+    /// Reason why the operating system could not confirm that all bytes were written. The drive vanishes after the last
+    /// byte, and some systems report this as an error. Only the content of the flash shows if the write succeeded.
     pub doubt: Option<String>,
 }
 
-/// Copies the image to the drive; `progress` receives the number of bytes so far. If the drive was removed in the meantime and
-/// its folder is on this computer's own disk, no byte is written.
+/// Copies the image to the drive. `progress` receives the number of bytes so far. Writes nothing if the drive was removed
+/// in the meantime, so that its folder is on a disk of this computer.
 ///
 /// # Errors
 ///
 /// [`FirmwareError::Changed`] and [`FirmwareError::NotOpened`]: no byte was written. [`FirmwareError::DriveFull`] and
-/// [`FirmwareError::NotWritten`]: the board has the previous program, or a part of one.
+/// [`FirmwareError::NotWritten`]: the board has the previous program, or only a part of one.
 pub fn put(drive: &Drive, image: &Image, progress: &mut dyn FnMut(usize)) -> Result<Written, FirmwareError> {
     let failure_before = drive.failure();
     let path = drive.path.join(FILE);
@@ -67,7 +68,7 @@ pub fn put(drive: &Drive, image: &Image, progress: &mut dyn FnMut(usize)) -> Res
     Ok(Written { began, ended: Instant::now(), failure_before, doubt })
 }
 
-/// Opens the new file on the drive, and never on another file system.
+/// Creates the file on the drive. It is never created on another file system.
 fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let gone = || FirmwareError::Changed { what: format!("{}: the drive has gone", drive.path.display()) };
     let is_drive = |found: &fs::Metadata| drive.volume.is_none() || volume(found) == drive.volume;
@@ -77,12 +78,12 @@ fn open(drive: &Drive, path: &Path) -> Result<File, FirmwareError> {
     let not_opened =
         |source| FirmwareError::NotOpened { path: path.to_owned(), device: drive.device.clone(), source };
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(path).map_err(not_opened)?;
-    // The drive may have been removed in between. From here on the open file keeps its file system.
+    // The drive may have been removed since the first check. The open file cannot move to another file system.
     if file.metadata().is_ok_and(|found| !found.is_file() || is_drive(&found)) {
         return Ok(file);
     }
     drop(file);
-    // The file is empty, and on a disk of this computer.
+    // The file is empty and on a disk of this computer.
     let _ = fs::remove_file(path);
     Err(gone())
 }

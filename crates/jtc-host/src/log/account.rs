@@ -1,4 +1,4 @@
-//! A replayed log with its timeline and the recording made from it.
+//! A replayed log with its timeline and the recording that is made from it.
 
 use std::io::{Seek, Write};
 use std::path::Path;
@@ -19,13 +19,13 @@ pub struct Account {
     pub story: Story,
     /// Header of the recording.
     pub info: RecordingInfo,
-    /// First error with its consequences; `None` if the log contains no error.
+    /// First error with its consequences. `None` if the log contains no error.
     pub failure: Option<RunFailure>,
 }
 
 impl Account {
-    /// Replays a log. `other` is the arm of the log, with its image, if this arm differs from the one stored with the
-    /// log. `source` is the location that the log was read from.
+    /// Replays a log. `other` is an arm with its image. It is used instead of the arm that is stored with the log. `source`
+    /// is the location from which the log was read.
     pub fn of(log: FlightLog, other: Option<(Arm, Vec<u8>)>, source: &str) -> Self {
         let (arm, image) = other.unzip();
         let replayed = log.replay(image.as_deref());
@@ -45,7 +45,7 @@ impl Account {
         Self { log, replayed, story, info, failure }
     }
 
-    /// Writes the recording, including the log, as MCAP; error messages use `path` as its name.
+    /// Writes the recording with the log as MCAP. Error messages use `path` as its name.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! A log as bytes. A recording carries these bytes, so that the log can be replayed from the file.
+//! Encoding of a log as bytes. A recording contains these bytes, so the log can be replayed from the file.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ mod part {
     pub const DEVICE: u8 = 7;
 }
 
-/// Reason why a file yields no log.
+/// Reason why no log can be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum LogFileError {
     /// The file cannot be read or is not a recording.
@@ -81,7 +81,7 @@ impl FlightLog {
         log.ok_or_else(|| LogFileError::NoLog { path: path.to_owned() })
     }
 
-    /// Decodes a log; skips parts that a later version added. Returns `None` if the bytes are not a valid log.
+    /// Decodes a log. Skips parts that a later version has added. Returns `None` if the bytes are not a valid log.
     pub fn from_bytes(bytes: &[u8]) -> Option<Self> {
         let mut rest = bytes.strip_prefix(MAGIC)?;
         let mut log = Self::default();

@@ -1,9 +1,8 @@
 //! The flight recorder's log: fetched from a device, stored in a file, and replayed through the controller (J-56).
 //!
-//! [`FlightLog`] is the answer of a device: the blocks of its log, the active arm, and the trajectory points that the
-//! log needs. [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the
-//! ticks that are known to match the original bit for bit. [`Story`] lists the events in order, with the first error at
-//! the top.
+//! [`FlightLog`] contains the data from a device: the blocks of its log, the active arm, and the trajectory points that the
+//! log needs. [`FlightLog::replay`] returns every tick with all values that the controller computed, and marks the ticks
+//! that are known to match the original bit for bit. [`Story`] lists the events in order, with the first error at the top.
 
 mod account;
 mod container;
@@ -18,7 +17,7 @@ pub use story::{Event, Story};
 use jtc_core::recorder::{BLOCK_WORDS, Block, Log, Record};
 use jtc_wire::{LogState, RawPoint};
 
-/// Maximum distance from a snapshot to the next, in ticks.
+/// Maximum distance between two snapshots, in ticks.
 const SPAN_MS: f64 = 1_100.0;
 
 /// Flight recorder data that a device returned.
@@ -30,7 +29,7 @@ pub struct FlightLog {
     pub blocks: Vec<Block>,
     /// Active arm at the time of the fetch: a [`jtc_wire::ArmImage`].
     pub arm: Vec<u8>,
-    /// Index in the trajectory of the first of these points.
+    /// Index of the first of these points in the trajectory.
     pub first_point: usize,
     /// Points of the trajectory that the log needs.
     pub points: Vec<RawPoint>,
@@ -51,8 +50,8 @@ impl FlightLog {
         self.log().next().is_none()
     }
 
-    /// Returns the points of the trajectory in the device's memory (with this hash) that the log needs: index of the
-    /// first, and number. Returns `None` if the log contains no motion along this trajectory.
+    /// Returns the points that the log needs from the trajectory with this hash, as the index of the first point and a
+    /// number. Returns `None` if the log contains no motion along this trajectory.
     pub fn needed_points(&self, hash: u32, total: usize) -> Option<(usize, usize)> {
         let mut needed: Option<(f64, f64)> = None;
         let mut need = |from: f64, to: f64| {
@@ -83,13 +82,13 @@ impl FlightLog {
         }
         let (low, high) = needed?;
         let first = (low.max(0.0) as usize).saturating_sub(1).min(total);
-        // Times after the end use the last point.
+        // For times after the end the last point is used.
         let end = ((high as usize).saturating_add(3)).min(total);
         (end > first).then_some((first, end - first))
     }
 }
 
-/// Splits bytes of log pages into blocks; drops an incomplete block at the end.
+/// Splits the bytes of log pages into blocks. Drops an incomplete block at the end.
 pub(crate) fn blocks_of(bytes: &[u8]) -> Vec<Block> {
     let words = bytes.as_chunks::<4>().0;
     words.as_chunks::<BLOCK_WORDS>().0.iter().map(|block| block.map(u32::from_le_bytes)).collect()

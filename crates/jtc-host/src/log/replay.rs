@@ -17,9 +17,10 @@ pub enum Worth {
     Same,
     /// The original controller computed different outputs.
     Differs,
-    /// Computed with an input missing: the values may differ from the original until the next snapshot. Measured values are correct.
+    /// Computed while an input was missing. The values may differ from the original until the next snapshot. Measured
+    /// values are correct.
     Unsure,
-    /// Not computed, because the arm or the trajectory of that time is missing: only the measured values are present.
+    /// Not computed, because the arm or the trajectory of that time is missing. Only the measured values are present.
     Measured,
 }
 
@@ -30,11 +31,12 @@ pub struct Tick {
     pub tick: u64,
     /// Starts of the device.
     pub boots: u32,
-    /// Values; their time is that of `tick`.
+    /// Values at the time of `tick`.
     pub sample: Sample,
-    /// Status that the controller would have reported, with the errors of the drives, as far as computed.
+    /// Status that the controller would have reported, with the errors of the drives. Fields that were not computed have
+    /// their defaults.
     pub status: Status,
-    /// Inputs of the tick; `None` for the state at a snapshot.
+    /// Inputs of the tick. `None` for the state in a snapshot.
     pub inputs: Option<RecordedInputs>,
     /// Reliability of the tick.
     pub worth: Worth,
@@ -56,7 +58,7 @@ pub struct Difference {
     pub tick: u64,
     /// State of the controller in the replay.
     pub state: &'static str,
-    /// Outputs of the replay that the log does not contain.
+    /// Outputs of the replay that differ from the log.
     pub replayed: String,
 }
 
@@ -65,15 +67,15 @@ pub struct Difference {
 pub struct Replayed {
     /// Ticks in order.
     pub ticks: Vec<Tick>,
-    /// Configuration of a controller with the arm of the log.
+    /// Configuration of a controller that has the arm of the log.
     pub config: Option<Box<Config>>,
     /// Number of ticks that are known to match the original.
     pub same: usize,
     /// First tick that differs from the original.
     pub difference: Option<Difference>,
-    /// Number of ticks that were computed with an input missing.
+    /// Number of ticks that were computed while an input was missing.
     pub unsure: usize,
-    /// Number of ticks recorded with an arm other than the available one.
+    /// Number of ticks that were recorded with another arm than the available one.
     pub other_arm: usize,
     /// Number of ticks along a trajectory that is not available.
     pub other_points: usize,
@@ -81,7 +83,7 @@ pub struct Replayed {
     pub gaps: Vec<Gap>,
     /// Hashes of arms in the log other than the available one.
     pub arms: Vec<u64>,
-    /// `true` if the log contains a state that no controller reaches; the replay ends there.
+    /// `true` if the log contains a state that no controller can reach. The replay ends there.
     pub broken: bool,
 }
 
@@ -94,7 +96,7 @@ impl FlightLog {
         controller
     }
 
-    /// Replays the log through the controller; `arm` is the image of an arm that replaces the one stored with the log.
+    /// Replays the log through the controller. `arm` is the image of an arm that is used instead of the arm in the log.
     pub fn replay(&self, arm: Option<&[u8]>) -> Replayed {
         let controller = self.controller(arm.unwrap_or(&self.arm));
         let points = (!self.points.is_empty()).then_some(self.points_hash);
@@ -102,7 +104,7 @@ impl FlightLog {
             Replayed { config: Some(Box::new(controller.config().clone())), ..Replayed::default() };
         let mut replay = Replay::new(self.log(), controller, points);
         let own = replay.arm();
-        // A forged file may contain a state that no controller reaches: its replay ends there.
+        // A forged file may contain a state that no controller can reach. The replay ends there.
         let all = std::panic::AssertUnwindSafe(|| {
             while let Some(step) = replay.next() {
                 let tick = tick(&step, &replay);
@@ -176,7 +178,7 @@ fn tick(step: &Step, replay: &Replay<'_, Vec<RawPoint>>) -> Tick {
     Tick { tick: step.telemetry.tick, boots: step.boots, sample, status, inputs: step.inputs, worth }
 }
 
-/// Returns the values that the drives' answers contain.
+/// Returns the values that come from the answers of the drives.
 fn measured(sample: &Sample, inputs: Option<&RecordedInputs>, config: &Config) -> Sample {
     let mut joints = [JointSample::UNKNOWN; JOINTS];
     let scale = Scale { velocity: config.velocity_full_scale };

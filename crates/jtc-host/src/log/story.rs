@@ -33,7 +33,7 @@ pub struct Event {
 pub struct Story {
     /// Events in order.
     pub events: Vec<Event>,
-    /// Index of the first error in the events; `None` in a log without an error.
+    /// Index of the first error in `events`. `None` if the log contains no error.
     pub first: Option<usize>,
 }
 
@@ -67,7 +67,7 @@ impl Story {
         Some(RunFailure::in_log(info, samples, first.time_s, causes, first.joints.first().copied()))
     }
 
-    /// Returns the first error and the events after it, each with its delay; then the events before it.
+    /// Returns the first error and the events after it, each with its delay. The events before the error follow.
     pub fn lines(&self) -> Vec<String> {
         let Some(first) = self.first else {
             return self
@@ -81,7 +81,7 @@ impl Story {
         for event in &self.events[first + 1..] {
             lines.push(format!("{}: {}", after(event.tick - at.tick), event.text));
         }
-        // Nearest event first, limited to a readable number.
+        // The nearest event comes first. The number of events is limited.
         let near = |event: &&Event| at.tick - event.tick <= BEFORE_MS;
         let before: Vec<&Event> = self.events[..first].iter().rev().take_while(near).take(BEFORE).collect();
         if !before.is_empty() {
@@ -94,7 +94,7 @@ impl Story {
     }
 }
 
-/// Time window before an error, ms, and maximum number of events listed from it.
+/// Time window before an error, ms, and the maximum number of events that are listed from this window.
 const BEFORE_MS: u64 = 3_000;
 const BEFORE: usize = 20;
 
@@ -118,17 +118,17 @@ fn names(joints: &[Joint]) -> String {
     }
 }
 
-/// Time within which consecutive frames of the same type are one event, ms.
+/// Consecutive frames of the same type within this time are one event, ms.
 const SAME_MS: u64 = 50;
-/// Ticks without an answer of a joint until the silence becomes an event.
+/// Number of ticks without an answer after which a silent joint becomes an event.
 const SILENT: u32 = 3;
 
 struct Narrator<'a> {
     config: Option<&'a Config>,
     events: &'a mut Vec<Event>,
-    /// Ticks for which each joint has not answered.
+    /// Number of ticks for which each joint has not answered.
     silent: [u32; 6],
-    /// Last frame of a host and its tick.
+    /// Last frame from a host, and its tick.
     sent: Option<(FrameType, u64)>,
 }
 
@@ -138,7 +138,7 @@ impl Narrator<'_> {
         self.events.push(Event { tick: tick.tick, time_s, text: text.into(), error, joints: Vec::new() });
     }
 
-    /// Adds an event of a joint; identical events of several joints in a tick are merged.
+    /// Adds an event of a joint. If several joints have the same event in one tick, they share it.
     fn push_joint(&mut self, tick: &Tick, error: bool, joint: Joint, text: impl Into<String>) {
         let text = text.into();
         let same =
@@ -154,8 +154,8 @@ impl Narrator<'_> {
         }
     }
 
-    /// Adds an event for a frame of a host. The execution of a long frame takes several ticks, and frames of the same
-    /// type often follow each other.
+    /// Adds an event for a frame from a host. A long frame is executed over several ticks, and frames of the same type
+    /// often follow each other, so such frames share one event.
     fn host_sends(&mut self, tick: &Tick, kind: FrameType) {
         let before = self.sent.replace((kind, tick.tick));
         let goes_on = before.is_some_and(|(last, at)| last == kind && tick.tick - at <= SAME_MS);
@@ -227,7 +227,7 @@ impl Narrator<'_> {
                     self.push(tick, false, format!("a bad frame of a host: {}", words::frame_status(status)));
                 }
                 (RecordedKind::Noise(_), _) | (_, None) => {}
-                // Requests that change nothing are not events.
+                // A request that changes nothing is not an event.
                 (_, Some(kind)) if kind.is_extension() && kind < FrameType::SetSettings => {}
                 (_, Some(FrameType::GetArm | FrameType::GetLog | FrameType::GetPoints)) => {}
                 (_, Some(kind)) => self.host_sends(tick, kind),
@@ -274,7 +274,7 @@ impl Narrator<'_> {
                 self.push_joint(tick, false, joint, "safety line active");
             }
         }
-        // Errors without an explanation from a joint, the bus or an input.
+        // Errors that no event of a joint, the bus or an input explains.
         let begins = tick.sample.errors & !last.sample.errors;
         if begins != 0 && !self.events.iter().rev().any(|event| event.tick == tick.tick && event.error) {
             self.push(tick, true, words::errors(begins).join(", "));
@@ -309,11 +309,12 @@ impl Narrator<'_> {
         }
     }
 
-    /// Describes an error that the controller detected in a joint, with its value and limit.
+    /// Describes an error that the controller detected in a joint, with the value and its limit.
     fn joint_error(&self, joint: Joint, bit: u16, last: &Tick, tick: &Tick) -> String {
         let name = words::joint_errors(bit).first().copied().unwrap_or("an error without a name");
         let j = joint.index();
-        // In the tick of the error the controller removes the torque, and with it the commanded value.
+        // In the tick of the error the controller removes the torque, and with it the commanded value. So the tick before
+        // is also used.
         let larger = |value: fn(&JointSample) -> f64| {
             let values = [value(&last.sample.joints[j]), value(&tick.sample.joints[j])];
             if values[1].abs() > values[0].abs() { values[1] } else { values[0] }
@@ -347,7 +348,7 @@ impl Narrator<'_> {
     }
 }
 
-/// Returns the torque of the control law before the limit.
+/// Returns the torque of the control law before it is limited.
 fn computed(s: &JointSample) -> f64 {
     s.torque_model + s.torque_p + s.torque_i + s.torque_d + s.torque_friction
 }

@@ -33,8 +33,8 @@ pub struct Tick {
     pub boots: u32,
     /// Values at the time of `tick`.
     pub sample: Sample,
-    /// Status that the controller would have reported, with the errors of the drives. Fields that were not computed have
-    /// their defaults.
+    /// Status that the controller would have reported, with the errors of the drives, as far as the replay
+    /// could compute it.
     pub status: Status,
     /// Inputs of the tick. `None` for the state in a snapshot.
     pub inputs: Option<RecordedInputs>,

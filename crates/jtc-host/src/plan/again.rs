@@ -1,4 +1,4 @@
-//! Replanning: a new motion along the path of a trajectory, within the limits of an arm.
+//! Replanning: a new motion on the path of an existing trajectory, within the limits of an arm.
 
 use jtc_plan::Waypoint;
 
@@ -7,22 +7,24 @@ use crate::plan::PlanError;
 use crate::trajectory::Trajectory;
 use crate::waypoints::thinned;
 
-/// Maximum distance of a dropped point from the leg between its neighbours, rad: noise of encoders and hands is smaller.
+/// Maximum distance of a dropped point from the leg between its neighbours, rad. Noise of encoders and of a guiding hand is
+/// smaller.
 const THINNED: f64 = 0.005;
 /// Rounding of the corners between legs, rad.
 const BLEND: f64 = 0.02;
 
 impl Planner<'_> {
-    /// Maximum deviation of the new motion from the path, rad, of the joint with the largest deviation.
+    /// Maximum deviation of the new motion from the path, in the joint with the largest deviation, rad.
     pub const ASIDE: f64 = THINNED + BLEND;
 
-    /// Plans a motion along the path of a trajectory, independent of its times: within the limits, at rest at both
-    /// ends, with at most [`Planner::ASIDE`] of deviation, and not faster than the original. Meant for measured paths,
-    /// whose spline contains encoder noise and whose ends may lie in motion.
+    /// Plans a motion on the path of a trajectory, whatever the times of the trajectory are. The motion is within the
+    /// limits, begins and ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. It is
+    /// meant for measured paths: their splines contain encoder noise, and their ends may be in motion.
     ///
     /// # Errors
     ///
-    /// As [`Planner::through`]; the waypoint numbers refer to the points that remain after thinning.
+    /// Returns the errors of [`Planner::through`]. The waypoint numbers in them refer to the points that remain after
+    /// thinning.
     pub fn anew(&self, way: &Trajectory) -> Result<Planned, PlanError> {
         let positions: Vec<_> = way.points.iter().map(|point| point.position).collect();
         let place = |i: usize| positions.get(i).map(|q| Waypoint { position: *q, time: None });
@@ -32,7 +34,7 @@ impl Planner<'_> {
         if share < 1.0 {
             planned.trajectory = at_speed(&planned.trajectory, (100.0 * share).max(1.0))?;
             planned.waypoint_times.iter_mut().for_each(|t| *t /= share);
-            // No limit binds a motion at its original speed.
+            // The motion was slowed down to its original duration, so no limit is reached.
             planned.binding.clear();
         }
         Ok(planned)
@@ -48,7 +50,7 @@ mod tests {
     use crate::check::Checker;
     use crate::trajectory::fit::Samples;
 
-    /// Replans a motion at twice the velocity limit, interrupted in the middle, and a slow motion, each along its path.
+    /// Replans two motions on their paths: one at twice the velocity limit that is cut off in the middle, and a slow one.
     #[test]
     fn a_way_that_is_too_fast_is_gone_within_the_limits() {
         let arm = Arm::avena();

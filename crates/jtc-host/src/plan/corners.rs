@@ -1,20 +1,20 @@
-//! Rounded corners: the range of the blend, and notes on the distance from the waypoints.
+//! Rounded corners: the range of the blend, and notes on how far the motion misses the waypoints.
 
 use jtc_core::JOINTS;
 use jtc_plan::furthest_joint;
 
 use super::{PlanError, Planned};
 
-/// Largest blend, rad: a larger value is probably an angle in degrees.
+/// Largest blend, rad. A larger value is probably an angle in degrees.
 pub const BLEND_MAX: f64 = 0.5;
-/// Largest blend of corners between lines and arcs, m: a larger value is probably a length in mm.
+/// Largest blend of corners between lines and arcs, m. A larger value is probably a length in mm.
 pub const BLEND_M_MAX: f64 = 0.5;
-/// Distance from a waypoint up to which no note is written, rad.
+/// A waypoint that is missed by more than this distance gets a note, rad.
 const NOTED: f64 = 0.05;
-/// Maximum number of waypoints that a note names.
+/// Maximum number of waypoints in a note.
 const NAMED: usize = 3;
 
-/// Rejects blends that are probably not in rad and in m. The planner rejects negative values and NaN.
+/// Rejects blends that are probably in a wrong unit. The planner rejects negative values and NaN.
 ///
 /// # Errors
 ///
@@ -33,7 +33,7 @@ pub(super) fn notes(planned: &Planned, positions: &[[f64; JOINTS]], blend: f64) 
     [missed(planned, positions), cut(positions, blend)].into_iter().flatten().collect()
 }
 
-/// Notes the waypoints that the motion misses, and the distances.
+/// Returns a note with the waypoints that the motion misses, and the distances.
 fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     let (trajectory, times) = (&planned.trajectory, &planned.waypoint_times);
     let step_s = f64::from(trajectory.step_ms) * 1e-3;
@@ -60,7 +60,7 @@ fn missed(planned: &Planned, positions: &[[f64; JOINTS]]) -> Option<String> {
     (!named.is_empty()).then(|| format!("rounded corners: {}", named.join(", ")))
 }
 
-/// Notes the corners whose legs are shorter than twice the blend.
+/// Returns a note with the corners whose legs are shorter than twice the blend.
 fn cut(positions: &[[f64; JOINTS]], blend: f64) -> Option<String> {
     let leg = |a: &[f64; JOINTS], b: &[f64; JOINTS]| {
         let length = furthest_joint(a, b).1;
@@ -102,7 +102,7 @@ mod tests {
         Planner { blend, jerk: false, ..Planner::new(&config) }.through(&waypoints)
     }
 
-    /// Returns a corner between two legs of this length; a single joint moves on each leg.
+    /// Returns a corner between two legs of this length. On each leg a single joint moves.
     fn corner(length: f64) -> [[f64; JOINTS]; 3] {
         [[0.0; JOINTS], [length, 0.0, 0.0, 0.0, 0.0, 0.0], [length, length, 0.0, 0.0, 0.0, 0.0]]
     }
@@ -157,7 +157,7 @@ mod tests {
         let there_and_back = [a, b, c, b, a, b, c, a, b, c, a, b];
         let note = cut(&there_and_back, 0.2).unwrap();
         assert!(note.contains("waypoints 2, 4, 6 and "), "{note}");
-        // A stop or a straight continuation has no corner.
+        // A straight continuation and a reversal at a stop have no corner.
         let [straight, back] = [[a, b, b.map(|q| 2.0 * q)], [a, b, a]];
         assert_eq!((cut(&straight, 0.2), cut(&back, 0.2)), (None, None));
     }
@@ -165,7 +165,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(8))]
 
-        /// The nearest position, searched each millisecond, agrees with the notes.
+        /// A search for the nearest position at each millisecond gives the same distances as the notes.
         #[test]
         fn notes_name_the_waypoints_that_are_missed(
             positions in prop::collection::vec(prop::array::uniform6(-1.0..1.0f64), 3..6), blend in 0.0..0.5f64

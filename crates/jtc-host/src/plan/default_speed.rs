@@ -1,4 +1,4 @@
-//! Speed of a motion if the user names none.
+//! Speed of a motion for which the user gives none.
 
 use jtc_wire::{Info, SIMULATOR};
 
@@ -11,25 +11,26 @@ const SIMULATED_PCT: f64 = 25.0;
 /// Default on every other controller, % of the limits.
 const DEFAULT_PCT: f64 = 10.0;
 
-/// The speed of a move or an approach.
+/// Speed of a move or an approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveSpeed {
-    /// % of the limits.
+    /// Speed, % of the limits.
     pub percent: f64,
-    /// `true` if the user named no speed.
+    /// `true` if the user gave no speed.
     pub is_default: bool,
 }
 
 impl MoveSpeed {
-    /// Returns the speed that the user named, else the default for the controller with this identity: 25 % of the
-    /// limits for a simulator, and 10 % for every other controller, including a controller that reports no identity.
+    /// Returns the speed that the user gave, or else the default for the controller with this identity. It is 25 % of the
+    /// limits for a simulator, and 10 % for every other controller, including one that reports no identity.
     pub fn of(named: Option<f64>, info: Option<&Info>) -> Self {
         let is_simulated = info.is_some_and(|info| info.board.as_str() == SIMULATOR);
         let default = if is_simulated { SIMULATED_PCT } else { DEFAULT_PCT };
         Self { percent: named.unwrap_or(default), is_default: named.is_none() }
     }
 
-    /// Returns the note on a default speed for the user; `option` (empty: none) sets another one. `None` if the user named a speed.
+    /// Returns a note for the user about the default speed, or `None` if the user gave a speed. `option` is the option that
+    /// sets the speed; it may be empty.
     pub fn note(&self, option: &str) -> Option<String> {
         let sets = if option.is_empty() { String::new() } else { format!("; {option} sets it") };
         self.is_default.then(|| format!("at {} % of the limits{sets}", self.percent))
@@ -37,11 +38,11 @@ impl MoveSpeed {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the speed of a move or an approach on this controller: the value that the user named, or the default.
+    /// Returns the speed of a move or an approach on this controller: the speed that the user gave, or the default.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::info`] if the user named no speed.
+    /// Returns the errors of [`Session::info`] if the user gave no speed.
     pub fn move_speed(&mut self, named: Option<f64>) -> Result<MoveSpeed, LinkError> {
         let info = if named.is_none() { self.info()? } else { None };
         Ok(MoveSpeed::of(named, info.as_ref()))
@@ -54,7 +55,7 @@ mod tests {
 
     use super::*;
 
-    /// Controllers that do not report to be simulators count as real ones.
+    /// A controller that does not report that it is a simulator is treated as a real one.
     #[test]
     fn the_default_speed_is_low_unless_the_controller_is_known_to_be_a_simulator() {
         let boards = [
@@ -74,7 +75,7 @@ mod tests {
         };
         for (board, percent) in boards {
             assert_eq!(of(board, None), MoveSpeed { percent, is_default: true }, "{board}");
-            // A named speed applies to every controller.
+            // A speed that the user gives is used for every controller.
             for named in [1.0, 5.0, 60.0, 100.0] {
                 assert_eq!(of(board, Some(named)), MoveSpeed { percent: named, is_default: false });
             }

@@ -8,11 +8,11 @@ use super::margin::{MARGIN_PCT, MARGIN_PCT_MAX};
 use crate::check::Verdict;
 use crate::error::facts;
 
-/// Reason why no plan exists.
+/// Reason why a motion cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// The motion is not possible; the error contains waypoint, joint, value and limit.
+    /// The motion is not possible. The error contains waypoint, joint, value and limit.
     #[error(transparent)]
     Plan(#[from] jtc_plan::PlanError),
     /// All waypoints are equal.
@@ -40,27 +40,27 @@ pub enum PlanError {
         /// Requested value, %.
         percent: f64,
     },
-    /// The blend is too large, probably given in another unit.
+    /// The blend is too large. It was probably given in another unit.
     #[error("blend of {value} {unit} is out of range, expected 0..{most} {unit}")]
     Blend {
         /// Requested value.
         value: f64,
         /// Maximum.
         most: f64,
-        /// Unit: rad, or m of the flange.
+        /// Unit: rad, or m for corners between lines and arcs.
         unit: &'static str,
     },
-    /// More corners than the points of a trajectory can represent.
+    /// The waypoints have more corners than the points of a trajectory can represent.
     #[error(
         "{corners} sharp corners are more than the {POINTS_MAX} points of a trajectory can follow: it has room for {most}"
     )]
     TooManyCorners {
         /// Number of corners found.
         corners: usize,
-        /// Maximum number.
+        /// Maximum number of corners.
         most: usize,
     },
-    /// The motion is too long: its points are too far apart for its corners.
+    /// The motion takes so long that the points of its trajectory are too far apart for its corners.
     #[error(
         "the motion takes {seconds:.0} s: {POINTS_MAX} points are {step_ms} ms apart then, too far to follow its corners"
     )]
@@ -70,7 +70,7 @@ pub enum PlanError {
         /// Step of the points, ms.
         step_ms: u16,
     },
-    /// Longer than a trajectory can be.
+    /// The motion takes longer than a trajectory can.
     #[error("the motion takes {seconds:.0} s or more: {POINTS_MAX} points cannot hold it")]
     TooLong {
         /// Minimum duration, s.
@@ -79,7 +79,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the waypoint of the error, counted from 1, if its message names one.
+    /// Returns the number of the waypoint in the error, counted from 1, if the message contains one.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::Plan(error) => error.waypoint(),
@@ -87,7 +87,8 @@ impl PlanError {
         }
     }
 
-    /// Returns the remedy for a move whose goal or start is outside the limits; `None` if [`Diagnose`] supplies it.
+    /// Returns the remedy for a move whose goal or start is outside the limits. Returns `None` if the remedy of
+    /// [`Diagnose`] applies.
     pub fn next_of_move(&self) -> Option<Next> {
         match self {
             Self::Plan(jtc_plan::PlanError::Position { waypoint: 1, .. }) => {
@@ -101,7 +102,7 @@ impl PlanError {
         }
     }
 
-    /// Returns the message for a move: its first waypoint is the arm's position, its second one the goal.
+    /// Returns the message for a move. Its first waypoint is the position of the arm, and its second one is the goal.
     pub fn of_move(&self) -> String {
         use jtc_plan::PlanError as Of;
         use kinematics::PoseError as Pose;
@@ -195,7 +196,7 @@ mod tests {
 
     use super::*;
 
-    /// A move uses the messages of its waypoints, with "where the arm stands" and the goal as names.
+    /// The messages of a move contain "where the arm stands" and the goal instead of waypoint numbers.
     #[test]
     fn a_move_is_refused_with_the_words_of_its_waypoint() {
         let joint = Joint::ALL[2];

@@ -1,4 +1,4 @@
-//! Motions with the flange on lines and arcs, and the deviation of other motions from the line.
+//! Motions with the flange on lines and arcs, and the distance of the flange from the line in other motions.
 
 use jtc_core::{JOINTS, SetPoint, interpolate};
 use jtc_dynamics::ArmModel;
@@ -23,21 +23,23 @@ pub struct Aside {
 }
 
 impl Planner<'_> {
-    /// Plans a motion through the waypoints of a route, from rest to rest, straight in joint space or with the flange
-    /// on lines and arcs. Keeps given times.
+    /// Plans a motion through the waypoints of a route, from rest to rest. The motion is straight in joint space, or the
+    /// flange moves on lines and arcs. If waypoints have times, the motion keeps them.
     ///
     /// # Errors
     ///
-    /// As [`Planner::through`].
+    /// Returns the errors of [`Planner::through`].
     pub fn on_route(&self, route: &Route, times: &[Option<f64>]) -> Result<Planned, PlanError> {
         self.along_route(route, times, None)
     }
 
-    /// Plans a motion from rest at `from` (rad) to `target`, straight in joint space or with the flange on a straight line.
+    /// Plans a motion from rest at `from` (rad) to `target`. The motion is straight in joint space, or the flange moves on
+    /// a straight line.
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`]; [`PlanError::Plan`] if the arm does not reach the pose or cannot follow the line.
+    /// Returns the errors of [`Planner::to`], and [`PlanError::Plan`] if the arm does not reach the pose or cannot follow
+    /// the line.
     pub fn to_target(
         &self,
         model: &ArmModel,
@@ -84,8 +86,8 @@ impl Planner<'_> {
     }
 }
 
-/// Returns the largest deviation of the flange from its path between two points, as the controller interpolates (J-32),
-/// m. A shift along the path does not count.
+/// Returns the largest deviation of the flange from its path between two points, with the interpolation of the controller
+/// (J-32), m. Only the deviation across the path is measured.
 fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -> [f64; JOINTS]) -> f64 {
     const MOMENT: f64 = 1e-4;
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
@@ -105,7 +107,8 @@ fn between_points(trajectory: &Trajectory, model: &ArmModel, way: impl Fn(f64) -
     most
 }
 
-/// Returns the leg with the largest deviation of the flange from the straight line, of the joint-space legs to the waypoints `legs`.
+/// Of the joint-space legs to the waypoints `legs`, returns the one on which the flange deviates most from the straight
+/// line.
 pub fn furthest_aside(planned: &Planned, model: &ArmModel, legs: &[usize]) -> Option<Aside> {
     let kinematics = Kinematics::new(model, &[(0.0, 0.0); JOINTS]);
     let times = &planned.waypoint_times;

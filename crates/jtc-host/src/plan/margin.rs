@@ -1,8 +1,9 @@
-//! Torque margin of a plan: the part of each torque limit that remains for effects that the model does not contain.
+//! Torque margin of a plan: the part of each torque limit that is left free for effects that the model does not contain.
 //!
-//! A plan keeps the model torque, friction included, below (100 % − margin) of each limit, at the smallest bearing temperature of the
-//! plan and at the usual one. If gravity and breakaway friction alone leave less of a limit, the motion may use a quarter of the remaining
-//! torque, and at least 2 % of the limit ([`ArmDynamics::usable_torque`]): a pose that can be held can be reached and left.
+//! A plan keeps the model torque, including friction, below (100 % − margin) of each limit. This holds at the lowest
+//! bearing temperature of the plan and at the usual one. Gravity and breakaway friction alone may leave less of a limit.
+//! Then the motion may use a quarter of the remaining torque, and at least 2 % of the limit
+//! ([`ArmDynamics::usable_torque`]). So a pose that the arm can hold can also be reached and left.
 //! [`Verdict::margin`](crate::check::Verdict::margin) reports the margin of a motion.
 
 use jtc_core::JOINTS;
@@ -17,12 +18,12 @@ use crate::trajectory::Trajectory;
 pub const MARGIN_PCT: f64 = 15.0;
 /// Largest torque margin, % of each limit.
 pub const MARGIN_PCT_MAX: f64 = 100.0 * jtc_plan::MARGIN_MAX;
-/// Shortfall of the margin from which a note is written, % of the limit.
+/// A margin that is smaller than requested by more than this value gets a note, % of the limit.
 const SHORT_PCT: f64 = 0.1;
-/// Rounding that does not count as excess, as a share of the torque.
+/// Relative rounding error of a torque that is still accepted as within the limit.
 const ROUNDING: f64 = 1e-9;
 
-/// Reads a torque margin, % of each limit.
+/// Parses a torque margin, % of each limit.
 ///
 /// # Errors
 ///
@@ -45,11 +46,11 @@ pub fn margin_in_range(percent: f64) -> Result<(), PlanError> {
     if (0.0..=MARGIN_PCT_MAX).contains(&percent) { Ok(()) } else { Err(PlanError::Margin { percent }) }
 }
 
-/// A joint whose torque violates the margin of its plan.
+/// Joint whose torque violates the margin of its plan.
 pub(super) struct Excess {
     /// The joint.
     pub joint: Joint,
-    /// Factor of the motion's time that makes the torque sufficient.
+    /// Factor for the duration of the motion at which the torque is within the margin.
     pub stretch: f64,
 }
 
@@ -69,8 +70,8 @@ pub(super) fn note(
     ))
 }
 
-/// Returns the joint that needs the slowest motion to keep the margin of `limits`, at each millisecond of the
-/// trajectory as the controller computes it; `None` if all joints keep it.
+/// Checks the margin of `limits` at each millisecond of the trajectory, with the values that the controller computes.
+/// Returns the joint that needs the slowest motion to keep it, or `None` if all joints keep it.
 pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics) -> Option<Excess> {
     let mut worst = None::<Excess>;
     let end = (trajectory.duration_s() * 1e3).round() as u32;
@@ -89,7 +90,7 @@ pub(super) fn excess(trajectory: &Trajectory, limits: &Limits, arm: &ArmDynamics
             if torque[j].abs() <= usable * (1.0 + ROUNDING) {
                 continue;
             }
-            // Torque that a slower motion does not reduce: gravity and nearly all of the friction.
+            // Part of the torque that a slower motion does not reduce: gravity and nearly all of the friction.
             let still = (slow[j] * torque[j].signum()).min(torque[j].abs());
             let (needed, left) = (torque[j].abs() - still, usable - still);
             let stretch = if left > 0.0 { (needed / left).sqrt() } else { f64::INFINITY };

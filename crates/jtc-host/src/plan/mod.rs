@@ -1,9 +1,9 @@
 //! Planner: moves to a goal, motions through waypoints, and trajectories at another speed.
 //!
-//! The motions come from `jtc-plan`, as fast as the limits of velocity, acceleration, jerk and torque allow. This
-//! module turns a motion into a trajectory with points at a fixed step, as on the wire. Each trajectory passes the same
-//! [check](crate::check) as a file before the planner returns it. If rounding, a pause on the path (J-33) or friction
-//! exceed a limit, the planner slows the motion down and reports it in [`Planned::notes`].
+//! The motions come from `jtc-plan`. They are as fast as the limits of velocity, acceleration, jerk and torque allow. This
+//! module turns a motion into a trajectory with points at a fixed step, in the form in which it is sent. Before the planner
+//! returns a trajectory, it must pass the [check](crate::check) that files also pass. If rounding, a pause on the path
+//! (J-33) or friction exceed a limit, the planner slows the motion down and reports this in [`Planned::notes`].
 //!
 //! ```
 //! use jtc_host::{Arm, plan::Planner};
@@ -54,23 +54,25 @@ use sampled::{least_s, sampled, step_ms};
 
 /// Step of planned moves, ms.
 const STEP_MS: u16 = 10;
-/// Time for a change of acceleration without a jerk limit, s. With less than two steps the position between the points
-/// (J-32) would accelerate more than the points do.
+/// Time for a change of acceleration without a jerk limit, s. If it were shorter than two steps, the position between the
+/// points (J-32) would accelerate more than the points.
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
-/// Share of the velocity and acceleration limits that a plan uses; the remainder covers the rounding of the wire.
+/// Share of the velocity and acceleration limits that a plan uses. The rest is reserved for the rounding in frames.
 const SHARE: f64 = 0.98;
-/// Time in which the remainder of a trajectory reaches its speed, s, and longer times to try if the check rejects it.
+/// Time in which the remainder of a trajectory reaches its speed, s, and longer times that are tried if the check rejects
+/// it.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Bearing temperature that a plan assumes, °C: a cold hall. Friction is higher than at the usual temperature.
+/// Bearing temperature that a plan assumes, °C: that of a cold hall. Friction is higher than at the usual temperature.
 pub const COLD: f64 = 20.0;
-/// Maximum slow-down factor of a motion; the planner rejects a slower motion.
+/// Maximum factor by which a motion is slowed down. A motion that needs more is rejected.
 const SLOWEST: f64 = 50.0;
-/// Minimum and maximum slow-down factor of an iteration.
+/// Minimum and maximum factor by which one iteration slows a motion down.
 const SLOWER: (f64, f64) = (1.01, 2.0);
-/// Minimum slow-down factor of an iteration for the torque margin: rounding alone exceeds the margin only slightly.
+/// Minimum factor by which one iteration slows a motion down for the torque margin. It is small, because rounding exceeds
+/// the margin only slightly.
 const SLOWER_FOR_MARGIN: f64 = 1.002;
-/// Factor of the time, needed for the torque margin, from which a note is written.
+/// A motion that is slowed down for the torque margin by more than this factor gets a note.
 const NOTED: f64 = 1.01;
 
 /// Plans motions for an arm and checks them.
@@ -78,25 +80,26 @@ const NOTED: f64 = 1.01;
 pub struct Planner<'a> {
     /// Limits, rotor inertia, gravity, payload.
     pub config: &'a Config,
-    /// Model for the torques; `None`: torque is neither planned nor checked.
+    /// Model for the torques. `None`: torque is neither planned nor checked.
     pub model: Option<&'a ArmModel>,
     /// Friction compensation that the controller adds to the model torque.
     pub friction: Option<&'a Friction>,
-    /// Lowest bearing temperature, °C, for which friction is planned.
+    /// Lowest bearing temperature for which friction is planned, °C.
     pub temperature: f64,
     /// Speed, 1 to 100 % of the limits.
     pub speed_pct: f64,
-    /// Rounding of the corner at a waypoint, rad of the joint with the largest deviation; 0: the arm stops at each waypoint.
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. With 0 the arm stops at each
+    /// waypoint.
     pub blend: f64,
-    /// `true` if jerk is limited, too; else the acceleration changes within two steps.
+    /// `true` if the jerk is limited. If not, the acceleration changes within two steps.
     pub jerk: bool,
     /// Torque margin, 0 to [`MARGIN_PCT_MAX`] % of each limit, for masses and friction that the model does not contain.
     pub margin_pct: f64,
-    /// Segments in which the trajectory will be sent.
+    /// Division into segments for the upload.
     pub upload: UploadOptions,
 }
 
-/// The limit that binds a motion in an interval of time.
+/// Limit that binds a motion in an interval of time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bound {
     /// Start of the interval, s from the start of the motion.
@@ -105,28 +108,29 @@ pub struct Bound {
     pub to_s: f64,
     /// Joint concerned.
     pub joint: Joint,
-    /// "velocity", "acceleration", "jerk", "torque", "stop" (distance to stop in time), "friction" (its table) or "given time".
+    /// "velocity", "acceleration", "jerk", "torque", "stop" (distance to stop in time), "friction" (the friction table) or
+    /// "given time".
     pub limit: &'static str,
 }
 
-/// A motion that passed the check.
+/// Motion that passed the check.
 #[derive(Clone, Debug)]
 pub struct Planned {
     /// Trajectory to run.
     pub trajectory: Trajectory,
-    /// Result of the check: figures of each joint, warnings.
+    /// Result of the check: figures of each joint, and warnings.
     pub verdict: Verdict,
-    /// Binding limits in order of time.
+    /// Binding limits, ordered by time.
     pub binding: Vec<Bound>,
-    /// Time at which the motion is nearest to each waypoint, s.
+    /// Times at which the motion is nearest to each waypoint, s.
     pub waypoint_times: Vec<f64>,
-    /// Changes made to pass the check, and waypoints that rounded corners miss, as text.
+    /// As text: changes that were made to pass the check, and waypoints that rounded corners miss.
     pub notes: Vec<String>,
 }
 
 impl<'a> Planner<'a> {
-    /// Creates a planner with the limits of `config` alone, full speed and a stop at each waypoint. If a model is set,
-    /// the planner keeps [`MARGIN_PCT`] of each torque limit free.
+    /// Creates a planner with full speed and a stop at each waypoint. It uses only the limits of `config`. If a model is
+    /// set, the planner keeps [`MARGIN_PCT`] of each torque limit free.
     pub fn new(config: &'a Config) -> Self {
         let upload = UploadOptions::default();
         Self {
@@ -142,14 +146,14 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Plans a motion from rest to rest between two positions (rad, base to wrist), straight in joint space if that is
-    /// not slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the nearest
-    /// position inside (J-58). A goal outside by no more than the rounding of a frame is moved to the limit (J-36).
+    /// Plans a motion from rest to rest between two positions (rad, base to wrist). It is straight in joint space, unless
+    /// that is slower. If a joint is outside its limits by up to the start tolerance, the motion begins at the nearest
+    /// position inside (J-58). If the goal is outside by at most the rounding of a frame, it is moved to the limit (J-36).
     ///
     /// # Errors
     ///
-    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] if a position is outside the limits or cannot
-    /// be held by the torque; [`PlanError::Refused`] if the check finds a problem that no lower speed solves.
+    /// [`PlanError::Speed`], [`PlanError::Margin`]; [`PlanError::Plan`] if a position is outside the limits or its gravity
+    /// torque is too high; [`PlanError::Refused`] if the check finds a problem that a lower speed does not solve.
     pub fn to(&self, from: &[f64; JOINTS], to: &[f64; JOINTS]) -> Result<Planned, PlanError> {
         let arm = self.dynamics();
         let first = self.nearest_inside(from);
@@ -158,8 +162,8 @@ impl<'a> Planner<'a> {
         self.checked(&motion, &first, Some(*from), false)
     }
 
-    /// Returns the nearest position inside the limits from which the controller executes a motion if the arm is at
-    /// `place`. Joints outside by more than the start tolerance keep their position.
+    /// Returns the position inside the limits that is nearest to `place` and from which the controller starts a motion.
+    /// Joints that are outside by more than the start tolerance keep their position.
     fn nearest_inside(&self, place: &[f64; JOINTS]) -> [f64; JOINTS] {
         std::array::from_fn(|j| {
             let inside = PathRange::of(self.config, j, 0).nearest_inside(place[j]);
@@ -167,12 +171,13 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// Plans a motion through waypoints, from rest to rest: straight legs in joint space, with corners rounded within
-    /// the blend. Keeps given times.
+    /// Plans a motion through waypoints, from rest to rest. The legs are straight in joint space, and the corners are
+    /// rounded within the blend. If waypoints have times, the motion keeps them.
     ///
     /// # Errors
     ///
-    /// As [`Planner::to`], with the number of the waypoint; [`PlanError::Nowhere`], [`PlanError::Blend`], [`PlanError::TooLong`].
+    /// Returns the errors of [`Planner::to`], with the number of the waypoint; [`PlanError::Nowhere`],
+    /// [`PlanError::Blend`], [`PlanError::TooLong`].
     pub fn through(&self, waypoints: &[Waypoint]) -> Result<Planned, PlanError> {
         let positions: Vec<[f64; JOINTS]> = waypoints.iter().map(|w| w.position).collect();
         if positions.len() > 1 && positions.iter().all(|q| Some(q) == positions.first()) {
@@ -190,12 +195,12 @@ impl<'a> Planner<'a> {
         Ok(planned)
     }
 
-    /// Plans the remainder of a trajectory on the same path, from `from_ms` of the path with the arm at `start`. After
-    /// a ramp the motion keeps the times of the trajectory. The ramp is the shortest one that passes the check.
+    /// Plans the remainder of a trajectory on the same path, beginning at `from_ms` of the path with the arm at `start`.
+    /// After a ramp the motion keeps the times of the trajectory. The shortest ramp that passes the check is used.
     ///
     /// # Errors
     ///
-    /// [`PlanError::Refused`] if the check rejects the remainder with every ramp, [`PlanError::TooLong`].
+    /// [`PlanError::Refused`] if the check rejects the remainder with every ramp; [`PlanError::TooLong`].
     pub fn rest(
         &self,
         trajectory: &Trajectory,
@@ -216,8 +221,8 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Rejects a motion that would be too long even at the highest speed, before it is planned. The planner rejects
-    /// positions outside the limits and invalid blends.
+    /// Rejects, before planning, a motion that is too long even at the highest speed. Positions outside the limits and
+    /// invalid blends are left to the planner, which rejects them.
     fn fits_time(&self, positions: &[[f64; JOINTS]]) -> Result<(), PlanError> {
         let limits = self.limits()?;
         let is_inside = |q: &[f64; JOINTS]| {
@@ -242,7 +247,8 @@ impl<'a> Planner<'a> {
         Checker { model, friction, start, upload, ..Checker::new(self.config) }
     }
 
-    /// Plans a motion within the limits. Drops the margin of a joint if the margin leaves it no torque for the motion.
+    /// Plans a motion within the limits. If the margin leaves a joint no torque for the motion, plans without the margin of
+    /// this joint.
     fn within(
         &self,
         plan: impl Fn(&Limits) -> Result<Motion, jtc_plan::PlanError>,
@@ -278,8 +284,8 @@ impl<'a> Planner<'a> {
         Ok(Limits { jerk: limits.acceleration.map(|a| a / JUMP_S), ..limits })
     }
 
-    /// Turns the motion into a trajectory that passes the check, and slows it down as far as necessary. A motion with
-    /// `timed` is not slowed down.
+    /// Turns the motion into a trajectory that passes the check, and slows it down as far as necessary. If `timed` is set,
+    /// the motion is not slowed down.
     fn checked(
         &self,
         within: &Within,
@@ -294,12 +300,14 @@ impl<'a> Planner<'a> {
         loop {
             let step = step_ms(motion.duration() * stretch)?;
             let sampled = sampled(motion, first, stretch, step, timed)?;
-            // Checks cold, then as before a run: if friction helps to brake, lower friction needs more torque.
+            // Checks with cold bearings first, then at the temperature of a run. If friction helps to brake, less friction
+            // means more torque.
             let cold =
                 Checker { temperature: self.temperature, ..checker.clone() }.check(&sampled.trajectory);
             let verdict =
                 if cold.is_ok() { checker.check(&sampled.trajectory).or_less(cold.margin) } else { cold };
-            // If corners are closer than the steps, no longer trajectory can represent them.
+            // The corners are closer together than the steps. A longer trajectory would not help, because its steps would
+            // be longer.
             if step > STEP_MS && verdict.warnings().next().is_some() {
                 return Err(PlanError::TooFine { seconds: sampled.trajectory.duration_s(), step_ms: step });
             }
@@ -313,7 +321,7 @@ impl<'a> Planner<'a> {
                 slowed = Some(worst);
                 continue;
             }
-            // Excess comes from rounding to the wire's steps, and from times between the samples of the plan.
+            // The margin can be exceeded because of the rounding in frames, and between the samples of the plan.
             let excess = arm.as_ref().filter(|_| !timed);
             let excess = excess.and_then(|arm| margin::excess(&sampled.trajectory, limits, arm));
             if let Some(excess) = excess {
@@ -351,7 +359,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// Returns `place` with each joint moved to its limit if it is beyond by no more than the rounding of a frame (J-36).
+/// Returns `place`. A joint that is outside its limits by at most the rounding of a frame is moved to the limit (J-36).
 fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     std::array::from_fn(|j| {
         let range = PathRange::of(config, j, 0);
@@ -359,13 +367,14 @@ fn within_rounding(config: &Config, place: &[f64; JOINTS]) -> [f64; JOINTS] {
     })
 }
 
-/// A motion with the limits that it keeps.
+/// Motion with the limits that it keeps.
 struct Within {
     motion: Motion,
     limits: Limits,
 }
 
-/// Returns the slow-down factor that solves the problems found; `None` if a slower motion does not solve them.
+/// Returns the factor by which the motion must be slowed down to solve the problems. Returns `None` if a slower motion does
+/// not solve them.
 fn slower(verdict: &Verdict) -> Option<f64> {
     use ProblemKind::{Acceleration, FrictionVelocity, NoStop, PositionSpeed, Torque, Velocity};
     let factors = verdict.refusals().map(|p| {
@@ -373,7 +382,7 @@ fn slower(verdict: &Verdict) -> Option<f64> {
         match p.kind {
             Velocity | PositionSpeed | FrictionVelocity => Some(over),
             Acceleration => Some(over.sqrt()),
-            // Part of the torque is gravity, which no speed changes.
+            // A part of the torque is gravity, which does not depend on the speed.
             Torque | NoStop => Some(over.max(1.03)),
             _ => None,
         }
@@ -392,7 +401,7 @@ fn limit_name(kind: ProblemKind) -> &'static str {
     }
 }
 
-/// Returns the binding limits: those of the plan, or the problem for which the motion was slowed down.
+/// Returns the binding limits: those of the plan, or, if the motion was slowed down, the problem that required it.
 fn binding(motion: &Motion, scale: f64, slowed: Option<&Problem>) -> Vec<Bound> {
     if let Some(problem) = slowed {
         let (joint, limit) = (problem.joint.unwrap_or(Joint::ALL[0]), limit_name(problem.kind));
@@ -411,7 +420,7 @@ fn slowed_words(problem: &Problem, stretch: f64) -> String {
     format!("slowed down to {:.0} % of the speed that was planned, for the check: {problem}", 100.0 / stretch)
 }
 
-/// Plans a move between two positions within the limits of `config` alone, at `speed_pct` of them: [`Planner::to`] without torques.
+/// Plans a move between two positions at `speed_pct` % of the limits of `config`, like [`Planner::to`] without torques.
 ///
 /// # Errors
 ///

@@ -6,16 +6,17 @@ use jtc_plan::{Motion, State};
 use super::{PlanError, STEP_MS};
 use crate::trajectory::{Point, Trajectory};
 
-/// Minimum number of steps of a motion, if its step can be short enough.
+/// Minimum number of steps of a motion, unless the step would be too short.
 const STEPS_MIN: f64 = 20.0;
-/// Shortest step, ms: in a shorter step the position would change by less than its rounding.
+/// Shortest step, ms. In a shorter step a position would change by less than its rounding.
 const STEP_MIN_MS: f64 = 2.0;
-/// Longest step that a trajectory frame carries, ms.
+/// Longest step that a trajectory frame can contain, ms.
 const STEP_MAX_MS: f64 = 1000.0;
-/// Maximum deviation of a trajectory from the motion between its points, rad.
+/// Maximum deviation of a trajectory from the motion, between the points, rad.
 const ASIDE: f64 = 1e-3;
-/// Minimum number of points from a corner to the next, if a corner turns by more than this share of the path and its
-/// legs are longer than this length, rad. With fewer points the deviation of the trajectory is larger.
+/// Minimum number of points between two sharp corners. With fewer points the trajectory deviates more from the motion. A
+/// corner is sharp if it turns by more than the given share of the path, and its legs are longer than the given length
+/// (rad).
 const CORNER_POINTS: usize = 3;
 const CORNER_TURN: f64 = 0.5;
 const CORNER_LEG: f64 = 0.05;
@@ -25,11 +26,11 @@ const PARTS: usize = 4;
 /// A motion as a trajectory.
 pub(super) struct Sampled {
     pub trajectory: Trajectory,
-    /// Factor from a time of the motion to the time of the trajectory.
+    /// Factor by which times of the motion are multiplied to get times of the trajectory.
     pub scale: f64,
 }
 
-/// Returns the step for a motion of this duration, ms.
+/// Returns the step for a motion of this duration, in ms.
 ///
 /// # Errors
 ///
@@ -41,9 +42,9 @@ pub(super) fn step_ms(seconds: f64) -> Result<u16, PlanError> {
     if step <= STEP_MAX_MS { Ok(step as u16) } else { Err(PlanError::TooLong { seconds }) }
 }
 
-/// Samples the motion, stretched in time by `stretch`. A trajectory has a whole number of steps. The motion is
-/// stretched to the full last step, or, if `kept`, the arm rests for the remainder of the last step. The first point is
-/// `first`, the last one is exactly the end of the motion.
+/// Samples the motion, stretched in time by `stretch`. A trajectory has a whole number of steps, so the motion is stretched
+/// further to fill the last step. If `kept` is set, the arm rests for the remainder of the last step instead. The first
+/// point is `first`, and the last one is exactly the end of the motion.
 ///
 /// # Errors
 ///
@@ -63,7 +64,8 @@ pub(super) fn sampled(
     let rest = Point { position: end.position, ..Point::default() };
     let at = |t: f64| slowed(&motion.at(t / scale), scale);
     let mut points: Vec<Point> = (0..steps).map(|k| at(k as f64 * h)).collect();
-    // Both ends are exactly the requested ones. If the acceleration jumps at the start, both sides of the jump are correct.
+    // Both ends are exactly the requested positions. If the acceleration jumps at the start, either side of the jump is
+    // correct.
     if let Some(point) = points.first_mut() {
         (point.position, point.velocity) = (*first, [0.0; JOINTS]);
     }
@@ -95,7 +97,8 @@ pub(super) fn fits_corners(positions: &[[f64; JOINTS]], blend: f64) -> Result<()
     if corners > most { Err(PlanError::TooManyCorners { corners, most }) } else { Ok(()) }
 }
 
-/// Returns a lower bound on the time of a motion through `positions`, s: each is reached within `blend` rad, at most at `velocity` (rad/s).
+/// Returns a lower bound for the duration of a motion through `positions` with at most `velocity` (rad/s), s. The motion
+/// passes each position within `blend` rad.
 pub(super) fn least_s(positions: &[[f64; JOINTS]], blend: f64, velocity: &[f64; JOINTS]) -> f64 {
     let leg = |pair: &[[f64; JOINTS]]| {
         let way = |j: usize| (pair[1][j] - pair[0][j]).abs() - 2.0 * blend;
@@ -112,7 +115,7 @@ fn slowed(state: &State, scale: f64) -> Point {
     }
 }
 
-/// Returns the largest deviation of the controller's curve between the points from the motion, rad.
+/// Returns the largest deviation between the controller's curve and the motion, between the points, rad.
 fn aside(points: &[Point], h: f64, at: impl Fn(f64) -> Point) -> f64 {
     let mut most = 0.0f64;
     for (i, pair) in points.windows(2).enumerate() {

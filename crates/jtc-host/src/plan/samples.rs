@@ -1,4 +1,4 @@
-//! A plan as the samples that its run would record, as far as they are known in advance.
+//! A plan in the form of the samples that its run would record, as far as they are known in advance.
 
 use jtc_core::JOINTS;
 use jtc_dynamics::Dynamics;
@@ -10,8 +10,8 @@ use crate::sample::{JointSample, Sample};
 use crate::trajectory::{Point, Trajectory};
 
 impl Planner<'_> {
-    /// Returns the commanded values at each point of a trajectory, with the model torques and friction at the planner's
-    /// temperature. No value is measured.
+    /// Returns the commanded values at each point of a trajectory, with the model torques, and with friction at the
+    /// planner's temperature. Measured values are unknown.
     pub fn samples(&self, trajectory: &Trajectory) -> Vec<Sample> {
         let dynamics =
             self.model.map(|model| Dynamics::with_payload(model, self.config.gravity, &self.config.payload));

@@ -32,7 +32,8 @@ proptest! {
         prop_assert!(plan.points.len() <= POINTS_MAX);
     }
 
-    /// With torques, friction and stopping distance. If the arm cannot be held, or not be stopped at any speed, the error says so.
+    /// The plans use torques, friction and stopping distance. If the arm cannot be held, or cannot be stopped at any speed,
+    /// an error says so.
     #[test]
     fn plans_of_an_arm_pass_its_check(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.3f64, jerk: bool) {
         let arm = Arm::avena();
@@ -71,7 +72,7 @@ fn a_target_outside_the_limits_is_refused() {
     }
 }
 
-/// An arm without brakes falls to an end stop outside its limits: a motion leads back from there.
+/// An arm without brakes has fallen to an end stop outside its limits. A motion leads back inside.
 #[test]
 fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -103,7 +104,7 @@ fn j58_a_move_from_outside_is_planned_from_the_nearest_place_inside() {
     }
 }
 
-/// Position 16 376 of the wire, to which an int16 file rounds 1.57 rad up, is 1.570077 rad.
+/// An int16 file rounds 1.57 rad up to the position number 16 376, which is 1.570077 rad.
 #[test]
 fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     let config = Config::avena();
@@ -115,7 +116,7 @@ fn j36_the_goal_of_a_move_may_be_a_limit_as_a_file_has_rounded_it() {
     }
 }
 
-/// An approach to a trajectory begins at the nearest position inside, too.
+/// Like a move, an approach to a trajectory begins at the nearest position inside.
 #[test]
 fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let arm = Arm::avena();
@@ -130,11 +131,11 @@ fn j58_an_approach_from_outside_begins_at_the_nearest_place_inside() {
     let points = &start.checked.trajectory().points;
     assert_eq!(points[0].position, [0.0, 1.57, 0.0, 0.0, 0.0, 0.0]);
     assert_eq!(points.last().unwrap().position, t.points[0].position);
-    // Beyond the start tolerance only a jog leads back.
+    // From beyond the start tolerance only a jog leads back.
     assert!(order.start(1, &[0.0, 1.595, 0.0, 0.0, 0.0, 0.0]).is_err());
 }
 
-/// A motion that is too fast for its torque is planned slower.
+/// A motion whose torque would be too high is planned slower.
 #[test]
 fn moves_slow_down_for_torque() {
     let arm = Arm::avena();
@@ -152,7 +153,7 @@ fn moves_slow_down_for_torque() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Long and slow motions have longer steps, up to the capacity of the controller.
+/// Long and slow motions have longer steps. The limit is the capacity of the controller.
 #[test]
 fn any_length_fits_or_is_refused() {
     let config = Config::avena();
@@ -168,7 +169,7 @@ fn any_length_fits_or_is_refused() {
     assert!(matches!(error, PlanError::TooManyCorners { .. }), "{error}");
 }
 
-/// Given times are kept, or rejected with the shortest possible time.
+/// Times of waypoints are kept, or rejected with the shortest possible time.
 #[test]
 fn given_times_are_kept_or_refused() {
     let config = Config::avena();
@@ -185,7 +186,7 @@ fn given_times_are_kept_or_refused() {
     assert_eq!(error.diagnosis().kind, ErrorKind::Refused);
 }
 
-/// Plans a move of joint 2 with a payload (kg), between a pose that takes most of its torque and the upright pose.
+/// Plans a move of joint 2 with a payload (kg), between the upright pose and a pose that needs most of the joint's torque.
 fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     let arm = Arm::avena();
     let (mut config, friction) = (arm.config(), arm.friction());
@@ -195,7 +196,8 @@ fn lowered_with(mass: f64) -> Result<Planned, PlanError> {
     planner.through(&waypoints(&places))
 }
 
-/// A pose that the whole torque limit can hold and leave is planned, although a plan uses less of the limit elsewhere.
+/// A pose that needs the whole torque limit to be held and left can be planned, although plans use less of the limit
+/// elsewhere.
 #[test]
 fn a_pose_that_can_be_held_can_be_left() {
     let (arm, mut masses) = (Arm::avena(), 0);
@@ -217,7 +219,7 @@ fn a_pose_that_can_be_held_can_be_left() {
     assert!(masses > 0);
 }
 
-/// The error names the waypoint that cannot be held, its torque, and the share of the limit that holding may use.
+/// The error contains the waypoint that cannot be held, its torque, and the share of the limit that holding may use.
 #[test]
 fn too_much_payload_names_the_pose_that_cannot_be_held() {
     let error = lowered_with(8.0).unwrap_err();
@@ -232,7 +234,7 @@ fn too_much_payload_names_the_pose_that_cannot_be_held() {
     assert!(error.to_string().contains("97.0 % of its limit of 180.0 N·m"), "{error}");
 }
 
-/// More corners than points are rejected before planning.
+/// If there are more corners than points, the motion is rejected before planning.
 #[test]
 fn too_many_corners_are_refused_at_once() {
     let places: Vec<[f64; JOINTS]> = (0..10_000)
@@ -246,8 +248,8 @@ fn too_many_corners_are_refused_at_once() {
     }
 }
 
-/// A motion that is too long even at the highest speed is rejected before planning: the last pose could not be held,
-/// which is not detected. Waypoints in degrees are reported as such.
+/// A motion that is too long even at the highest speed is rejected before planning. So the planner does not find that the
+/// last pose cannot be held. Waypoints in degrees are reported as such.
 #[test]
 fn too_long_a_way_is_refused_at_once() {
     let arm = Arm::avena();
@@ -282,7 +284,8 @@ proptest! {
         prop_assert!(least <= planned.trajectory.duration_s(), "{least} s");
     }
 
-    /// Without a jerk limit, too, the position that the controller computes between the points (J-32) keeps the acceleration limit.
+    /// Even without a jerk limit, the position that the controller computes between the points (J-32) keeps the
+    /// acceleration limit.
     #[test]
     fn j32_the_position_between_points_keeps_the_acceleration(places in prop::collection::vec(pose(), 2..5), blend in 0.0..0.2f64, jerk: bool) {
         let config = Config::avena();

@@ -1,21 +1,22 @@
-//! Path through the waypoints of a file: positions, or lines and arcs of the flange.
+//! Path through the waypoints of a file. It goes through joint positions, or along lines and arcs of the flange.
 
 use super::kinematics::Route;
 use super::{Aside, PlanError, Planned, Planner, Waypoint, corners, furthest_aside};
 use crate::arm::Arm;
 use crate::waypoints::{WaypointError, WaypointFile};
 
-/// Deviation of the flange from a straight line that is not reported, m.
+/// A larger deviation of the flange from a straight line is reported, m.
 const ASIDE_M: f64 = 5e-4;
 
 /// Options for the path through waypoints.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WayOptions {
-    /// `true`: the flange moves on a straight line on each leg for which the file does not specify the motion.
+    /// If `true`, the flange moves on a straight line on each leg for which the file does not specify the motion.
     pub line: bool,
-    /// Rounding of the corner at a waypoint, rad of the joint with the largest deviation; 0: the arm stops at each.
+    /// Rounding of the corner at a waypoint, in the joint with the largest deviation, rad. With 0 the arm stops at each
+    /// waypoint.
     pub blend: f64,
-    /// Rounding of the corner between two lines or arcs, m; 0: the arm stops there.
+    /// Rounding of the corner between two lines or arcs, m. With 0 the arm stops there.
     pub blend_m: f64,
 }
 
@@ -30,7 +31,7 @@ pub struct Way<'a> {
 #[derive(Debug)]
 enum Course {
     Joints(Vec<Waypoint>),
-    /// Alternative routes (the fastest is used), with the times of the waypoints.
+    /// Alternative routes, of which the fastest is used, and the times of the waypoints.
     Lines(Vec<Route>, Vec<Option<f64>>),
 }
 
@@ -45,7 +46,8 @@ impl<'a> Way<'a> {
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop satisfies every blend, and next to a sharp corner it may be faster than a small blend.
+            // A stop keeps to every blend. Near a sharp corner it may be faster than a small blend, so both routes are
+            // planned.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)
         } else {
@@ -84,7 +86,7 @@ impl<'a> Way<'a> {
 
     /// Returns the largest deviation of the flange from the straight line between two of its poses, if above 0.5 mm.
     pub fn off_the_line(&self, planned: &Planned, arm: &Arm) -> Option<Aside> {
-        // With `line`, the user requested each remaining leg in joint space.
+        // With the option `line`, the user has chosen joint space for each remaining leg.
         let legs = if self.options.line { Vec::new() } else { self.file.legs_between_flange_poses() };
         furthest_aside(planned, &arm.model, &legs).filter(|aside| aside.distance_m >= ASIDE_M)
     }

@@ -1,4 +1,4 @@
-//! A raw record of both directions of a port, one line per piece: seconds, direction, bytes in hex.
+//! Raw record of both directions of a port. Each line has the time in seconds, the direction, and bytes in hexadecimal.
 //!
 //! ```text
 //! 0.001250 > 9B 06 00 06 0A E6
@@ -19,7 +19,7 @@ pub enum Direction {
     ToHost,
 }
 
-/// A port that also writes all bytes of both directions to a capture.
+/// Port that also writes all bytes of both directions to a capture.
 pub struct Capture<P, W: Write> {
     port: P,
     out: W,
@@ -27,7 +27,7 @@ pub struct Capture<P, W: Write> {
 }
 
 impl<P: Port, W: Write> Capture<P, W> {
-    /// Wraps `port`; lines are written to `out`.
+    /// Wraps `port`. The lines are written to `out`.
     pub fn new(port: P, out: W) -> Self {
         Self { port, out, failed: None }
     }
@@ -50,7 +50,7 @@ impl<P: Port, W: Write> Capture<P, W> {
         for b in bytes {
             let _ = write!(line, " {b:02X}");
         }
-        // A full disk must not end a motion: keep the error for `finish`.
+        // A full disk must not end a motion. So the error is kept for `finish`.
         self.failed = writeln!(self.out, "{line}").err();
     }
 }
@@ -102,7 +102,7 @@ pub struct Captured {
     pub bytes: Vec<u8>,
 }
 
-/// Reads a capture back. Invalid lines are an error with their number.
+/// Reads a capture. The error for an invalid line contains the line number.
 ///
 /// # Errors
 ///

@@ -18,25 +18,26 @@ use super::runtime;
 
 /// Maximum number of programs served at the same time.
 const ASKERS: usize = 8;
-/// Interval at which the door checks whether it is closed, if no event wakes it.
+/// Maximum delay until the door notices that it is closed, if no event wakes it.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 /// Pause after a connection that could not be accepted.
 const RETRY: Duration = Duration::from_millis(20);
 /// Timeout for a request and for writing an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// An open door. The door is closed before the port, because the next program that opens the port creates a door at the same path.
+/// An open door. The door must be closed before the port, because the next program that opens the port creates a door at
+/// the same path.
 pub struct Door {
     path: PathBuf,
-    /// Device and inode of the socket: another program may create a socket at the same path later.
+    /// Device and inode of the socket. They show if another program has since created a socket at the same path.
     file: (u64, u64),
     line: Arc<Line>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Door {
-    /// Opens the door of this program's port. Returns `None` if no socket can be created for it; the port works without
-    /// a door.
+    /// Opens the door of this program's port. Returns `None` if no socket can be created. The port then works without a
+    /// door.
     pub fn open(line: &Arc<Line>) -> Option<Self> {
         let name = socket_name(&line.path)?;
         let (path, listener, file) = runtime::candidates().into_iter().find_map(|folder| {
@@ -60,13 +61,13 @@ impl Door {
 impl Drop for Door {
     fn drop(&mut self) {
         self.line.close();
-        // Wakes the thread at once; without the connection the thread notices after at most 200 ms.
+        // Wakes the thread at once. Without this connection the thread would notice after at most 200 ms.
         let _ = UnixStream::connect(&self.path);
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
         if file_of(&self.path) == Some(self.file) {
-            // The file may already be deleted.
+            // The file may have been deleted already.
             let _ = fs::remove_file(&self.path);
         }
     }
@@ -76,7 +77,8 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// An existing socket belongs to a killed program, or to a program of the superuser, who can open any port. The superuser's socket is kept.
+/// Creates the socket. An existing socket that nobody serves was left by a killed program, and is replaced. If a program
+/// still serves it, the socket is kept: that program belongs to the superuser, who can open any port.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {
         return Err(io::ErrorKind::AddrInUse.into());
@@ -100,7 +102,7 @@ fn serve(listener: &UnixListener, line: &Line) {
                 Ok((stream, _)) => stream,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => continue,
                 Err(_) => {
-                    // For example too many open files: the next attempt would fail at once, too.
+                    // The cause may be too many open files. Without a pause the next attempt would fail in the same way.
                     std::thread::sleep(RETRY);
                     continue;
                 }
@@ -112,17 +114,17 @@ fn serve(listener: &UnixListener, line: &Line) {
                 continue;
             }
             let counted = Counted::new(&busy);
-            // If no thread can start, the client is disconnected and repeats its request.
+            // If no thread can be started, the client is disconnected and repeats its request.
             let _ = std::thread::Builder::new().spawn_scoped(scope, move || {
                 let _counted = counted;
-                // A disconnected client needs no answer.
+                // If the client has disconnected, the answer is not needed.
                 let _ = answer(&stream, line);
             });
         }
     });
 }
 
-/// A reader with a deadline for a whole request, even if its bytes arrive slowly.
+/// Reader with one deadline for a whole request, even if its bytes arrive slowly.
 struct Within<'a> {
     stream: &'a UnixStream,
     end: Instant,

@@ -8,7 +8,7 @@ use host_kit::{Diagnose, Diagnosis, ErrorKind, Next, next};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PortError {
-    /// The device does not exist.
+    /// The device was not found.
     #[error("{path}: there is no such port")]
     NotFound {
         /// Name of the port.
@@ -72,22 +72,22 @@ pub enum PortError {
         /// Waiting time, s.
         seconds: f64,
     },
-    /// No port was named, and no port exists.
+    /// The user selected no port, and the computer has none.
     #[error("no serial port found")]
     NoneFound,
-    /// No port was named, and several ports exist.
+    /// The user selected no port, and the computer has several.
     #[error("several serial ports found: {}", paths.join(", "))]
     Several {
         /// Names found.
         paths: Vec<String>,
     },
-    /// The path belongs to a file or a directory.
+    /// The path belongs to a file or directory instead of a port.
     #[error("{path} is no serial port")]
     NoPort {
         /// Name of the port.
         path: String,
     },
-    /// The port withholds a frame that would move the arm: the arm was stopped after the motion was requested.
+    /// The port withholds a frame that would move the arm, because the arm was stopped after the motion was requested.
     #[error("not sent: {} after this motion was requested", stopped_by(by.as_deref()))]
     Halted {
         /// Program that stopped the arm, if another program did.

@@ -1,7 +1,7 @@
 //! Stop or Pause by another program of the same user: messages at the [door](super) of the program that holds the port.
 //!
-//! The client sends one line, a request as JSON. The program that holds the port writes the frame to the line, answers
-//! with an [`Answer`], and sends an [`End`] when the arm is at rest.
+//! The client sends one line with a request as JSON. The program that holds the port writes the frame to the line and
+//! answers with an [`Answer`]. When the arm is at rest, it also sends an [`End`].
 
 use std::io;
 use std::time::Duration;
@@ -28,9 +28,9 @@ pub(super) const REQUEST_MAX: usize = 1024;
 const ANSWER_MAX: usize = 4096;
 /// Maximum size of an end, bytes.
 pub(super) const END_MAX: usize = 1024;
-/// Timeout for the answer of the program that holds the port: longer than writing a Stop eight times.
+/// Timeout for the answer of the program that holds the port. It is longer than writing a Stop eight times.
 const PATIENCE: Duration = Duration::from_secs(3);
-/// Timeout for the end: longer than a stopped arm needs to come to rest.
+/// Timeout for the final message. It is longer than a stopped arm needs to come to rest.
 const REST: Duration = Duration::from_secs(6);
 
 /// Command that a program requests from the holder of the port.
@@ -53,7 +53,7 @@ impl Halt {
     }
 }
 
-/// Request: the command and the program that sends it.
+/// Request: the command, and the name of the program that sends it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Request {
     pub halt: Halt,
@@ -67,13 +67,13 @@ pub struct Answer {
     pub program: String,
     /// Process number of that program.
     pub pid: u32,
-    /// Port, named as that program opened it.
+    /// Port, with the name that this program used to open it.
     pub port: String,
     /// Rate of the port, Bd.
     pub baud: u32,
     /// `true` if the controller has received the frame.
     pub confirmed: bool,
-    /// `true` if the controller accepted the frame: a motion could be stopped.
+    /// `true` if the controller accepted the frame, so that a motion was stopped.
     pub accepted: bool,
     /// `true` if the arm moved when the frame arrived.
     pub moved: bool,
@@ -85,14 +85,14 @@ pub struct Answer {
     pub error: Option<String>,
 }
 
-/// Final message: the state of the arm after the command.
+/// Final message with the state of the arm after the command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct End {
     /// `true` if the arm is at rest.
     pub stands: bool,
     /// `true` if the arm moved before.
     pub moved: bool,
-    /// Description of the remaining motion.
+    /// Description of the motion that remains.
     pub moving: Option<String>,
     /// State of the controller.
     #[serde(default)]
@@ -100,14 +100,14 @@ pub struct End {
     /// Trajectory execution state.
     #[serde(default)]
     pub trajectory: String,
-    /// `true` if the arm is in a held stop: a joint that still moves yields to a push or lowers its load.
+    /// `true` if the arm is in a held stop. A joint that still moves then yields to a push or lowers its load.
     #[serde(default)]
     pub held_stop: bool,
 }
 
 impl Answer {
     pub(super) fn of(port: String, baud: u32, done: Result<Option<HaltOutcome>, PortError>) -> Self {
-        // The client may run in another working directory.
+        // The client may have another working directory.
         let port = std::path::absolute(&port).map_or(port, |absolute| absolute.display().to_string());
         let own = Self { program: this_program(), pid: std::process::id(), port, baud, ..Self::default() };
         match done {
@@ -125,7 +125,7 @@ impl Answer {
     }
 }
 
-/// Returns the next step for an arm that moves after a Stop.
+/// Returns the next step if an arm still moves after a Stop.
 pub fn still_moving_help() -> Next {
     next!("press the emergency stop; {} shows the joints", Status)
 }
@@ -154,7 +154,7 @@ impl End {
         Self { stands, moved: standstill.moved(), moving, state, trajectory, held_stop }
     }
 
-    /// Returns the next step for an arm that still moves.
+    /// Returns the next step if the arm still moves.
     pub fn next_step(&self) -> Next {
         if self.held_stop {
             next!(
@@ -168,7 +168,7 @@ impl End {
     }
 }
 
-/// Returns the name of this program with the first words of its command line.
+/// Returns the name of this program and the first words of its command line.
 pub fn this_program() -> String {
     let mut words = std::env::args();
     let name = words.next().unwrap_or_default();
@@ -179,20 +179,20 @@ pub fn this_program() -> String {
     all.join(" ").chars().filter(|c| !c.is_control()).take(80).collect()
 }
 
-/// Returns `true` if this user may stop the arm: the user that runs this program.
+/// Returns `true` if `user` may stop the arm. Only the user that runs this program may.
 #[cfg(unix)]
 pub(super) fn may_ask(user: u32) -> bool {
     user == rustix::process::geteuid().as_raw()
 }
 
-/// Returns the user at the other end of a socket. If the system does not report it, the permissions of folder and
+/// Returns the user at the other end of a socket. If the operating system does not report it, the permissions of folder and
 /// socket admit no other user.
 #[cfg(target_os = "linux")]
 pub(super) fn peer(stream: &UnixStream) -> Option<u32> {
     rustix::net::sockopt::socket_peercred(stream).ok().map(|peer| peer.uid.as_raw())
 }
 
-/// Returns this program's user on systems that do not report the other end.
+/// Returns the user of this program, because this operating system does not report the other end.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(super) fn peer(_: &UnixStream) -> Option<u32> {
     Some(rustix::process::geteuid().as_raw())
@@ -207,7 +207,7 @@ fn process(stream: &UnixStream) -> Option<i32> {
     return None.filter(|_: &i32| stream.peer_addr().is_ok());
 }
 
-/// Returns the socket name of a port: its device number, which all names of the port share.
+/// Returns the socket name of a port. It contains the device number, which is the same for all names of the port.
 #[cfg(unix)]
 pub(super) fn socket_name(port: &str) -> Option<String> {
     use std::os::unix::fs::MetadataExt as _;
@@ -233,8 +233,8 @@ pub fn sockets() -> Vec<PathBuf> {
     files.flatten().map(|file| file.path()).filter(named).collect()
 }
 
-/// Returns the port of a socket, if its device is the one for which the program listened. A device that was plugged in
-/// later, or a pseudo-terminal that was opened later, may have the same number.
+/// Returns the port of a socket. Returns `None` if its device is not the one for which the program listens: a device that
+/// was plugged in later, or a pseudo-terminal that was opened later, may have the same number.
 #[cfg(unix)]
 pub fn port_of(socket: &Path) -> Option<String> {
     use std::os::unix::fs::{FileTypeExt as _, MetadataExt as _};
@@ -260,7 +260,8 @@ pub fn is_alive(socket: &Path) -> bool {
     UnixStream::connect(socket).is_ok()
 }
 
-/// Sends a request to the program that listens at this socket. Returns `None` if no program listens, or if it ended before it answered.
+/// Sends a request to the program that listens at this socket. Returns `None` if no program listens, or if it ended before
+/// it answered.
 ///
 /// # Errors
 ///
@@ -292,7 +293,7 @@ pub fn ask(socket: &Path, halt: Halt, by: &str) -> Result<Option<(Answer, Option
         let holder = format!("{} (process {})", answer.program, answer.pid);
         return Err(PortError::NotHalted { path: answer.port, holder, what: answer.error });
     }
-    // The other program may end because of the Stop, before the arm is at rest.
+    // Because of the Stop, the other program may end before the arm is at rest.
     let end = stream.set_read_timeout(Some(REST)).and_then(|()| read_line(&stream, END_MAX)).ok();
     Ok(Some((answer, end)))
 }
@@ -323,7 +324,7 @@ pub(super) fn write_line<T: Serialize>(mut stream: impl io::Write, what: &T) -> 
 mod tests {
     use super::*;
 
-    /// Another user may not stop the arm, independent of the way of the request.
+    /// Another user may not stop the arm, however the request arrives.
     #[test]
     fn the_request_of_another_user_is_refused() {
         let own = rustix::process::geteuid().as_raw();
@@ -338,7 +339,7 @@ mod tests {
         assert_eq!((peer(&one), peer(&other)), (Some(own), Some(own)));
     }
 
-    /// The emergency stop would drop an arm that is lowering its load.
+    /// The next step is to wait, because the emergency stop would drop an arm that is lowering its load.
     #[test]
     fn j70_an_arm_that_still_moves_in_a_held_stop_is_waited_for() {
         let standstill = Standstill::after(Halt::Stop);

@@ -1,9 +1,9 @@
-//! The two directions of a serial line, shared by the owner of the port and by the [door](super::door) through which other programs
-//! stop the arm.
+//! The two directions of a serial line. They are used by the owner of the port, and by the [door](super::door) through
+//! which other programs stop the arm.
 //!
-//! The door's thread writes a Stop of another program, even while the owner is busy. The Stop goes between two frames:
-//! a half-written long frame is abandoned, and a gap on the line tells the controller to drop it (J-03). From then on,
-//! frames that move the arm and were requested before the Stop are not written.
+//! The thread of the door writes the Stop of another program even while the owner is busy. The Stop is written between two
+//! frames. A half-written long frame is abandoned, and a gap on the line tells the controller to drop it (J-03). From then
+//! on, frames are not written if they move the arm and were requested before the Stop.
 
 use std::collections::VecDeque;
 use std::io;
@@ -20,29 +20,29 @@ use super::halt::Halt;
 use super::standstill::{Standstill, is_moving, is_paused};
 use super::{Halts, PortError, line_time};
 
-/// Timeout of a write that makes no progress.
+/// Timeout for a write that makes no progress.
 const STALL: Duration = Duration::from_secs(5);
-/// Bytes per write. Limits the delay until a stalled line is noticed, and the delay of a Stop.
+/// Bytes per write. It limits how late a stalled line is noticed, and how late a Stop is sent.
 const CHUNK: usize = 256;
-/// Gap on the line after an abandoned frame: the 5 ms of J-03, plus the part that adapters may remove.
+/// Gap on the line after an abandoned frame: the 5 ms of J-03, plus reserve for adapters that shorten the gap.
 const GAP: Duration = Duration::from_millis(8);
-/// Time after the last byte of a frame from which a further piece does not continue it.
+/// A piece that is written later than this time after the last byte of a frame does not continue the frame.
 const PIECE: Duration = Duration::from_millis(50);
 /// Time to wait for the record of a Stop, in addition to three statuses on the line.
 const AWAITED: Duration = Duration::from_millis(150);
-/// Number of times that a Stop is written before it counts as not confirmed.
+/// Number of times that a Stop is written. After them it is considered not confirmed.
 const TRIES: u32 = 8;
 /// Timeout for the record of a frame.
 const RECORD_TIME: Duration = Duration::from_secs(1);
-/// Time after another program's Stop in which motion requests are rejected, as with an agent.
+/// Time after another program's Stop in which motion requests are rejected. An agent does the same.
 const CALM: Duration = Duration::from_secs(3);
-/// Maximum age of a status or a jog that still describes the arm.
+/// Maximum age at which a status or a jog still describes the current state of the arm.
 const RECENT: Duration = Duration::from_millis(300);
-/// Interval at which a Stop, or the end of teaching, is repeated until the statuses show it.
+/// Interval at which a Stop or the end of teaching is repeated, until the statuses show it.
 const AGAIN: Duration = Duration::from_millis(200);
 /// Maximum time in which a stopped arm comes to rest.
 const REST: Duration = Duration::from_secs(5);
-/// Maximum number of bytes kept for an owner that does not read.
+/// Maximum number of received bytes that are kept if the owner does not read them.
 const KEPT: usize = 1 << 16;
 
 /// The outcome of another program's Stop or Pause.
@@ -62,12 +62,13 @@ pub struct Line {
     pub baud: u32,
     pub start: Instant,
     output: Mutex<Output>,
-    /// Number of Stops that wait for the output; the owner's next piece waits for them.
+    /// Number of Stops that wait for the output. The owner writes its next piece after them.
     urgent: AtomicUsize,
-    /// Number of Stops and Pauses of other programs, and of Stops alone. Both change together with `Output::halted`.
+    /// Number of Stops and Pauses of other programs, and number of the Stops alone. Both change together with
+    /// `Output::halted`.
     halts: AtomicU64,
     stops: AtomicU64,
-    /// Serialises Stops: each is written and confirmed before the next.
+    /// Lock that is held until a Stop is written and confirmed, so that Stops are handled one after the other.
     turn: Mutex<()>,
     input: Mutex<Input>,
     seen: Mutex<Seen>,
@@ -84,7 +85,7 @@ struct Output {
     free_at: Instant,
     /// `true` if the current frame was abandoned for a Stop.
     given_up: bool,
-    /// Last Stop or Pause of another program, until the owner makes a new motion request.
+    /// Last Stop or Pause of another program. The owner's next motion request removes it.
     halted: Option<Halted>,
     /// Time of the owner's last jog.
     jogged: Option<Instant>,
@@ -104,7 +105,7 @@ struct Input {
     pending: VecDeque<u8>,
 }
 
-/// Facts from the received statuses, independent of the thread that read them.
+/// Facts from the received statuses, whichever thread has read them.
 #[derive(Default)]
 struct Seen {
     status: Option<(Instant, Status)>,
@@ -112,15 +113,16 @@ struct Seen {
     moved_at: Option<Instant>,
     statuses: u64,
     damaged: u64,
-    /// `true` if the owner switched teaching on and no record reports that it is off again.
+    /// `true` if the owner has switched teaching on and no record has confirmed since that it is off.
     teaching: bool,
-    /// Frames Execute, Pause and Stop without a record, oldest first; frames that the door wrote have a number.
+    /// Frames Execute, Pause and Stop whose records have not arrived, oldest first. Frames that the door wrote have a
+    /// number.
     written: VecDeque<(Instant, Option<u64>)>,
     numbers: u64,
     answered: VecDeque<(u64, Response)>,
 }
 
-/// Guard that increments a counter until it is dropped, also if its thread panics.
+/// Guard that increments a counter until it is dropped, even if its thread panics.
 pub(super) struct Counted<'a>(&'a AtomicUsize);
 
 impl<'a> Counted<'a> {
@@ -213,13 +215,13 @@ impl Line {
         Halts { all: self.halts.load(Ordering::SeqCst), stops }
     }
 
-    /// Permits motion frames for a request made after `after` halts. The gate stays closed if another halt came since,
-    /// or if the last one is less than 3 s old.
+    /// Permits the frames of a motion that was requested after `after` halts. They stay blocked if there were further halts
+    /// since, or if the last halt is less than 3 s old.
     pub fn ask_to_move(&self, after: u64) {
         self.open_gate(after, |_| true);
     }
 
-    /// Like `ask_to_move`, to resume a paused motion. No motion is resumed after a Stop.
+    /// Like `ask_to_move`, for resuming a paused motion. After a Stop a motion cannot be resumed.
     pub fn ask_to_resume(&self, after: u64) {
         self.open_gate(after, |halt| halt == Halt::Pause);
     }
@@ -238,17 +240,17 @@ impl Line {
         self.news.notify_all();
     }
 
-    /// Returns `true` if the owner closes the port.
+    /// Returns `true` if the owner is closing the port.
     pub fn is_closing(&self) -> bool {
         self.closing.load(Ordering::SeqCst)
     }
 
-    /// Writes another program's Stop or Pause, and repeats it until the controller has received it. Returns `None` if
-    /// it is not confirmed. An owner that closes the port waits for this, because it may be closing because of the
-    /// Stop.
+    /// Writes another program's Stop or Pause, and repeats it until the controller has received it. Returns `None` if it is
+    /// not confirmed. An owner that closes the port waits for this call, because the Stop may be the reason why it closes
+    /// the port.
     pub fn halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         match self.write_halt(halt, by) {
-            // A Pause after a Stop is not written, because no motion can be paused.
+            // A Pause after a Stop is not written, because a stopped motion cannot be paused.
             Err(PortError::Halted { .. }) => {
                 let status = lock(&self.seen).status.map(|(_, status)| status);
                 Ok(status.map(|status| HaltOutcome { accepted: false, moved: false, status }))
@@ -259,7 +261,7 @@ impl Line {
 
     fn write_halt(&self, halt: Halt, by: &str) -> Result<Option<HaltOutcome>, PortError> {
         let (begin, mut jogged) = (Instant::now(), false);
-        // First, block all frames that move the arm.
+        // Before anything else, all frames that move the arm are blocked.
         self.urgently(|output| {
             if halt == Halt::Pause && output.is_stopped() {
                 return Err(output.refusal());
@@ -284,20 +286,20 @@ impl Line {
             }
         }
         let status = lock(&self.seen).status.map(|(_, status)| status);
-        // An arm in teaching is compliant; a Stop makes it hold its position.
+        // In teaching the arm is compliant. After a Stop it must hold its position.
         let taught = status.is_some_and(|status| status.state == ControllerState::Teaching);
         if halt == Halt::Stop && (taught || lock(&self.seen).teaching) {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
         }
         Ok(record.zip(status).map(|(record, status)| HaltOutcome {
             accepted: record.data == DataStatus::NoError,
-            // If the owner does not read, old statuses are read first.
+            // If the owner has not been reading, the first statuses that arrive here are old.
             moved: moved || taught || self.moved_since(begin),
             status,
         }))
     }
 
-    /// Waits until the arm is at rest. Returns the last status and the standstill state.
+    /// Waits until the arm is at rest, but at most 5 s. Returns the last status and the standstill state.
     pub fn wait_for_rest(&self, halt: Halt) -> Option<(Status, Standstill)> {
         let (end, mut standstill, mut count) = (Instant::now() + REST, Standstill::after(halt), None);
         let mut written_at = Instant::now();
@@ -311,11 +313,11 @@ impl Line {
             {
                 if halt == Halt::Stop && written_at.elapsed() >= AGAIN {
                     written_at = Instant::now();
-                    // If the line accepts no bytes, the result shows an arm that is not at rest.
+                    // If the line accepts no bytes, the statuses will show that the arm is not at rest.
                     let _ = self.insist(&status);
                 }
                 standstill.see(at.duration_since(self.start), &status);
-                // A pending teach request may start as soon as the arm is at rest.
+                // Teaching that was requested earlier may begin as soon as the arm is at rest.
                 if lock(&self.seen).teaching && halt == Halt::Stop {
                     standstill.begin_again();
                 }
@@ -329,8 +331,8 @@ impl Line {
         status.map(|(_, status)| (status, standstill))
     }
 
-    /// Repeats the effects of a Stop that the statuses do not show: the end of teaching, and the Stop itself if another
-    /// sender's Pause came after it.
+    /// Repeats those parts of a Stop that the statuses do not show yet: the end of teaching, and the Stop itself if the
+    /// Pause of another sender arrived after it.
     fn insist(&self, status: &Status) -> Result<(), PortError> {
         if status.state == ControllerState::Teaching || lock(&self.seen).teaching {
             self.write_urgent(&fixed::TEACHING_MODE_DISABLE, false)?;
@@ -346,7 +348,7 @@ impl Line {
         lock(&self.seen).moved_at.is_some_and(|at| at >= time)
     }
 
-    /// Returns the record of a Stop that was written with a number of at least `first`.
+    /// Waits for the record of a Stop whose number is at least `first`. Returns `None` if it does not arrive in time.
     fn record_since(&self, first: u64) -> Option<Response> {
         let queued = lock(&self.output).free_at.saturating_duration_since(Instant::now());
         let end = Instant::now() + queued + AWAITED + line_time(3 * STATUS_LEN, Some(self.baud));
@@ -367,7 +369,7 @@ impl Line {
         }
     }
 
-    /// Waits for the next status. If the owner does not read, this function reads for the owner.
+    /// Waits for the next status. If the owner does not read, this function reads instead.
     fn look(&self) {
         let seen = lock(&self.seen);
         let before = seen.statuses;
@@ -408,7 +410,7 @@ impl Line {
         Ok(())
     }
 
-    /// Checks bytes of the owner that begin or continue a frame.
+    /// Checks bytes of the owner at the beginning of a frame, or at the beginning of a further piece of one.
     fn begin(&self, output: &mut Output, bytes: &[u8]) -> Result<(), PortError> {
         let whole = FrameRef::new_checked(bytes).is_some();
         if !whole && output.given_up {
@@ -430,9 +432,9 @@ impl Line {
         let moves = jogs
             || bytes == fixed::EXECUTE
             || is(FrameType::TeachingModeEnable)
-            // An upload prepares a motion.
+            // An upload is the preparation of a motion.
             || is(FrameType::Trajectory);
-        // A Pause during the deceleration of a Stop would leave a motion that can be resumed.
+        // A Pause while the arm decelerates after a Stop would leave a motion that can be resumed.
         let weakens = bytes == fixed::PAUSE && output.is_stopped();
         if (moves && output.halted.is_some()) || weakens {
             return Err(output.refusal());
@@ -450,7 +452,7 @@ impl Line {
         Ok(())
     }
 
-    /// Writes a frame ahead of the owner's remaining bytes.
+    /// Writes a frame before the remaining bytes of the owner.
     fn write_urgent(&self, frame: &[u8], has_number: bool) -> Result<(), PortError> {
         self.urgently(|output| {
             if frame == fixed::PAUSE && output.is_stopped() {
@@ -476,7 +478,7 @@ impl Line {
         work(&mut lock(&self.output))
     }
 
-    /// Lets waiting Stops go first, because a mutex is not fair. Each of them takes as long as a short write.
+    /// Lets waiting Stops write first, because a mutex does not guarantee the order. Each takes as long as a short write.
     fn let_urgent_pass(&self) {
         let end = Instant::now() + STALL;
         while self.urgent.load(Ordering::SeqCst) > 0 && Instant::now() < end {
@@ -508,7 +510,7 @@ impl Line {
 }
 
 impl Output {
-    /// Returns `true` if the arm may still be coming to rest after a Stop.
+    /// Returns `true` if the arm may still be decelerating after a Stop.
     fn is_stopped(&self) -> bool {
         self.halted.as_ref().is_some_and(|halted| halted.halt == Halt::Stop && halted.at.elapsed() < REST)
     }
@@ -519,7 +521,7 @@ impl Output {
 }
 
 impl Seen {
-    /// Notes that a frame Execute, Pause or Stop is written now.
+    /// Records that a frame Execute, Pause or Stop is being written.
     fn write(&mut self, number: Option<u64>) {
         self.forget();
         self.written.push_back((Instant::now(), number));
@@ -548,7 +550,7 @@ impl Seen {
         }
     }
 
-    /// Drops frames whose record is overdue, and excess records that no thread waits for.
+    /// Drops frames whose record is overdue, and old records that no thread has taken.
     fn forget(&mut self) {
         self.written.retain(|(at, _)| at.elapsed() < RECORD_TIME);
         let excess = self.answered.len().saturating_sub(16);

@@ -1,4 +1,4 @@
-//! The serial ports of this computer, and the reason if a port cannot be used.
+//! The serial ports of this computer. For a port that cannot be used, the reason is given.
 
 use serialport::SerialPortType;
 
@@ -16,14 +16,14 @@ pub enum PortKind {
         product: u16,
         /// Serial number, if the device has one.
         serial: Option<String>,
-        /// Self-description of the device.
+        /// Description that the device gives of itself.
         description: String,
     },
     /// A card in the computer.
     Pci,
     /// A paired radio link.
     Bluetooth,
-    /// Unknown type: the system does not report it.
+    /// The operating system does not report the type.
     Unknown,
 }
 
@@ -34,7 +34,7 @@ pub struct PortInfo {
     pub path: String,
     /// Hardware type.
     pub kind: PortKind,
-    /// Reason why the port cannot be used; `None` if it can.
+    /// Reason why the port cannot be used. `None` if it can be used.
     pub problem: Option<PortError>,
 }
 
@@ -45,7 +45,7 @@ impl PortInfo {
     }
 }
 
-/// Returns all ports, sorted by name; opens each one briefly to check that it can be used.
+/// Returns all ports, sorted by name. Opens each port briefly to check that it can be used.
 ///
 /// # Errors
 ///
@@ -78,13 +78,13 @@ pub fn usb_names() -> Vec<String> {
 ///
 /// # Errors
 ///
-/// Returns an error if no port or more than one can be used; the error contains the names.
+/// Returns an error if none or several of the ports can be used. The error contains the names.
 pub fn only_one() -> Result<String, PortError> {
     let ports = list()?;
     let mut usable: Vec<String> = ports.iter().filter(|p| p.usable()).map(|p| p.path.clone()).collect();
     match usable.len() {
         1 => Ok(usable.remove(0)),
-        // A board that is connected but cannot be opened is the more helpful error.
+        // If a connected board cannot be opened, its error is more helpful than "none found".
         0 => Err(ports
             .into_iter()
             .filter(|p| matches!(p.kind, PortKind::Usb { .. }))

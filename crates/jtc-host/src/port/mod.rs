@@ -24,7 +24,8 @@ pub use list::{PortInfo, PortKind, list, only_one, usb_names};
 pub use serial::{STANDARD_RATES, SerialPort};
 pub use standstill::{Standstill, is_moving, is_paused};
 
-/// Number of times that other programs stopped or paused the arm: through a port of this program, or through the agent that holds the port.
+/// Number of times that other programs stopped or paused the arm, through a port of this program or through the agent that
+/// holds the port.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Halts {
     /// Number of Stops and Pauses.
@@ -33,13 +34,15 @@ pub struct Halts {
     pub stops: u64,
 }
 
-/// A byte stream to a controller, polled by one thread.
+/// Byte stream to a controller, polled by one thread.
 ///
-/// The port defines the time: in the simulator time is virtual and advances while `read` waits, so that runs are deterministic.
+/// The port defines the time. In the simulator time is virtual and advances while `read` waits, so that runs are
+/// deterministic.
 pub trait Port {
-    /// Waits until at least one byte is available or `timeout` has passed; returns the number of bytes read (0 after a timeout).
+    /// Waits until at least one byte is available or `timeout` has passed. Returns the number of bytes read, which is 0
+    /// after a timeout.
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> Result<usize, PortError>;
-    /// Writes all bytes to the line; may block while the line's buffer is full.
+    /// Writes all bytes to the line. May block while the buffer of the line is full.
     fn write_all(&mut self, bytes: &[u8]) -> Result<(), PortError>;
     /// Returns the time since a fixed start.
     fn now(&self) -> Duration;
@@ -49,27 +52,27 @@ pub trait Port {
     fn name(&self) -> String {
         "port".to_owned()
     }
-    /// Returns the reason, as text, why the last rejected frame did not reach the device; `None` if the device rejected
-    /// it. Only a shared line has such a reason.
+    /// Returns the reason why the last rejected frame did not reach the device. Returns `None` if the device itself
+    /// rejected it. Only a shared line gives such reasons.
     fn take_denial(&mut self) -> Option<String> {
         None
     }
-    /// Marks the start of a motion request: frames written from now on belong to it. A shared line rejects requests
-    /// that are older than another client's Stop; on other lines this call has no effect.
+    /// Marks the start of a motion request. Frames that are written from now on belong to it. A shared line rejects
+    /// requests that are older than another client's Stop. On other lines this call has no effect.
     fn ask_to_move(&mut self) -> Result<(), PortError> {
         Ok(())
     }
-    /// Returns the known number of Stops and Pauses of other programs.
+    /// Returns how often other programs have stopped or paused the arm, as far as this port knows.
     fn halts(&self) -> Halts {
         Halts::default()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), for a motion requested after `halts` of the [`halts`](Self::halts). A
-    /// request that waited, for example in a queue, is rejected if the arm was stopped since.
+    /// Like [`ask_to_move`](Self::ask_to_move), for a motion that was requested when [`halts`](Self::halts) was `halts`. If
+    /// the request waited, for example in a queue, and the arm was stopped meanwhile, the motion is rejected.
     fn ask_to_move_after(&mut self, halts: u64) -> Result<(), PortError> {
         let _ = halts;
         self.ask_to_move()
     }
-    /// Like [`ask_to_move`](Self::ask_to_move), to resume a paused motion: after a Stop no motion is resumed.
+    /// Like [`ask_to_move`](Self::ask_to_move), for resuming a paused motion. After a Stop a motion cannot be resumed.
     fn ask_to_resume(&mut self) -> Result<(), PortError> {
         self.ask_to_move()
     }

@@ -1,30 +1,30 @@
-//! The folder of this user for sockets and locks of running programs. Other users cannot write to it.
+//! Folder of this user for sockets and locks of running programs. Other users cannot write to it.
 
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Returns the folder that this program uses, if the system has one for this user alone.
+/// Returns the folder that this program uses, if the operating system has a folder for this user alone.
 pub fn folder() -> Option<PathBuf> {
     by_environment().or_else(by_user)
 }
 
-/// Returns the folders that a program of this user may use, best first.
+/// Returns the folders that a program of this user may use, in order of preference.
 #[cfg(unix)]
 pub(super) fn candidates() -> Vec<PathBuf> {
     by_environment().into_iter().chain(by_user()).collect()
 }
 
-/// Returns all folders of this user. Another program may use a different one: started with other variables, as under
-/// `su` or `cron`, or with a path too long for a socket.
+/// Returns all folders that programs of this user may use. Another program may use a different one, because its environment
+/// variables differ (`su`, `cron`) or because a path was too long for a socket.
 pub fn folders() -> Vec<PathBuf> {
     let given = std::env::var_os("XDG_RUNTIME_DIR").filter(|dir| !dir.is_empty()).map(PathBuf::from);
     let all = own_name().map_or(Vec::new(), |name| all_of(given, &std::env::temp_dir(), &name));
     all.into_iter().filter(|folder| is_own(folder)).collect()
 }
 
-/// Returns the folders for these variables. A runtime folder other than the usual one isolates its programs: then only
-/// that folder and the folder for temporary files are used.
+/// Returns the folders for these variables. If the runtime folder is not the usual one, its programs are isolated: only
+/// this folder and the folder for temporary files are used.
 fn all_of(given: Option<PathBuf>, temporary: &Path, name: &str) -> Vec<PathBuf> {
     let user = name.trim_start_matches("openjtc-");
     let usual = Path::new("/run/user").join(user);
@@ -73,7 +73,7 @@ pub fn is_own(folder: &Path) -> bool {
     folder.is_dir()
 }
 
-/// Creates the folder. Returns `None` if no location is writable by this user alone.
+/// Creates the folder. Returns `None` if there is no location to which only this user can write.
 ///
 /// # Errors
 ///
@@ -98,7 +98,7 @@ pub(super) fn create_at(folder: PathBuf) -> io::Result<Option<PathBuf>> {
 mod tests {
     use super::*;
 
-    /// A client finds the folder of a program that was started with other variables.
+    /// A client finds the folder of a program that was started with other environment variables.
     #[test]
     fn the_folders_of_programs_with_other_variables_are_found() {
         let all = |given: Option<&str>, temporary: &str| -> Vec<String> {
@@ -106,13 +106,13 @@ mod tests {
             all.iter().map(|folder| folder.display().to_string()).collect()
         };
         let (runtime, tmp) = ("/run/user/1000/openjtc", "/tmp/openjtc-1000");
-        // Without variables, as under su and cron.
+        // Under su and cron the variables are not set.
         assert_eq!(all(None, "/tmp"), [tmp, runtime]);
         assert_eq!(all(None, "/var/x"), ["/var/x/openjtc-1000", runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000/"), "/tmp"), [runtime, tmp]);
         assert_eq!(all(Some("/run/user/1000"), "/y"), [runtime, "/y/openjtc-1000", tmp]);
-        // An unusual runtime folder isolates its programs.
+        // An unusual runtime folder isolates the programs that use it.
         assert_eq!(all(Some("/z"), "/y"), ["/z/openjtc", "/y/openjtc-1000"]);
         assert_eq!(all(Some("/run/user/0"), "/tmp"), ["/run/user/0/openjtc", tmp]);
     }

@@ -12,7 +12,7 @@ use super::door::Door;
 use super::line::Line;
 use super::{Halts, Port, PortError};
 
-/// Rates up to 15 MBd that adapters support; other rates may work, too.
+/// Rates up to 15 MBd that adapters support. Other rates may also work.
 pub const STANDARD_RATES: [u32; 16] = [
     9_600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 500_000, 921_600, 1_000_000, 1_500_000,
     2_000_000, 3_000_000, 4_000_000, 12_000_000, 15_000_000,
@@ -27,11 +27,13 @@ pub struct SerialPort {
 }
 
 impl SerialPort {
-    /// Opens `path` at `baud`, with a door: other programs of this user can stop the arm while this program holds the port.
+    /// Opens `path` at `baud`, with a door through which other programs of this user can stop the arm while this program
+    /// holds the port.
     ///
     /// # Errors
     ///
-    /// Returns an error if the port does not exist, is used by another program, does not permit this user, or does not support the rate.
+    /// Returns an error if the port does not exist, is used by another program, is not accessible for this user, or does
+    /// not support the rate.
     pub fn open(path: &str, baud: u32) -> Result<Self, PortError> {
         let port = Self::open_without_door(path, baud)?;
         #[cfg(unix)]
@@ -39,17 +41,17 @@ impl SerialPort {
         Ok(port)
     }
 
-    /// Like `open`, without a door: for a program that other programs reach in another way, such as an agent.
+    /// Like `open`, but without a door. Meant for a program that offers another way to stop the arm, such as an agent.
     ///
     /// # Errors
     ///
     /// Returns the errors of [`SerialPort::open`].
     pub fn open_without_door(path: &str, baud: u32) -> Result<Self, PortError> {
-        // The builder reports a missing port in several ways; ask the file system first.
+        // The builder reports a missing port in several ways, so the file system is checked first.
         if cfg!(unix) && !std::path::Path::new(path).exists() {
             return Err(PortError::NotFound { path: path.to_owned() });
         }
-        // A regular file would give the error "not a typewriter".
+        // For a regular file the system would report "not a typewriter".
         #[cfg(unix)]
         if std::fs::metadata(path).is_ok_and(|m| !m.file_type().is_char_device()) {
             return Err(PortError::NoPort { path: path.to_owned() });
@@ -77,7 +79,7 @@ fn opening(path: &str, baud: u32, error: serialport::Error) -> PortError {
         serialport::ErrorKind::NoDevice if error.description.contains("busy") => {
             PortError::Busy { path: named }
         }
-        // If another program opened the port in shared mode, its lock appears as "try again".
+        // If another program has opened the port in shared mode, its lock leads to the error "try again".
         serialport::ErrorKind::Io(io::ErrorKind::WouldBlock) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice if cfg!(unix) => PortError::Busy { path: named },
         serialport::ErrorKind::NoDevice => PortError::NotFound { path: named },

@@ -1,4 +1,4 @@
-//! Simulated controller, drives and arm in this process, as a port in virtual time.
+//! A simulated controller with drives and arm in this process, as a port in virtual time.
 
 use std::time::{Duration, Instant};
 
@@ -6,13 +6,13 @@ use jtc_sim::World;
 
 use super::{Port, PortError};
 
-/// Size of the line's write buffer, bytes, as in an operating system: a write to a full buffer blocks.
+/// Size of the write buffer of the line, bytes. Like in an operating system, a write to a full buffer blocks.
 const WRITE_BUFFER: usize = 4096;
 
 /// Callback after each simulated millisecond.
 type Observer = Box<dyn FnMut(&World)>;
 
-/// A simulated world as a port: waiting advances virtual time.
+/// Simulated world as a port. Waiting advances the virtual time.
 pub struct SimPort {
     world: World,
     observer: Option<Observer>,
@@ -24,7 +24,7 @@ impl SimPort {
         Self { world, observer: None }
     }
 
-    /// Sets `observer`, which is called after each simulated millisecond, for recordings at 1 kHz.
+    /// Sets `observer`, which is called after each simulated millisecond. Used for recordings at 1 kHz.
     pub fn observe(&mut self, observer: impl FnMut(&World) + 'static) {
         self.observer = Some(Box::new(observer));
     }
@@ -81,24 +81,24 @@ impl Port for SimPort {
     }
 }
 
-/// Maximum simulated time to catch up at once; after a longer delay (a suspended computer) the simulation skips the delay.
+/// Maximum simulated time to catch up at once. After a longer delay, for example a suspended computer, the rest is skipped.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
-/// A simulated world as a port in real time, like a real controller.
+/// Simulated world as a port in real time, like a real controller.
 pub struct LivePort {
     world: World,
     start: Instant,
-    /// Real time that the simulation skipped.
+    /// Real time that the simulation has skipped.
     left_out: Duration,
 }
 
 impl LivePort {
-    /// Creates a port to `world`, whose time begins now.
+    /// Creates a port to `world`. The time of the world begins now.
     pub fn new(world: World) -> Self {
         Self { world, start: Instant::now(), left_out: Duration::ZERO }
     }
 
-    /// Advances the world to the present.
+    /// Advances the world to the present time.
     fn catch_up(&mut self) {
         let world = Duration::from_micros(self.world.now_us());
         let behind = self.now().saturating_sub(world);

@@ -7,7 +7,7 @@ use jtc_wire::{ControllerState, Status, TrajectoryState};
 use super::halt::Halt;
 use crate::words;
 
-/// Time without motion after which an arm counts as at rest.
+/// Time without motion after which the arm is considered at rest.
 const STILL: Duration = Duration::from_millis(200);
 
 /// Returns `true` if the arm follows a path or can be guided by hand, or if a joint moves under torque.
@@ -28,7 +28,8 @@ pub(super) fn has_torque(status: &Status) -> bool {
     status.state.is_in(&[HoldPos, Operate, Teaching])
 }
 
-/// Evaluates statuses until the arm is at rest. An arm that falls without torque is not at rest, although no Stop can hold it.
+/// Evaluates statuses until the arm is at rest. An arm that falls without torque is not at rest, although a Stop cannot
+/// hold it.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     halt: Halt,
@@ -53,12 +54,13 @@ impl Standstill {
         self.reached = now.saturating_sub(since) >= STILL;
     }
 
-    /// Returns `true` if a Stop has not taken full effect on a still arm: it must hold the arm and leave no motion that can be resumed.
+    /// Returns `true` if a Stop has not taken full effect yet, although the arm does not move. After a Stop the arm must be
+    /// held, and no motion may be left that can be resumed.
     fn is_incomplete(&self, status: &Status) -> bool {
         self.halt == Halt::Stop && (status.state == ControllerState::Teaching || is_paused(status))
     }
 
-    /// Restarts the time for which the arm must be still.
+    /// Starts again to measure the time for which the arm must be still.
     pub(super) fn begin_again(&mut self) {
         (self.since, self.reached) = (None, false);
     }
@@ -68,7 +70,7 @@ impl Standstill {
         self.reached
     }
 
-    /// Returns `true` if the arm moved at first.
+    /// Returns `true` if the arm has moved since the Stop or Pause.
     pub fn moved(&self) -> bool {
         self.moved
     }
@@ -86,14 +88,14 @@ mod tests {
         status
     }
 
-    /// Evaluates a status each 50 ms for one second.
+    /// Evaluates one status each 50 ms for one second.
     fn stands_after(halt: Halt, statuses: impl Fn(u32) -> Status) -> bool {
         let mut standstill = Standstill::after(halt);
         (0..20).for_each(|i| standstill.see(Duration::from_millis(50) * i, &statuses(i)));
         standstill.is_reached()
     }
 
-    /// A moving arm is not at rest, with torque or without.
+    /// A moving arm is not at rest, whether it has torque or not.
     #[test]
     fn an_arm_that_moves_does_not_stand_in_any_state() {
         for state in [Error, HoldPos, Init, Operate, Start] {
@@ -102,13 +104,13 @@ mod tests {
                 let reached = stands_after(Halt::Stop, |_| status(state, velocity));
                 assert_eq!(reached, stands, "{state:?} {velocity}");
             }
-            // Still for a moment only.
+            // The arm is still only for moments.
             let swings = |i: u32| status(state, if i % 4 == 3 { 0.1 } else { 0.0 });
             assert!(!stands_after(Halt::Stop, swings), "{state:?}");
         }
     }
 
-    /// A Stop ends teaching and a pause; a Pause leaves its trajectory paused.
+    /// A Stop ends both teaching and a pause. After a Pause the trajectory stays paused.
     #[test]
     fn a_stop_leaves_nothing_that_is_taught_or_can_be_resumed() {
         let paused = |state| Status { trajectory: TrajectoryState::Pause.into(), ..status(state, 0.0) };
@@ -117,7 +119,7 @@ mod tests {
             assert!(!stands_after(Halt::Stop, |_| paused(state)), "{state:?}");
             assert!(stands_after(Halt::Pause, |_| paused(state)), "{state:?}");
         }
-        // Without torque no motion can be resumed.
+        // Without torque a paused motion cannot be resumed.
         assert!(stands_after(Halt::Stop, |_| paused(Error)));
     }
 }

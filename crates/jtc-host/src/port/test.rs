@@ -5,8 +5,8 @@ use std::time::Duration;
 
 use super::{Port, PortError, line_time};
 
-/// Calls `device(now, bytes)` when bytes are written and after each virtual millisecond of waiting (with no bytes); the
-/// returned bytes are received.
+/// Calls `device(now, bytes)` when bytes are written, and, without bytes, after each virtual millisecond of waiting. The
+/// bytes that it returns are received.
 pub struct ScriptedPort<F> {
     device: F,
     now: Duration,
@@ -16,7 +16,7 @@ pub struct ScriptedPort<F> {
 }
 
 impl<F: FnMut(Duration, &[u8]) -> Vec<u8>> ScriptedPort<F> {
-    /// Creates a port to `device`. If `baud` is set, writing takes virtual time.
+    /// Creates a port to `device`. If `baud` is given, writing takes virtual time.
     pub fn new(baud: Option<u32>, device: F) -> Self {
         Self { device, now: Duration::ZERO, inbox: VecDeque::new(), baud, written: Vec::new() }
     }

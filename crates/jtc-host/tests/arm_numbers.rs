@@ -1,11 +1,12 @@
-//! Every number of an arm file, one at a time: removed, duplicated, with the opposite sign. Each change must be detected.
+//! Each number of an arm file is removed, duplicated, or given the opposite sign, one number at a time. Each change must be
+//! detected.
 use std::ops::Range;
 
 use jtc_host::arm::{Arm, Source};
 
 const AVENA: &str = include_str!("../../../arms/avena.toml");
 
-/// A number of the file.
+/// Number in the file.
 struct Number {
     /// Position in the file.
     at: Range<usize>,
@@ -48,12 +49,12 @@ fn line_of(number: &Number) -> Range<usize> {
     start..end
 }
 
-/// Returns the file without the number and its separators.
+/// Returns the file without the number and without its separators.
 fn without(number: &Number) -> String {
     let line = line_of(number);
     let (before, after) = (&AVENA[line.start..number.at.start], &AVENA[number.at.end..line.end]);
     if let Some(pair) = before.rfind("{ ").or(before.rfind(", ")).filter(|_| before.contains('{')) {
-        // A pair of an inline table is removed with its comma.
+        // In an inline table the pair of key and number is removed with its comma.
         let pair = before.rfind(", ").unwrap_or(pair) + 2;
         return with(line.start + pair..number.at.end + after.find([',', ' ']).unwrap_or(0) + 1, "");
     }
@@ -74,7 +75,8 @@ fn a_number_that_is_left_out_is_missed() {
                 let named = e.contains(number.key) || e.contains("line ") || e.contains(" values, not ");
                 assert!(named, "{} {text}: {e}", number.key);
             }
-            // A missing value with a default is listed as a default or warned about; for a rotor inertia the arm notes that it is missing.
+            // If the missing value has a default, it must be listed as a default or have a warning. A missing rotor inertia
+            // is recorded in the arm.
             Ok(arm) => {
                 let default = arm.values().iter().any(|v| v.name == number.key && v.from == Source::Default);
                 let listed = default || arm.warnings.iter().any(|w| w.problem.contains(number.key));
@@ -99,14 +101,15 @@ fn a_number_that_is_given_twice_is_refused() {
     }
 }
 
-/// A number of opposite sign is rejected, or accepted as a valid value; then exactly that value differs.
+/// A number with the opposite sign is rejected, or it is accepted as a valid value and is the only value that differs.
 #[test]
 fn a_number_of_the_other_sign_is_refused_or_is_what_differs() {
     let avena = Arm::parse(AVENA).unwrap();
     for number in numbers() {
         let text = &AVENA[number.at.clone()];
         let value: f64 = text.parse().unwrap();
-        // The arm uses polynomials, not the friction tables: for those the reader only requires increasing axes.
+        // The arm uses polynomials instead of the friction tables. So for the axes of the tables the reader only checks
+        // that they increase.
         let unused = ["temperature_c", "velocity_rad_s"].contains(&number.key);
         match Arm::parse(&with(number.at.clone(), &(-value).to_string())) {
             Ok(arm) if value != 0.0 && !unused => {

@@ -1,4 +1,4 @@
-//! Runs the bodies of the fuzz targets on the stored inputs, and on some random ones.
+//! Runs the bodies of the fuzz targets on the stored inputs and on some random inputs.
 
 use jtc_host::fuzzing;
 use proptest::prelude::*;

@@ -1,7 +1,8 @@
-//! Torque margin of plans, evaluated by the inverse dynamics and the friction law alone, at each millisecond that the controller computes.
+//! Torque margin of plans. The tests compute it independently, from the inverse dynamics and the friction law, at each
+//! millisecond that the controller computes.
 //!
-//! Tests the shipped arm, and imported ones with the proportions of a UR5 and a Z1. `JTC_TEST_ARMS` names further arm
-//! files or robot descriptions, separated by `:`.
+//! The tests use the shipped arm, and imported arms with the proportions of a UR5 and a Z1. The variable `JTC_TEST_ARMS`
+//! can list further arm files or robot descriptions, separated by `:`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -15,7 +16,7 @@ use jtc_host::plan::{self, MARGIN_PCT, PlanError, Planned, Planner, Waypoint};
 use jtc_host::{Arm, Diagnose as _, ErrorKind};
 use proptest::prelude::*;
 
-/// Axis, offset from the previous joint, mass (kg), distance of its centre (m), torque limit (N·m), friction (N·m).
+/// Axis, offset from the previous joint (m), mass (kg), position of its centre (m), torque limit (N·m), friction (N·m).
 type Part = (&'static str, [f64; 3], f64, [f64; 3], f64, f64);
 
 const UR5: [Part; JOINTS] = [
@@ -76,16 +77,18 @@ fn friction_at(friction: Option<&Friction>, config: &Config, j: usize, v: f64, c
     }
 }
 
-/// Temperatures of a plan and of a run, °C.
+/// Bearing temperatures of a plan and of a run, °C.
 const TEMPERATURES: [f64; 2] = [20.0, 30.0];
 
-/// Returns all torque problems of a plan that must keep a share of each limit free, and the smallest share that it keeps.
+/// Checks a plan that must leave the share `margin` of each limit free. Returns all torque problems as text, and the
+/// smallest share that the plan leaves free.
 fn judge(arm: &Arm, config: &Config, planned: &Planned, margin: f64) -> (String, f64) {
     let (friction, mut wrong, mut left) = (arm.friction(), String::new(), f64::INFINITY);
     let of = |j: usize, v: f64, celsius: f64| friction_at(friction.as_ref(), config, j, v, celsius);
     let dynamics = Dynamics::with_payload(&arm.model, config.gravity, &config.payload);
     let end = (planned.trajectory.duration_s() * 1e3).round() as u32;
-    // Breakaway: up to slightly more than the speed at which the sign of the friction is fully applied.
+    // The breakaway friction is the greatest friction at low speeds, up to slightly more than the speed at which the sign
+    // of the friction is fully applied.
     let breakaway: [f64; JOINTS] = std::array::from_fn(|j| {
         let fastest = config.friction_sign_width + config.joints[j].velocity_max / 128.0;
         let speeds = (-20..=20).map(|i| f64::from(i) / 20.0 * fastest);
@@ -151,7 +154,7 @@ proptest! {
         }))).collect();
         let planned = match planner.through(&waypoints) {
             Ok(planned) => planned,
-            // Gravity alone is too much for the arm with this load.
+            // With this load, gravity alone exceeds the torque of the arm.
             Err(PlanError::Plan(jtc_plan::PlanError::Torque { .. })) => return Ok(()),
             Err(PlanError::Refused(verdict)) => {
                 use jtc_host::check::ProblemKind::{HoldTorque, NoStop, Torque};
@@ -185,8 +188,8 @@ fn stretched(share: f64) -> (Arm, Config) {
 
 const OUT: [f64; JOINTS] = [0.0, 1.5, 0.0, 0.0, 0.0, 0.0];
 
-/// A pose that needs more torque than the margin permits is reached and left. The margin is kept if possible, and a
-/// margin below 10 % is named.
+/// A pose that needs more torque than the margin permits can be reached and left. The margin is kept where that is
+/// possible. If it falls below 10 %, there is a warning.
 #[test]
 fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     for share in [0.6, 0.7, 0.8, 0.86, 0.9, 0.94] {
@@ -208,8 +211,8 @@ fn a_pose_that_takes_more_than_the_margin_leaves_is_reached_and_left() {
     }
 }
 
-/// Purpose of the margin: with 10 % more mass and 20 % more friction than in the model, a plan with the default margin
-/// stays within each limit.
+/// Purpose of the margin: an arm with 10 % more mass and 20 % more friction than its model stays within each limit, if the
+/// plan has the default margin.
 #[test]
 fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() {
     let places =
@@ -231,7 +234,7 @@ fn the_default_margin_suffices_for_ten_percent_of_mass_and_twenty_of_friction() 
     }
 }
 
-/// A margin out of range is a caller's error that names the range; each value in the range is accepted.
+/// A margin out of range is a usage error that contains the range. Each margin in the range is accepted.
 #[test]
 fn a_margin_is_zero_to_fifty_percent() {
     let arm = Arm::avena();
@@ -267,7 +270,7 @@ fn a_margin_is_zero_to_fifty_percent() {
     }
 }
 
-/// A check reports the margin of any trajectory, and a warning below 10 %.
+/// A check reports the margin of any trajectory, and warns if it is below 10 %.
 #[test]
 fn a_check_names_the_margin_and_warns_below_ten_percent() {
     let arm = Arm::avena();

@@ -10,7 +10,7 @@ use jtc_host::{Diagnose, Port, frame};
 use jtc_wire::{ControllerState, DataStatus, FrameType, RawPoint, Response, Status, TrajectoryState, fixed};
 use serialport::{SerialPort as _, TTYPort};
 
-/// Returns the far end, and the path of the near end.
+/// Returns the far end of a pseudo-terminal, and the path of its near end.
 fn pair() -> (TTYPort, String) {
     let (mut far, near) = TTYPort::pair().expect("a pseudo-terminal");
     far.set_timeout(Duration::from_secs(5)).unwrap();
@@ -38,7 +38,7 @@ fn j01_bytes_go_both_ways_at_every_rate() {
             got.extend(&buffer[..n]);
         }
         assert_eq!(got, all);
-        // No bytes available: no error, no wait.
+        // If no bytes are available, `read` returns without an error and without waiting.
         assert_eq!(port.read(&mut [0; 8], Duration::ZERO).unwrap(), 0);
     }
 }
@@ -81,21 +81,21 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!((&got[..300], &got[300..]), (&segment[..300], &fixed::STOP[..]));
     let error = port.write_all(&segment[300..]).expect_err("it was given up");
     assert!(error.to_string().contains("a test stopped the arm after this motion was requested"), "{error}");
-    // Frames that move the arm are blocked; other frames are still sent.
+    // Frames that move the arm are blocked. Other frames are still sent.
     assert!(port.write_all(&segment).is_err() && port.write_all(&fixed::EXECUTE).is_err());
     assert!(port.write_all(&fixed::TEACHING_MODE_ENABLE).is_err());
-    // A Pause would turn the Stop into a pause.
+    // A Pause would change the stop into a pause.
     assert!(port.write_all(&fixed::PAUSE).is_err());
     port.write_all(&fixed::STOP).unwrap();
     port.write_all(&fixed::GET_INFO).unwrap();
     let mut got = vec![0; fixed::STOP.len() + fixed::GET_INFO.len()];
     far.read_exact(&mut got).unwrap();
     assert_eq!(got, [&fixed::STOP[..], &fixed::GET_INFO].concat());
-    // The owner does not read: the record is found nevertheless, and the owner gets its bytes later.
+    // The owner does not read. The record is found anyway, and the owner gets its bytes later.
     let record = Response::good(FrameType::TrajSetExecStatus, DataStatus::NotAllowed, 7);
     far.write_all(&status(record)).unwrap();
     let (answer, _) = loop {
-        // Statuses keep arriving, as from a controller.
+        // Statuses keep arriving, like those of a controller.
         far.write_all(&status(Response::default())).unwrap();
         std::thread::sleep(Duration::from_millis(20));
         if asked.is_finished() {
@@ -108,7 +108,7 @@ fn j03_a_stop_of_another_program_is_never_inside_a_frame() {
     assert_eq!(first, status(record));
 }
 
-/// A Stop that arrives damaged or is not answered is repeated; finally the client learns that it is not confirmed.
+/// A Stop that arrives damaged or is not answered is sent again. If it is never confirmed, the client gets an error.
 #[test]
 fn a_stop_is_written_until_the_controller_confirms_it() {
     let (mut far, path) = pair();
@@ -135,7 +135,8 @@ fn halt_unconfirmed(path: &str, halt: Halt) {
     std::thread::spawn(move || halt::ask(&socket, halt, "a test")).join().unwrap().expect_err("unconfirmed");
 }
 
-/// A motion that waits, as in a queue, was requested before the Stop; waiting does not turn it into a new request.
+/// A motion was requested before the Stop and then waits, for example in a queue. The waiting does not make it a new
+/// request.
 #[test]
 fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() {
     let (_far, path) = pair();
@@ -147,7 +148,7 @@ fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() 
     port.write_all(&fixed::EXECUTE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     assert_eq!(port.halts(), Halts { all: 1, stops: 1 });
-    // Longer than the 3 s hold-off for new requests.
+    // This is longer than the 3 s for which new requests are rejected.
     std::thread::sleep(Duration::from_millis(3100));
     for _ in 0..10 {
         port.ask_to_move_after(none.all).unwrap();
@@ -159,7 +160,8 @@ fn a_motion_requested_before_a_stop_does_not_pass_however_late_its_turn_comes() 
     port.write_all(&fixed::EXECUTE).unwrap();
 }
 
-/// J-33: a controller that gets a Pause while it decelerates for a Stop pauses. Therefore no client's Pause is written after a Stop.
+/// J-33: if a controller gets a Pause while it decelerates after a Stop, it pauses. So a Pause of any client is not written
+/// after a Stop.
 #[test]
 fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     let (mut far, path) = pair();
@@ -173,7 +175,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     };
     halt_unconfirmed(&path, Halt::Pause);
     read(&mut far, &[fixed::PAUSE; 8]);
-    // A Pause may follow a Pause, and a Stop replaces it.
+    // A Pause may follow a Pause. A Stop replaces a Pause.
     port.write_all(&fixed::PAUSE).unwrap();
     halt_unconfirmed(&path, Halt::Stop);
     read(&mut far, &[fixed::PAUSE; 1]);
@@ -188,7 +190,7 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     port.ask_to_move().unwrap();
     port.write_all(&fixed::EXECUTE).unwrap();
     read(&mut far, &[fixed::EXECUTE; 1]);
-    // After a Pause alone the motion is resumed.
+    // After a Pause without a Stop the motion can be resumed.
     halt_unconfirmed(&path, Halt::Pause);
     std::thread::sleep(Duration::from_millis(3100));
     port.ask_to_resume().unwrap();
@@ -197,7 +199,8 @@ fn j33_no_pause_is_written_after_a_stop_and_no_stopped_motion_is_resumed() {
     read(&mut far, &[fixed::EXECUTE; 1]);
 }
 
-/// Simulates a controller that loses the frames selected by the closure and sends its statuses. Returns the received bytes and the end.
+/// Simulates a controller. It calls `next` with the received bytes, and sends the status that `next` returns. Returns a
+/// flag that ends the controller, and its thread.
 fn controller(
     mut far: TTYPort,
     mut next: impl FnMut(&[u8]) -> Status + Send + 'static,
@@ -210,7 +213,7 @@ fn controller(
         let mut buffer = [0; 256];
         while !end.load(Ordering::SeqCst) {
             let n = far.read(&mut buffer).unwrap_or(0);
-            // A line whose other end does not read for a while loses statuses.
+            // Statuses are lost if the other end of the line does not read for a while.
             let _ = far.write_all(&next(&buffer[..n]).emit());
         }
     });
@@ -221,7 +224,7 @@ fn is_in(bytes: &[u8], frame: &[u8]) -> bool {
     bytes.windows(frame.len()).any(|window| window == frame)
 }
 
-/// The end of teaching is repeated until the statuses show it; before that the arm does not count as at rest.
+/// The end of teaching is written again until the statuses show it. Until then the arm is not considered at rest.
 #[test]
 fn the_end_of_teaching_is_written_until_statuses_show_it() {
     for heard in [1, 2, 5, u32::MAX] {
@@ -251,7 +254,8 @@ fn the_end_of_teaching_is_written_until_statuses_show_it() {
     }
 }
 
-/// Teaching that was requested but has not begun begins as soon as the arm is at rest: its end counts once its record has arrived.
+/// Teaching that was requested but has not begun would begin as soon as the arm is at rest. It is considered ended when the
+/// record of its end has arrived.
 #[test]
 fn teaching_that_did_not_begin_is_ended_with_a_record() {
     for heard in [1, 3, u32::MAX] {
@@ -305,7 +309,8 @@ fn a_pause_that_came_after_the_stop_is_stopped() {
     }
 }
 
-/// Two programs of the superuser may hold one port: the later program takes no socket from the earlier one, and removes only its own.
+/// Two programs of the superuser may hold one port. The later program does not replace the socket of the earlier one, and
+/// removes only its own socket.
 #[test]
 fn a_socket_of_a_living_program_is_left_alone() {
     let (_far, path) = pair();
@@ -313,7 +318,7 @@ fn a_socket_of_a_living_program_is_left_alone() {
     let socket = door(&path);
     let kept = socket.with_extension("kept");
     std::fs::rename(&socket, &kept).unwrap();
-    // Meanwhile another program listens at the same path.
+    // In the meantime another program listens at the same path.
     let other = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     drop(port);
     assert!(socket.exists(), "it is not the port's own");
@@ -325,13 +330,14 @@ fn a_socket_of_a_living_program_is_left_alone() {
     std::fs::remove_file(&socket).unwrap();
 }
 
-/// A request whose bytes arrive slowly has one deadline: it does not keep the port from closing.
+/// A request whose bytes arrive slowly has one deadline for the whole request. So it does not prevent the port from
+/// closing.
 #[test]
 fn a_request_that_comes_byte_by_byte_is_given_up() {
     let (_far, path) = pair();
     let _port = SerialPort::open(&path, 115_200).unwrap();
     let mut stream = std::os::unix::net::UnixStream::connect(door(&path)).unwrap();
-    // The door disconnects before the line is complete: the bytes would take far more than a second.
+    // The door disconnects before the line is complete. All bytes together would take far more than a second.
     let closed = (0..100).any(|_| {
         std::thread::sleep(Duration::from_millis(100));
         stream.write_all(b" ").is_err()

@@ -1,4 +1,5 @@
-//! The paths of the simulator's soak run pass the host's check: a stop on each of them must succeed.
+//! The paths of the simulator's soak run pass the check of the host, which includes that the arm can be stopped anywhere on
+//! them.
 use jtc_host::check::Checker;
 use jtc_host::{Arm, Point, Trajectory};
 use proptest::prelude::*;

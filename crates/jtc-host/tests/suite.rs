@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, to save link time: each file here is a module of it.
+//! All tests of the crate are in one program, which saves link time. Each file in this folder is a module of it.
 mod arm_numbers;
 mod codes_page;
 mod fuzz_regressions;

@@ -1,4 +1,4 @@
-//! Point at which a run was interrupted, according to its recording.
+//! Finds the point at which a run was interrupted, from its recording.
 
 use std::sync::Arc;
 
@@ -10,14 +10,14 @@ use super::Recording;
 use crate::sample::Sample;
 use crate::trajectory::Trajectory;
 
-/// Maximum path time in which the arm comes to rest after a stop, ms.
+/// Maximum path time that the arm needs to come to rest after a stop, ms.
 const RAMP_MS: u32 = 1000;
-/// Maximum distance of a measured position from a path position at rest, rad.
+/// Maximum distance of the arm at rest from a position of the path to be considered there, rad.
 const AT_REST: f64 = 0.01;
-/// Maximum distance of the commanded positions of a recording from its trajectory, rad.
+/// Maximum distance between the commanded positions of a recording and its trajectory, rad.
 const SAME: f64 = 2e-3;
 
-/// Progress of a run along its path, as far as its recording proves it.
+/// Progress of a run along its path, as far as the recording proves it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BrokenOff {
     /// Path time of the last position that the recording shows, ms; 0 if the motion had not begun.
@@ -29,25 +29,25 @@ pub struct BrokenOff {
 pub struct Resumption {
     /// Path time, ms.
     pub ms: u32,
-    /// `true` if the controller itself reports this point because the motion continued without a recording; `false` if
-    /// the recording shows it.
+    /// `true` if the controller itself reports this point, because the motion continued after the end of the recording.
+    /// `false` if the recording shows the point.
     pub shown: bool,
     /// `true` if the arm is at this point.
     pub stands: bool,
 }
 
 impl BrokenOff {
-    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part: the last position
-    /// that the recording shows. A later point counts if the controller's `status` shows that the motion continued, and
-    /// the arm is there. An arm at rest anywhere on the remaining path proves nothing, because a user may have moved it
-    /// there. A controller that was restarted or received another motion shows no point of this one; neither does a
-    /// stopped controller, whose points begin again.
+    /// Returns the point at which the run on `trajectory` can be resumed without leaving out a part. It is the last
+    /// position that the recording shows. A later point is used if the controller's `status` shows that the motion
+    /// continued to that point, and the arm is there. The position of the arm alone proves nothing, because a user may have
+    /// moved the arm along the path. A controller that was restarted or that received another motion reports no point of
+    /// this motion. A stopped controller reports its points from the start again.
     ///
-    /// `tolerance` (rad) is the maximum distance of the arm from a point at which it counts as being there.
+    /// `tolerance` is the maximum distance from a point at which the arm is considered to be there, rad.
     ///
     /// # Errors
     ///
-    /// [`NothingLeft::Finished`] if the controller shows the end of the path.
+    /// [`NothingLeft::Finished`] if the controller reports the end of the path.
     pub fn resumption(
         &self,
         trajectory: &Trajectory,
@@ -57,7 +57,7 @@ impl BrokenOff {
         let (end_ms, q) = (end_ms(trajectory), status.positions());
         let stands_at = |ms: u32| trajectory.at_ms(ms).is_some_and(|at| away(&at.position, &q) <= tolerance);
         let on_its_way = status.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
-        // A motion finishes only at its own end.
+        // A motion ends in Finish only at its last point.
         let at_end = status.trajectory == TrajectoryState::Finish && status.point == end_ms;
         let shown = (on_its_way || at_end) && status.point >= self.last_ms && stands_at(status.point);
         let ms = if shown { status.point } else { self.last_ms };
@@ -73,14 +73,14 @@ fn end_ms(trajectory: &Trajectory) -> u32 {
     (trajectory.duration_s() * 1e3).round() as u32
 }
 
-/// Returns the distance of the joint that is furthest away, rad.
+/// Returns the distance of the joint with the largest distance, rad.
 fn away(a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
-    // An unknown joint position counts as infinitely far away.
+    // An unknown position is infinitely far away.
     let far = |(a, b): (&f64, &f64)| if (a - b).is_nan() { f64::INFINITY } else { (a - b).abs() };
     a.iter().zip(b).map(far).fold(0.0, f64::max)
 }
 
-/// Reason why no part of a run remains to be resumed.
+/// Reason why a run cannot be resumed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NothingLeft {
@@ -90,7 +90,7 @@ pub enum NothingLeft {
     /// The recording contains no motion.
     #[error("the recording holds no execution of this trajectory")]
     NoExecution,
-    /// The commanded positions are not on this trajectory.
+    /// The commanded positions belong to another trajectory.
     #[error("the recording is of another trajectory, or of this one at another speed")]
     Other,
 }
@@ -109,12 +109,13 @@ impl Diagnose for NothingLeft {
 }
 
 impl Recording {
-    /// Returns the progress of the last run of this recording along `trajectory`: up to its last sample in motion or,
-    /// after a stop, up to the later position at which the recording shows the arm at rest.
+    /// Returns the progress of the last run in this recording along `trajectory`. It ends at the last sample in motion, or,
+    /// after a stop, at the later position at which the recording shows the arm at rest.
     ///
     /// # Errors
     ///
-    /// Returns [`NothingLeft`] if the run reached its end, if the recording contains no run, or if the run is of another trajectory.
+    /// Returns [`NothingLeft`] if the run reached its end, if the recording contains no run, or if the run is on another
+    /// trajectory.
     pub fn broken_off(&self, trajectory: &Trajectory) -> Result<BrokenOff, NothingLeft> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let number = self.samples.iter().rposition(moving).ok_or(NothingLeft::NoExecution)?;
@@ -128,7 +129,8 @@ impl Recording {
             let own = |of: Option<&Arc<Trajectory>>| of.is_some_and(|own| **own == *trajectory);
             let own = own(info.and_then(|info| info.commanded.as_ref()))
                 || own(info.and_then(|info| info.then.as_ref()));
-            // The interrupted motion was the approach to the first point: no part of the trajectory itself was run.
+            // The interrupted motion was the approach to the first point. The arm has not moved along the trajectory
+            // itself.
             return if own { Ok(BrokenOff { last_ms: 0 }) } else { Err(NothingLeft::Other) };
         }
         if is_end || last.point >= end_ms(trajectory) {
@@ -139,8 +141,8 @@ impl Recording {
 }
 
 impl Recording {
-    /// Returns the number of completed runs of a repeated motion: the first run on `first`, the others on `then`.
-    /// Approaches between them do not count.
+    /// Returns the number of completed runs of a repeated motion. The first run is on `first`, the others are on `then`.
+    /// Approaches between them are not counted.
     pub fn runs_finished(&self, first: &Trajectory, then: &Trajectory) -> u32 {
         let mut finished = 0;
         for (leg, ended) in self.executions() {
@@ -150,15 +152,15 @@ impl Recording {
         finished
     }
 
-    /// Returns the samples of each execution, and `true` if it reached its end: another execution follows, or the
-    /// controller reports the end.
+    /// Returns the samples of each execution, and `true` if the execution reached its end. That is the case if another
+    /// execution follows or the controller reports the end.
     fn executions(&self) -> Vec<(Vec<&Sample>, bool)> {
         let moving = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
         let mut all: Vec<(Vec<&Sample>, bool)> = Vec::new();
         for sample in &self.samples {
             match all.last_mut() {
                 Some((leg, ended)) if moving(sample) && !*ended => match leg.last() {
-                    // The point index starts again.
+                    // The point index begins again, so this is another execution.
                     Some(before) if sample.point < before.point => {
                         *ended = true;
                         all.push((vec![sample], false));
@@ -177,8 +179,9 @@ impl Recording {
     }
 }
 
-/// Returns the path time at which a stop brought the arm to rest, ms: the first position after the last one in motion
-/// (`last_ms`) that matches the arm at rest. Without torque an arm leaves its path and proves nothing.
+/// Returns the path time at which a stop brought the arm to rest, ms. It is the first position after `last_ms`, the last
+/// one in motion, that matches the arm at rest. If the arm had no torque, it may have left its path, and its position
+/// proves nothing.
 fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u32> {
     let held = |s: &Sample| s.errors == 0 && s.state.known().is_none_or(ControllerState::has_torque);
     let rest = behind.last().filter(|_| behind.iter().all(held))?;
@@ -191,7 +194,7 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
         let far = away(&trajectory.at_ms(ms)?.position, &stood);
         match nearest {
             Some((_, least)) if far < least => nearest = Some((ms, far)),
-            // The path has left this position again: a later pass does not count.
+            // The path moves away from this position. Later passes are ignored.
             Some(_) if far > AT_REST => break,
             None if far <= AT_REST => nearest = Some((ms, far)),
             _ => {}
@@ -200,12 +203,13 @@ fn at_rest(last_ms: u32, behind: &[Sample], trajectory: &Trajectory) -> Option<u
     nearest.map(|(ms, _)| ms)
 }
 
-/// Returns `true` if the commanded position of the sample is on the trajectory; without commanded positions, compares the measured ones.
+/// Returns `true` if the commanded position of the sample is on the trajectory. If commanded positions are unknown,
+/// compares the measured ones.
 fn is_on(sample: &Sample, trajectory: &Trajectory) -> bool {
     let Some(at) = trajectory.at_ms(sample.point) else { return false };
     (0..JOINTS).all(|j| {
         let joint = &sample.joints[j];
-        // Measured positions lag and contain the tracking error.
+        // Measured positions lag behind and contain the tracking error.
         let (value, same) =
             if joint.set_position.is_finite() { (joint.set_position, SAME) } else { (joint.position, 0.1) };
         (value - at.position[j]).abs() <= same
@@ -245,7 +249,7 @@ mod tests {
         };
         let way = [(0, Execute), (40, Execute), (4_000, Execute)];
         let at = |last_ms| Ok(BrokenOff { last_ms });
-        // The link was lost, the program was killed, or the controller ended the run.
+        // Possible reasons: the link was lost, the program was killed, or the controller ended the run.
         for outcome in ["", "fault"] {
             assert_eq!(of(&way, outcome), at(4_000));
         }
@@ -254,17 +258,17 @@ mod tests {
         assert_eq!(of(&paused, "stopped"), at(4_300));
         assert_eq!(of(&[&way[..], &[(10_000, Finish)]].concat(), "finished"), Err(NothingLeft::Finished));
         assert_eq!(of(&[(0, Stop)], "stopped"), Err(NothingLeft::NoExecution));
-        // The points belong to another path.
+        // The points are those of another path.
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
         assert_eq!(approach.broken_off(&demo_motion()), Err(NothingLeft::Other));
-        // Unless the trajectory is the recording's own: then the arm was approaching its first point.
+        // If the recording contains this trajectory, the arm was approaching its first point.
         approach.info =
             Some(RecordingInfo { commanded: Some(Arc::new(demo_motion())), ..RecordingInfo::default() });
         assert_eq!(approach.broken_off(&demo_motion()), at(0));
     }
 
-    /// Completed runs are counted, approaches between them are not; the first run may be the remainder of a run.
+    /// Completed runs are counted, but not the approaches between them. The first run may be the remainder of a run.
     #[test]
     fn runs_of_a_repeated_motion_are_counted() {
         use TrajectoryState::{Execute, Finish, Stop};
@@ -280,7 +284,7 @@ mod tests {
             }
         };
         let run = || recording(&whole, "");
-        // Statuses arrive every 40 ms, and possibly none of them shows the end of a run.
+        // Statuses arrive every 40 ms, so it is possible that none of them shows the end of a run.
         let unseen = || recording(&whole[..3], "");
         let part = || recording(&whole[..2], "");
         let approach = || recording_of(&other, &[(0, Execute), (9_960, Execute), (10_000, Finish)], "");
@@ -304,13 +308,13 @@ mod tests {
                 parts.len()
             );
         }
-        // The remainder of a run, then two complete ones.
+        // The remainder of a run is followed by two complete runs.
         let rest = joined(&[approach(), run(), part()], "stopped");
         assert_eq!(rest.runs_finished(&other, &demo), 2);
         assert_eq!(rest.broken_off(&demo), Ok(BrokenOff { last_ms: 5_000 }));
     }
 
-    /// A stopped controller is at its start again (point 0); the position at rest shows the progress.
+    /// A stopped controller is at its first point again (point 0). The position at rest shows the progress.
     #[test]
     fn a_stop_proves_the_place_at_which_the_arm_came_to_rest() {
         use TrajectoryState::{Execute, Stop};
@@ -328,9 +332,10 @@ mod tests {
             let found = stood(3_400, ms).broken_off(&path).unwrap().last_ms;
             assert!(found.abs_diff(ms) < 20, "{found} instead of {ms}");
         }
-        // The path turned back meanwhile, and the arm is at an earlier position: the turn is run again rather than left out.
+        // The path has turned back meanwhile, so the arm is at an earlier position. The turn is then run again instead of
+        // being left out.
         assert!(stood(4_900, 5_100).broken_off(&path).unwrap().last_ms < 4_920);
-        // Elsewhere on the path, away from it, or without torque the position proves nothing.
+        // If the arm is elsewhere on the path, away from the path, or without torque, its position proves nothing.
         let elsewhere = stood(3_400, 12_000);
         let (mut beside, mut error) = (stood(3_400, 3_700), stood(3_400, 3_700));
         beside.samples[2].joints[3].position += 0.05;
@@ -340,7 +345,7 @@ mod tests {
         }
     }
 
-    /// 0.5 → 1.0 → 0.5 → −0.5 rad of joint 1, at 0.1 rad/s.
+    /// Joint 1 moves 0.5 → 1.0 → 0.5 → −0.5 rad, at 0.1 rad/s.
     fn back_and_forth() -> Trajectory {
         let q = |k: i32| 0.01 * f64::from(if k <= 50 { 50 + k } else { 150 - k });
         let point = |k: i32| Point { position: [q(k), 0.0, 0.0, 0.0, 0.0, 0.0], ..Point::default() };
@@ -353,14 +358,15 @@ mod tests {
         status
     }
 
-    /// An arm on the remaining path counts as having moved there in this run only if the controller shows it.
+    /// An arm on the remaining path is considered to have moved there in this run only if the controller reports it.
     #[test]
     fn only_what_is_proved_counts_as_done() {
         use TrajectoryState::{Execute, Finish, Null, Pause, Stop};
         let (path, broken) = (back_and_forth(), BrokenOff { last_ms: 3_400 });
         let at = |status: &Status| broken.resumption(&path, status, 0.02);
         let recorded = |stands| Ok(Resumption { ms: 3_400, shown: false, stands });
-        // Restarted, stopped, or moved by a user: at 0 rad the arm is at the path's position of 15 s, at −0.5 rad at its end.
+        // The controller was restarted or stopped, or a user moved the arm. At 0 rad the arm is at the position of the path
+        // at 15 s, and at −0.5 rad at its end.
         for (joint_1, stands) in [(0.0, false), (-0.5, false), (0.84, true), (0.5, false)] {
             for (trajectory, point) in
                 [(Null, 0), (Stop, 0), (Finish, 15_000), (Finish, 4_000), (Finish, 3_000), (Execute, 9_000)]
@@ -372,13 +378,13 @@ mod tests {
                 );
             }
         }
-        // The motion continued by itself.
+        // The motion continued after the end of the recording.
         for trajectory in [Execute, Pause] {
             let on = at(&status(trajectory, 8_000, 0.7));
             assert_eq!(on, Ok(Resumption { ms: 8_000, shown: true, stands: true }));
         }
         assert_eq!(at(&status(Finish, 20_000, -0.5)), Err(NothingLeft::Finished));
-        // At the end of a closed path an arm is also at its start.
+        // On a closed path, an arm at the end is also at the start.
         assert_eq!(at(&status(Null, 0, -0.5)), recorded(false));
     }
 

@@ -1,4 +1,5 @@
-//! Little-endian CDR, the encoding of ROS 2 messages: each value aligned to its size, counted after the 4-byte header.
+//! Little-endian CDR, the encoding of ROS 2 messages. Each value is aligned to its size, and offsets begin after the 4-byte
+//! header.
 
 /// Encoder of a message.
 #[derive(Default)]
@@ -75,14 +76,14 @@ impl Encoder {
     }
 }
 
-/// Decoder of a message; every method returns `None` after its end.
+/// Decoder of a message. Every method returns `None` if the message is too short.
 pub(super) struct Decoder<'a> {
     body: &'a [u8],
     at: usize,
 }
 
 impl<'a> Decoder<'a> {
-    /// Creates a decoder; returns `None` unless the message is little-endian CDR.
+    /// Creates a decoder. Returns `None` unless the message is little-endian CDR.
     pub(super) fn new(bytes: &'a [u8]) -> Option<Self> {
         let body = bytes.strip_prefix(&HEADER[..2])?.get(2..)?;
         Some(Self { body, at: 0 })
@@ -133,7 +134,7 @@ impl<'a> Decoder<'a> {
         Some(values)
     }
 
-    /// Reads a sequence and returns its first six values, with NaN for missing ones.
+    /// Reads a sequence and returns its first six values. Missing values are NaN.
     pub(super) fn f64s(&mut self) -> Option<[f64; 6]> {
         let mut values = [f64::NAN; 6];
         let len = self.u32()? as usize;

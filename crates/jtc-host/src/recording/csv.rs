@@ -1,6 +1,6 @@
-//! CSV files: a header with units, then one row per sample; an unknown value is an empty field. If a run was not
-//! finished, comment lines that begin with `#` report its end. The comments follow all rows, so that a reader without
-//! support for comments gets the whole table first.
+//! CSV files: a header with units, then one row per sample. An unknown value is an empty field. If a run was not finished,
+//! comment lines that begin with `#` report how it ended. They follow after all rows, so that a reader without support for
+//! comments still gets the whole table.
 
 use std::io::{BufRead, Read, Write};
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use jtc_wire::{Code, NodeState};
 use super::{Ending, Found, RecordingError, Writer};
 use crate::sample::{JointSample, Sample};
 
-/// A value of a joint: column name after `q1_`…, and its accessor.
+/// A value of a joint: column name after `q1_` and so on, and its accessor.
 type Column = (&'static str, fn(&mut JointSample) -> &mut f64);
 
 const COLUMNS: [Column; 13] = [
@@ -107,7 +107,8 @@ impl<W: Write + Send> Writer for CsvWriter<W> {
     }
 }
 
-/// Formats a number with nine decimals: 1 nrad, far below the resolution of any sensor, at half the size of all digits.
+/// Formats a number with nine decimals. This is 1 nrad, far below the resolution of any sensor, and needs half the space of
+/// all digits.
 fn number(row: &mut String, value: f64) {
     use std::fmt::Write as _;
     if value.is_finite() {
@@ -116,7 +117,7 @@ fn number(row: &mut String, value: f64) {
     }
 }
 
-/// Maximum length of a line, bytes: the writer's lines have about 1,500.
+/// Maximum length of a line, bytes. The lines of the writer have about 1,500 bytes.
 const LINE_MAX: u64 = 1 << 20;
 
 /// Destination of the values of a column.
@@ -128,11 +129,11 @@ enum Target {
     Point,
     Errors,
     CanCurrent,
-    /// Joint, and index in [`COLUMNS`].
+    /// Joint, and index into [`COLUMNS`].
     Value(usize, usize),
     Node(usize),
     Internal(usize),
-    /// Unknown column, ignored.
+    /// Unknown column, which is ignored.
     Other,
 }
 
@@ -185,8 +186,8 @@ fn whole<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// Parses a number like [`str::parse`], but faster for short numbers such as those of the writer. If a float holds both
-/// the digits and the power of ten exactly, their quotient is rounded only once (Clinger 1990).
+/// Parses a number like [`str::parse`], but faster for short numbers such as those of the writer. If a float can hold both
+/// the digits and the power of ten exactly, the quotient is rounded only once, so it is correct (Clinger 1990).
 fn decimal(field: &[u8]) -> Option<f64> {
     const POWERS: [f64; 16] =
         [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
@@ -212,7 +213,7 @@ fn decimal(field: &[u8]) -> Option<f64> {
     whole(field)
 }
 
-/// Reader of a file's lines; the last line may be incomplete.
+/// Reader of the lines of a file. The last line may be incomplete.
 struct Lines<R> {
     file: R,
     line: Vec<u8>,
@@ -220,7 +221,8 @@ struct Lines<R> {
 }
 
 impl<R: BufRead> Lines<R> {
-    /// Returns the next line without its line end, and `true` if the line end was present; `None` after the last line.
+    /// Returns the next line without its line end, and `true` if the line end was present. Returns `None` after the last
+    /// line.
     fn next(&mut self) -> Result<Option<(&[u8], bool)>, RecordingError> {
         self.line.clear();
         self.number += 1;
@@ -238,7 +240,8 @@ fn failure(line: usize, column: Option<&str>, problem: &'static str) -> Recordin
     RecordingError::Line { path: PathBuf::new(), line, column: column.map(str::to_owned), problem }
 }
 
-/// Reads rows in order. Columns may be in any order; unknown columns are ignored, and missing ones leave values unknown.
+/// Reads the rows in order. The columns may be in any order. Unknown columns are ignored, and values of missing columns are
+/// unknown.
 pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<Found, RecordingError> {
     let mut lines = Lines { file, line: Vec::new(), number: 0 };
     let Some((header, _)) = lines.next()? else {
@@ -255,7 +258,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     while let Some((row, ended)) = lines.next()? {
         let row = row.trim_ascii();
         if !ended {
-            // Every completely written line has a line end.
+            // A line without a line end was not written completely.
             within_line = !row.is_empty();
             break;
         }
@@ -289,7 +292,7 @@ pub(super) fn scan(file: impl BufRead, see: &mut dyn FnMut(&Sample)) -> Result<F
     Ok(Found { info: None, ending, cut: cut.map(str::to_owned) })
 }
 
-/// Reads the end of the run from a comment.
+/// Reads how the run ended, from a comment.
 fn take_comment(ending: &mut Ending, row: &str) {
     for (head, value) in [(OUTCOME, &mut ending.outcome), (REASON, &mut ending.reason)] {
         if let Some(text) = row.strip_prefix(head) {

@@ -48,7 +48,7 @@ pub enum RecordingError {
         /// Problem that the reader found.
         problem: String,
     },
-    /// Messages of an MCAP file are far out of order of their times.
+    /// The messages of an MCAP file are not even nearly in the order of their times.
     Disorder {
         /// The file.
         path: PathBuf,

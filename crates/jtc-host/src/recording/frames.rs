@@ -1,11 +1,12 @@
-//! Poses of the arm's links as transforms for viewers: each joint's frame in its parent frame, named as in the description.
+//! Poses of the arm's links as transforms for viewers: the frame of each joint in its parent frame. The names are those of
+//! the description.
 
 use super::RecordingInfo;
 use super::cdr::Encoder;
 use crate::arm::frame_name;
 use crate::sample::Sample;
 
-/// Minimum interval between transforms, ns: the display rate of a viewer.
+/// Minimum interval between transforms, ns. It corresponds to the display rate of a viewer.
 const EVERY_NS: u64 = 20_000_000;
 
 /// A rotation as a unit quaternion: x, y, z, w.
@@ -22,7 +23,7 @@ fn product(a: Quaternion, b: Quaternion) -> Quaternion {
     ]
 }
 
-/// Returns the rotation by an angle, rad, about axis 0, 1 or 2.
+/// Returns the rotation by an angle (rad) about axis 0, 1 or 2.
 fn about(axis: usize, angle: f64) -> Quaternion {
     let (sin, cos) = (0.5 * angle).sin_cos();
     let mut turned = [0.0, 0.0, 0.0, cos];
@@ -35,7 +36,7 @@ fn from_rpy([roll, pitch, yaw]: [f64; 3]) -> Quaternion {
     product(about(2, yaw), product(about(1, pitch), about(0, roll)))
 }
 
-/// A frame with its pose in the parent frame.
+/// Frame with its pose in the parent frame.
 struct Placed {
     xyz: [f64; 3],
     rotation: Quaternion,
@@ -45,7 +46,7 @@ struct Placed {
 
 /// Writer of `tf2_msgs/msg/TFMessage`.
 pub(super) struct Frames {
-    /// The six joints and the flange, which is fixed.
+    /// The frames of the six joints, and of the flange, which is fixed.
     placed: [Placed; 7],
     last: Option<u64>,
 }
@@ -65,7 +66,7 @@ impl Frames {
         Self { placed: std::array::from_fn(placed), last: None }
     }
 
-    /// Writes the message of a sample, if one is due; leaves out joints with an unknown position.
+    /// Writes the message of a sample if one is due. Leaves out joints whose position is unknown.
     pub(super) fn write<'a>(
         &mut self,
         cdr: &'a mut Encoder,
@@ -79,7 +80,7 @@ impl Frames {
             return None;
         }
         self.last = Some(turn);
-        // The pose of the flange is always known.
+        // The flange does not move relative to its parent, so its pose is always known.
         cdr.start().u32(known as u32 + 1);
         for (i, placed) in self.placed.iter().enumerate().filter(|(i, _)| position(*i).is_finite()) {
             cdr.header(stamp_ns, &placed.parent).string(&placed.child);

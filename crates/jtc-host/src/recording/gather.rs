@@ -1,4 +1,4 @@
-//! Reassembly of samples from their messages, in order of their times, for any order in the file.
+//! Reassembly of samples from their messages, in the order of their times. The messages may be in any order in the file.
 
 use std::collections::VecDeque;
 
@@ -8,26 +8,27 @@ use crate::sample::Sample;
 struct Gathered {
     time_ns: u64,
     sample: Sample,
-    /// Messages received so far, one bit each.
+    /// Mask of the messages received so far, with one bit for each topic.
     came: u8,
 }
 
-/// Reassembles samples. Releases the oldest sample when the buffer of `room` samples is full, because no further message of it is expected.
+/// Reassembles samples. If the buffer of `room` samples is full, the oldest sample is released, because no further message
+/// of it is expected.
 ///
-/// A recording of this project stores the messages of a sample consecutively. A program that rewrites a file may group
-/// messages by topic; messages up to a chunk apart are still matched.
+/// In a recording of this project, the messages of a sample follow each other. A program that rewrites a file may group
+/// messages by topic. Messages that are up to a chunk apart are still matched.
 pub(super) struct Gatherer {
     /// Incomplete samples, sorted by time.
     waiting: VecDeque<Box<Gathered>>,
     room: usize,
     /// Time of the last released sample.
     given_ns: Option<u64>,
-    /// Largest number of messages of a sample so far.
+    /// Largest number of messages that a sample has had so far.
     most: u32,
     spare: Option<Box<Gathered>>,
 }
 
-/// Error: the message belongs to a released sample or to an earlier one.
+/// The message arrived too late: its sample, or a later one, has already been released.
 #[derive(Debug)]
 pub(super) struct Late;
 
@@ -37,7 +38,8 @@ impl Gatherer {
         Self { waiting: VecDeque::new(), room, given_ns: None, most: 0, spare: None }
     }
 
-    /// Returns the sample of this time, to which the message `bit` belongs; passes a sample that is released for it to `give`.
+    /// Returns the sample of this time, to which the message `bit` belongs. If a sample must be released to make space, it
+    /// is passed to `give`.
     pub(super) fn at(
         &mut self,
         time_ns: u64,
@@ -83,8 +85,8 @@ impl Gatherer {
         self.waiting.is_empty() && self.given_ns.is_none()
     }
 
-    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), drops the last sample
-    /// if messages are missing.
+    /// Releases the remaining samples at the end of the file. If the file is truncated (`cut`), the last sample is dropped
+    /// if some of its messages are missing.
     pub(super) fn finish(mut self, cut: bool, give: &mut dyn FnMut(u64, Sample)) {
         if cut && self.waiting.back().is_some_and(|last| last.came.count_ones() < self.most) {
             self.waiting.pop_back();
@@ -101,7 +103,8 @@ mod tests {
 
     use super::*;
 
-    /// Messages of topics up to `room` samples apart are matched, in order of time, and none is lost.
+    /// Messages of topics that are up to `room` samples apart are matched. The samples are in order of time, and none is
+    /// lost.
     fn gathered(messages: &[(u64, u8)], room: usize) -> Result<Vec<u64>, Late> {
         let mut gatherer = Gatherer::new(room);
         let mut given = Vec::new();

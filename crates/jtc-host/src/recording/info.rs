@@ -1,4 +1,4 @@
-//! The header of a recording: the arm, its limits, and the source of the samples.
+//! Header of a recording: the arm, its limits, and the source of the samples.
 
 use std::sync::Arc;
 
@@ -40,7 +40,7 @@ impl Default for JointInfo {
     }
 }
 
-/// End of the recorded run; empty if the recording does not contain it.
+/// How the recorded run ended. Empty if the recording does not contain it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Ending {
     /// `finished`, `stopped` or `fault`.
@@ -86,7 +86,7 @@ pub struct RecordingInfo {
     pub arm: String,
     /// "simulator", or the serial port.
     pub source: String,
-    /// Client that commanded the motion, if several clients share the line; else empty.
+    /// Client that commanded the motion, if several clients share the line. Otherwise empty.
     pub commanded_by: String,
     /// Name of the trajectory.
     pub trajectory: String,
@@ -96,7 +96,7 @@ pub struct RecordingInfo {
     pub joints: [JointInfo; 6],
     /// Origin of the flange in the last joint's frame, as in [`JointInfo::origin`].
     pub flange: [f64; 6],
-    /// Robot description (URDF) of the arm, in MCAP files; if present, the file also contains the pose of each link.
+    /// Robot description (URDF) of the arm, in MCAP files. If it is present, the file also contains the poses of the links.
     pub description: Option<Arc<str>>,
     /// Gains, base to wrist, in MCAP files.
     pub gains: Option<[PidGains; JOINTS]>,
@@ -106,16 +106,17 @@ pub struct RecordingInfo {
     pub device: Option<DeviceIdentity>,
     /// End of the run.
     pub ending: Ending,
-    /// Complete trajectory of the run, in MCAP files; needed to resume an interrupted run.
+    /// Complete trajectory of the run, in MCAP files. It is needed to resume an interrupted run.
     pub commanded: Option<Arc<Trajectory>>,
-    /// Requested number of runs of the motion, including the first, in MCAP files; `None` if not recorded.
+    /// Number of runs that the user requested, including the first, in MCAP files. `None` if not recorded.
     pub runs: Option<u32>,
-    /// Trajectory of all runs but the first, if not `commanded`: the first run was then the remainder of a run.
+    /// Trajectory of all runs except the first, if it differs from `commanded`. The first run was then the remainder of a
+    /// run.
     pub then: Option<Arc<Trajectory>>,
 }
 
 impl RecordingInfo {
-    /// Returns names, limits, gains and frames of an arm; leaves source, trajectory, start time and ending empty.
+    /// Returns names, limits, gains and frames of an arm. Source, trajectory, start time and ending are empty.
     pub fn of(arm: &Arm) -> Self {
         let origin = |i: usize| {
             let o = &arm.model.joints[i];
@@ -135,7 +136,7 @@ impl RecordingInfo {
             flange: origin(6),
             description: Some(arm.to_urdf().into()),
             gains: arm.pid,
-            // An arm without an image has no hash.
+            // Without an image of the arm, the hash is unknown.
             hash: arm.hash().ok().flatten(),
             ..Self::default()
         }

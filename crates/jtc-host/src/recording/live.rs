@@ -1,6 +1,6 @@
-//! A recording that is written during the run, so that a killed program loses only its last moments.
+//! Recording that is written during the run, so that a killed program loses only the last moments.
 //!
-//! A separate thread writes: a slow or full disk does not delay the caller.
+//! A separate thread writes the file. So a slow or full disk does not delay the caller.
 
 use std::fs::File;
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::sample::Sample;
 
 /// Maximum delay until recorded samples are written to the operating system.
 pub const FLUSH: Duration = Duration::from_millis(200);
-/// Maximum number of samples that wait for the disk: 16 s of a simulator, many minutes of a serial line.
+/// Maximum number of samples that wait for the disk. This is 16 s of a simulator, or many minutes of a serial line.
 const WAITING_MAX: usize = 1 << 14;
 
 enum Message {
@@ -27,20 +27,20 @@ enum Message {
 pub struct SampleSink(SyncSender<Message>);
 
 impl SampleSink {
-    /// Passes a sample to the recorder. Drops the samples after an error, which was reported when it occurred.
+    /// Passes a sample to the recorder. After an error, which was reported when it occurred, samples are dropped.
     pub fn write(&self, sample: &Sample) {
         let _ = self.0.send(Message::Sample(Box::new(*sample)));
     }
 }
 
-/// A recording in progress.
+/// Recording in progress.
 pub struct LiveRecorder {
     sink: SampleSink,
     thread: JoinHandle<Result<u64, RecordingError>>,
 }
 
 impl LiveRecorder {
-    /// Writes the header, so that an unwritable disk is reported here; the extension of `path` selects the format. The
+    /// Writes the header, so that an error of the disk is reported here. The extension of `path` selects the format. The
     /// writing thread calls `on_error` once, as soon as writing fails.
     pub fn begin(
         file: File,
@@ -59,17 +59,17 @@ impl LiveRecorder {
         Ok(Self { sink: SampleSink(send), thread })
     }
 
-    /// Returns a sink for samples; [`Self::finish`] ends the recording even if sinks still exist.
+    /// Returns a sink for samples. [`Self::finish`] ends the recording even if sinks still exist.
     pub fn sink(&self) -> SampleSink {
         self.sink.clone()
     }
 
-    /// Completes the file with the ending of the run, and returns the number of samples; or the error if the file is incomplete.
+    /// Completes the file with the ending of the run. Returns the number of samples, or an error if the file is incomplete.
     pub fn finish(self, ending: &Ending) -> Result<u64, RecordingError> {
         self.end(Message::End(ending.clone()))
     }
 
-    /// Ends without completing the file, which will be started again.
+    /// Ends the recording without completing the file, because it will be written again from the start.
     pub fn abandon(self) {
         let _ = self.end(Message::Abandon);
     }
@@ -120,7 +120,8 @@ mod tests {
         }
     }
 
-    /// The recording is never ended: as after `kill -9`, the file contains only the data passed to the operating system.
+    /// The recording is never ended. As after `kill -9`, the file contains only the data that were passed to the operating
+    /// system.
     #[test]
     fn what_was_recorded_is_readable_while_it_goes_on() {
         let dir = tempfile::tempdir().unwrap();
@@ -137,7 +138,7 @@ mod tests {
             assert!(whole, "{name}: {:?}", Recording::read(&path).map(|r| r.samples.len()));
             let read = Recording::read(&path).unwrap();
             assert!(read.cut.unwrap().contains("0.149 s"), "{name}");
-            // An observer that still holds a sink does not keep the recording open.
+            // A sink that an observer still holds does not keep the recording open.
             let ending = Ending { outcome: "stopped".into(), reason: "by hand".into(), ..Ending::default() };
             assert_eq!(live.finish(&ending).unwrap(), 150);
             let read = Recording::read(&path).unwrap();

@@ -22,11 +22,11 @@ use crate::trajectory::{Loaded, Trajectory};
 const METADATA: &str = "openjtc";
 /// Name of the metadata record with the [`Ending`], after all messages.
 const END: &str = "openjtc_end";
-/// Topic of a flight recorder log, as fetched from the device (J-56).
+/// Topic of a flight recorder log, with the bytes that were fetched from the device (J-56).
 const LOG_TOPIC: &str = "/jtc/log";
-/// Topic of the executed trajectory, in the header-less form of 19 columns of integers.
+/// Topic of the executed trajectory, in the form of 19 columns of integers without a header.
 const TRAJECTORY_TOPIC: &str = "/jtc/trajectory";
-/// Topic of the trajectory of later runs, in the same form.
+/// Topic of the trajectory of the later runs, in the same form.
 const THEN_TOPIC: &str = "/jtc/trajectory_then";
 
 impl From<McapError> for RecordingError {
@@ -43,7 +43,7 @@ const DESCRIPTION_TOPIC: &str = "/robot_description";
 /// Topic of the poses of the links.
 const TRANSFORMS_TOPIC: &str = "/tf";
 
-/// Writer of samples as four messages each.
+/// Writer of samples. Each sample is written as four messages.
 pub(super) struct McapWriter<W: Write + Seek> {
     out: mcap::Writer<W>,
     states: u16,
@@ -103,7 +103,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Writes a robot description in the form that robot viewers expect.
+/// Writes a robot description in the form that robot viewers read.
 fn describe<W: Write + Seek>(
     out: &mut mcap::Writer<W>,
     description: &str,
@@ -131,7 +131,7 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 }
 
-/// Returns the log of a flight recorder in a file; `None` if the recording contains no log.
+/// Returns the flight recorder log in a file. `None` if the file contains no log.
 pub(super) fn read_log(file: impl Read) -> Result<Option<Vec<u8>>, RecordingError> {
     let (mut channel, mut log) = (None, None);
     let read = each_record(file, |record| {
@@ -196,13 +196,13 @@ impl<W: Write + Seek + Send> Writer for McapWriter<W> {
     }
 }
 
-/// Topics of a sample; each has a bit in the mask of received messages.
+/// Topics of a sample. Each has a bit in the mask of received messages.
 const SAMPLE_TOPICS: [&str; 4] = [STATES_TOPIC, COMMANDS_TOPIC, CONTROL_TOPIC, STATE_TOPIC];
 
 /// Content of a channel of a file.
 #[derive(Clone, Copy)]
 enum Carries {
-    /// Messages of samples, by their index in [`SAMPLE_TOPICS`].
+    /// Messages of samples. The number is the index into [`SAMPLE_TOPICS`].
     Sample(u8),
     Trajectory,
     Then,
@@ -222,15 +222,15 @@ impl Carries {
     }
 }
 
-/// Returns the header of a file; `None` if the file is truncated before it.
+/// Returns the header of a file. `None` if the file is truncated before the header.
 ///
-/// A program that rewrote the file may have moved the header to the end: the whole file is searched.
+/// The whole file is searched, because a program that rewrote the file may have moved the header to the end.
 pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     let mut info = None;
     let mut see = |record: records::Record<'_>| match record {
         records::Record::Metadata(metadata) if metadata.name == METADATA => {
             info = Some(RecordingInfo::from_map(&metadata.metadata));
-            // The rest of the file is not needed.
+            // The header was found, and the error ends the search.
             Err(RecordingError::Empty { path: PathBuf::new() })
         }
         _ => Ok(()),
@@ -239,9 +239,9 @@ pub(super) fn read_info(file: impl Read) -> Option<RecordingInfo> {
     info
 }
 
-/// Reads the output of [`McapWriter`] up to the first damage; ignores messages of other topics. Passes samples to `see`
-/// in order of their times. Up to `room` samples wait for messages that come later in the file. `info` is the result of
-/// [`read_info`].
+/// Reads the output of [`McapWriter`] up to the first damage. Ignores messages of other topics. Passes the samples to `see`
+/// in the order of their times. Up to `room` samples wait for messages that follow later in the file. `info` is the result
+/// of [`read_info`].
 pub(super) fn scan(
     file: impl Read,
     mut info: Option<RecordingInfo>,

@@ -1,4 +1,5 @@
-//! Messages about an arm, in CDR with ROS 2 schemas: in recordings, and live for viewers that also show recordings.
+//! Messages about an arm, in CDR with ROS 2 schemas. They are used in recordings, and live for viewers that can also show
+//! recordings.
 
 use super::cdr::Encoder;
 use super::frames::Frames;
@@ -26,7 +27,7 @@ pub enum Topic {
     Control,
     /// State, error words and point of the trajectory.
     State,
-    /// Robot description (URDF) of the arm, which does not change.
+    /// Robot description (URDF) of the arm. It does not change.
     Description,
     /// Poses of the arm's links.
     Transforms,
@@ -80,7 +81,7 @@ pub(super) fn measured(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.position), j.map(|j| j.velocity), j.map(|j| j.torque)]
 }
 
-/// Returns the commanded values. The commanded effort is the model's share; the rest of the torque is feedback and friction.
+/// Returns the commanded values. The effort is the torque of the model; feedback and friction compensation are added to it.
 pub(super) fn commanded(j: &[JointSample; 6]) -> [[f64; 6]; 3] {
     [j.map(|j| j.set_position), j.map(|j| j.set_velocity), j.map(|j| j.torque_model)]
 }
@@ -137,8 +138,8 @@ impl MessageWriter {
         }
     }
 
-    /// Returns the message of a sample at a time, ns since 1970. Returns `None` if the sample has no data for the
-    /// topic; transforms are due at most 50 times a second.
+    /// Returns the message of a sample at a time (ns since 1970). Returns `None` if the sample has no data for the topic,
+    /// or if the last transforms are less than 20 ms old.
     pub fn write(&mut self, topic: Topic, stamp_ns: u64, sample: &Sample) -> Option<&[u8]> {
         let (cdr, j) = (&mut self.cdr, &sample.joints);
         match topic {

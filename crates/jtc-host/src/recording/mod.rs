@@ -1,14 +1,15 @@
-//! Recordings of a run: written as MCAP or CSV, depending on the extension of the file name, and read back for reports.
+//! Recordings of a run. They are written as MCAP or CSV, depending on the extension of the file name, and read again for
+//! reports.
 //!
-//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded),
-//! so that Foxglove, PlotJuggler and Rerun plot it directly. The torque split is on `/jtc/control` and the states are
-//! on `/jtc/state`. If the arm is known, the file is self-contained: its description (URDF) is on `/robot_description`,
-//! and the pose of each link on `/tf`. The metadata contain its limits, gains and hash, and the controller's firmware.
-//! A CSV file has one row per sample and a header that names the units; if a run was not finished, lines that begin
-//! with `#` at the end of the file report its end.
+//! An MCAP file contains `sensor_msgs/msg/JointState` on `/joint_states` (measured) and `/joint_commands` (commanded), so
+//! that Foxglove, PlotJuggler and Rerun plot it directly. The parts of the torque are on `/jtc/control`, and the states are
+//! on `/jtc/state`. If the arm is known, its description (URDF) is on `/robot_description`, and the pose of each link is on
+//! `/tf`. The metadata contain the limits, gains and hash of the arm, and the controller's firmware. A CSV file has one row
+//! per sample, and a header with the units. If a run was not finished, lines that begin with `#` at the end of the file
+//! report how it ended.
 //!
-//! A truncated file (the program was killed, the disk was full) is read up to the damage, and [`Recording::cut`]
-//! describes the missing part.
+//! If a file is truncated (the program was killed, or the disk was full), it is read up to the damage. [`Recording::cut`]
+//! then describes the missing part.
 
 mod broken_off;
 #[cfg(feature = "mcap")]
@@ -59,7 +60,7 @@ impl Format {
     ///
     /// # Errors
     ///
-    /// Returns an error for another extension, or if this program was built without the format.
+    /// Returns an error for another extension, or if this program was built without support for the format.
     pub fn of(path: &Path) -> Result<Self, RecordingError> {
         match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("mcap") if cfg!(feature = "mcap") => Ok(Format::Mcap),
@@ -74,7 +75,7 @@ impl Format {
 trait Writer: Send {
     fn write(&mut self, sample: &Sample) -> Result<(), RecordingError>;
     fn flush(&mut self) -> Result<(), RecordingError>;
-    /// Writes the ending of the run, which is known only at its end.
+    /// Writes how the run ended.
     fn end(&mut self, ending: &Ending) -> Result<(), RecordingError>;
     fn finish(self: Box<Self>) -> Result<(), RecordingError>;
 }
@@ -87,7 +88,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates (or replaces) the file; its extension selects the format.
+    /// Creates or replaces the file. Its extension selects the format.
     ///
     /// # Errors
     ///
@@ -97,7 +98,7 @@ impl Recorder {
         Self::on(File::create(path).map_err(|e| RecordingError::io(path, e))?, path, info)
     }
 
-    /// Writes to an open file; the extension of `path` selects the format.
+    /// Writes to an open file. The extension of `path` selects the format.
     ///
     /// # Errors
     ///
@@ -135,18 +136,18 @@ impl Recorder {
         self.finish()
     }
 
-    /// Writes all samples so far to the operating system: they survive the end of this program.
+    /// Writes all samples so far to the operating system, so that they are kept if this program ends.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         self.writer.flush().map_err(|e| e.at(&self.path))
     }
 
-    /// Completes the file like [`Self::finish`], with the ending of the run, which was unknown at the start.
+    /// Completes the file like [`Self::finish`], and writes how the run ended.
     pub fn finish_as(mut self, ending: &Ending) -> Result<u64, RecordingError> {
         self.writer.end(ending).map_err(|e| e.at(&self.path))?;
         self.finish()
     }
 
-    /// Completes the file (index and summary of an MCAP file) and returns its number of samples.
+    /// Completes the file, in MCAP with index and summary, and returns the number of samples.
     ///
     /// # Errors
     ///
@@ -165,7 +166,7 @@ pub fn write_all(path: &Path, info: &RecordingInfo, samples: &[Sample]) -> Resul
     Recorder::create(path, info)?.finish_with(samples)
 }
 
-/// Writes a complete recording at once to an open file; the extension of `path` selects the format.
+/// Writes a complete recording at once to an open file. The extension of `path` selects the format.
 ///
 /// # Errors
 ///
@@ -179,12 +180,12 @@ pub fn write_into(
     Recorder::on(file, path, info)?.finish_with(samples)
 }
 
-/// Writes a complete recording, and the flight recorder log that it was made from, as MCAP to an open file. Error
-/// messages use `path` as its name.
+/// Writes a complete recording as MCAP to an open file, together with the flight recorder log from which it was made. Error
+/// messages use `path` as the name of the file.
 ///
 /// # Errors
 ///
-/// Returns an error if the file cannot be written or if this program was built without MCAP.
+/// Returns an error if the file cannot be written, or if this program was built without MCAP.
 pub fn write_with_log(
     file: impl Write + Seek + Send,
     path: &Path,
@@ -209,7 +210,7 @@ pub fn write_with_log(
     }
 }
 
-/// Returns the log of a flight recorder in an MCAP file; `None` if the recording contains no log.
+/// Returns the flight recorder log in an MCAP file. `None` if the recording contains no log.
 ///
 /// # Errors
 ///
@@ -235,11 +236,11 @@ pub fn read_log(path: &Path) -> Result<Option<Vec<u8>>, RecordingError> {
 pub struct Recording {
     /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
     pub info: Option<RecordingInfo>,
-    /// End of the run.
+    /// How the run ended.
     pub ending: Ending,
     /// Samples, oldest first.
     pub samples: Vec<Sample>,
-    /// Description of the missing part of a truncated file; `None` for a complete file.
+    /// Description of the missing part of a truncated file. `None` for a complete file.
     pub cut: Option<String>,
 }
 
@@ -261,29 +262,29 @@ impl Recording {
 pub struct Scanned {
     /// Arm, limits and origin; `None` for a CSV file, which does not contain them.
     pub info: Option<RecordingInfo>,
-    /// End of the run.
+    /// How the run ended.
     pub ending: Ending,
     /// Number of samples.
     pub samples: u64,
-    /// Description of the missing part of a truncated file; `None` for a complete file.
+    /// Description of the missing part of a truncated file. `None` for a complete file.
     pub cut: Option<String>,
 }
 
-/// Maximum number of samples that wait for messages later in the file: several chunks of the writer.
+/// Maximum number of samples that wait for messages later in the file. These are several chunks of the writer.
 const ROOM: usize = 4096;
 
-/// Passes the samples of a file that [`Recorder`] wrote to `see`, oldest first. Only a part of the file is in memory,
-/// independent of its size.
+/// Passes the samples of a file that [`Recorder`] wrote to `see`, oldest first. However long the file is, only a part of it
+/// is in memory.
 ///
 /// # Errors
 ///
-/// Returns an error if the file cannot be read, is not a recording of this project, or has messages far out of order of
-/// their times. The samples before the error were passed to `see`.
+/// Returns an error if the file cannot be read, is not a recording of this project, or has messages that are not even
+/// nearly in the order of their times. The samples before the error were passed to `see`.
 pub fn scan(path: &Path, see: impl FnMut(&Sample)) -> Result<Scanned, RecordingError> {
     scan_with(path, ROOM, see)
 }
 
-/// Content of a file apart from its samples, and the reason if it is incomplete.
+/// Content of a file except its samples, and the reason if the file is incomplete.
 struct Found {
     info: Option<RecordingInfo>,
     ending: Ending,

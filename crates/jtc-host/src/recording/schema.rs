@@ -1,6 +1,6 @@
-//! ROS 2 message definitions contained in the MCAP file.
+//! ROS 2 message definitions that are written into an MCAP file.
 
-/// Adds the definitions that every header needs.
+/// Appends the definitions that every message with a header needs.
 macro_rules! with_header {
     ($fields:literal) => {
         concat!(
@@ -66,9 +66,9 @@ float64 w 1
 "
 );
 
-/// Name of the control law's message.
+/// Name of the message with the parts of the control law.
 pub(super) const CONTROL: &str = "openjtc_msgs/msg/JointControl";
-/// Definition with values per joint, base to wrist; NaN for a value that the source does not know.
+/// Definition with values per joint, base to wrist. A value that the source does not know is NaN.
 pub(super) const CONTROL_TEXT: &str = with_header!(
     "\
 std_msgs/Header header

@@ -1,4 +1,4 @@
-//! Round trips through both formats, and files that are not recordings.
+//! Both formats are written and read again, and files that are not recordings are rejected.
 
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 
@@ -109,8 +109,8 @@ fn what_is_no_recording_is_refused_by_name() {
     assert!(read_mcap(b"not an mcap file").is_err());
 }
 
-/// A file truncated at any byte returns all samples of its complete blocks, in the order in which they were written,
-/// and reports the truncation.
+/// From a file that is truncated at any byte, all samples of complete blocks are read in the order in which they were
+/// written, and the truncation is reported.
 #[test]
 fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     let dir = tempfile::tempdir().unwrap();
@@ -146,7 +146,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
                     assert_eq!(sample.point, i as u32);
                     assert!(sample.joints.iter().all(|j| j.temperature == 31.0 && j.position.is_finite()));
                 }
-                // After the last block comes the end of an MCAP file.
+                // The last block is followed by the end of the MCAP file.
                 if k + 1 == sizes.len() && more > 0 {
                     continue;
                 }
@@ -159,7 +159,7 @@ fn a_file_that_breaks_off_is_read_as_far_as_it_is_whole() {
     }
 }
 
-/// A record inside a compressed chunk whose length is a terabyte.
+/// The length of a record inside a compressed chunk claims to be a terabyte.
 #[test]
 fn a_damaged_length_takes_no_memory() {
     let mut file = b"\x89MCAP0\r\n".to_vec();
@@ -180,7 +180,7 @@ fn a_damaged_length_takes_no_memory() {
     assert!(error.contains("length"), "{error}");
 }
 
-/// The index of the limits points beyond the end of all files: the reader ignores it.
+/// The index of the limits points beyond the end of any file. The reader ignores it.
 #[test]
 fn a_damaged_index_takes_nothing_away() {
     let dir = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn a_damaged_index_takes_nothing_away() {
     let mut file = std::fs::read(&path).unwrap();
     let name = b"\x07\0\0\0openjtc";
     let at = file.windows(name.len()).rposition(|bytes| bytes == name).unwrap();
-    // Offset and length precede the name.
+    // Offset and length are written before the name.
     file[at - 16..at - 8].copy_from_slice(&(u64::MAX - 8).to_le_bytes());
     file[at - 8..at].copy_from_slice(&u64::from(16_u8).to_le_bytes());
     let (found, samples) = read_mcap(&file).unwrap();
@@ -231,8 +231,9 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
     counts
 }
 
-/// The file contains all context of its values: the arm, its gains and limits, the identity of the controller. Poses of
-/// the links are written at most 50 times a second, independent of the sample rate, and not if no position is known.
+/// The file contains everything that is needed to understand its values: the arm, its gains and limits, and the identity of
+/// the controller. Poses of the links are written at most 50 times a second, whatever the sample rate is, and only if a
+/// position is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,8 +1,10 @@
-//! Curves of a report: every sample of a short recording; for a longer one the extremes of pieces of equal length.
+//! Curves of a report. A short recording keeps every sample. A longer one is divided into pieces of equal length, and the
+//! extremes of each piece are kept.
 
 use crate::sample::{JointSample, Sample};
 
-/// Maximum number of points per curve; 16 000 keep the page below about 4 MB and are four times the resolution of a screen.
+/// Maximum number of points per curve. With 16 000 points the page stays below about 4 MB, and the curve has four times the
+/// resolution of a screen.
 pub(super) const POINTS_MAX: usize = 16_000;
 
 /// Plotted values of a joint.
@@ -13,7 +15,7 @@ pub(super) enum Curve {
     SetVelocity,
     SetAcceleration,
     Velocity,
-    /// In mrad.
+    /// Position error, mrad.
     Error,
     TorqueModel,
     TorquePid,
@@ -43,15 +45,15 @@ fn values(joint: &JointSample) -> [f64; KINDS] {
     ]
 }
 
-/// A piece of the recording: its start, its middle, and the extremes of each curve.
+/// Piece of the recording: its start, its middle, and the extremes of each curve.
 #[derive(Clone, Debug)]
 struct Bucket {
     begin_s: f64,
     middle_s: f64,
-    /// Lowest values; above `high` if no value is known.
+    /// Lowest values. If no value is known, they are above `high`.
     low: [f64; ALL],
     high: [f64; ALL],
-    /// `true` if the lowest value occurs before the highest.
+    /// `true` if the lowest value occurred before the highest.
     low_first: [bool; ALL],
 }
 
@@ -84,7 +86,7 @@ impl Bucket {
         }
     }
 
-    /// Joins this bucket with the next one, of the same length.
+    /// Joins this bucket with the next one, which has the same length.
     fn join(&mut self, next: &Self) {
         self.middle_s = next.begin_s;
         for i in 0..ALL {
@@ -109,11 +111,11 @@ impl Bucket {
     }
 }
 
-/// Curves of streamed samples in bounded memory: if there are too many buckets, neighbours are joined in pairs.
+/// Curves of streamed samples in bounded memory. If there are too many buckets, neighbours are joined in pairs.
 #[derive(Clone, Debug)]
 pub(super) struct Curves {
     buckets: Vec<Bucket>,
-    /// Number of samples in a bucket; 1: each sample is a point.
+    /// Number of samples in a bucket. If it is 1, each sample is a point.
     width: usize,
     /// Number of samples in the last bucket.
     filled: usize,
@@ -144,7 +146,7 @@ impl Curves {
         self.last_s = sample.time_s;
     }
 
-    /// Joins the buckets, all full, in pairs.
+    /// Joins the buckets in pairs. All buckets must be full.
     fn double(&mut self) {
         for i in 0..self.buckets.len() / 2 {
             let (first, next) = self.buckets.split_at_mut(2 * i + 1);
@@ -163,7 +165,7 @@ impl Curves {
         self.buckets.capacity() * size_of::<Bucket>()
     }
 
-    /// Returns the number of samples per bucket; 1: every sample is a point.
+    /// Returns the number of samples per bucket. If it is 1, every sample is a point.
     pub(super) fn bucket(&self) -> usize {
         self.width
     }
@@ -180,14 +182,15 @@ impl Curves {
         }
         let mut times: Vec<f64> =
             self.buckets.iter().flat_map(|bucket| [bucket.begin_s, bucket.middle_s]).collect();
-        // The curve reaches to the end, even if its last piece is incomplete.
+        // The curve reaches to the last sample, even if its last piece is incomplete.
         if let Some(last) = times.last_mut().filter(|_| self.filled < self.width) {
             *last = self.last_s;
         }
         times
     }
 
-    /// Returns the values at those times: the extremes of each bucket, in the order in which they occur. NaN if no value is known.
+    /// Returns the values at those times: the extremes of each bucket, in the order in which they occurred. NaN if no value
+    /// is known.
     pub(super) fn values(&self, curve: Curve, joint: usize) -> Vec<f64> {
         let i = joint * KINDS + curve as usize;
         let mut values = Vec::with_capacity(self.len());
@@ -205,15 +208,15 @@ impl Curves {
     }
 }
 
-/// Number of pieces kept of a row of states; pieces are joined when there are twice as many.
+/// Number of pieces to which a row of states is reduced when it has twice as many.
 const RUNS_MAX: usize = 8_192;
 
-/// Rule for joining two pieces if there are too many.
+/// Rule for the value of two pieces that are joined.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Joined {
     /// Keep the value of the longer piece: for states.
     Longer,
-    /// Combine the bits of both: for errors, so that none is lost.
+    /// Combine the bits of both: for errors, so that no error is lost.
     Both,
 }
 
@@ -243,9 +246,9 @@ impl Runs {
         }
     }
 
-    /// Joins the pieces in pairs, and neighbours with equal values.
+    /// Joins the pieces in pairs. Neighbours that then have equal values are joined too.
     fn halve(&mut self) {
-        // The last piece continues.
+        // The last piece is not joined, because it may still grow.
         let last = self.runs.pop();
         let mut fewer: Vec<(f64, f64, u64)> = Vec::with_capacity(RUNS_MAX);
         for two in self.runs.chunks(2) {

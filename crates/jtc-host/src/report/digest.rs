@@ -1,4 +1,4 @@
-//! Data that a report needs from its samples. The samples are streamed: memory does not grow with their number.
+//! Data that a report needs from its samples. The samples are streamed, so the memory does not grow with their number.
 
 use super::curves::{Curves, Joined, Runs};
 use super::summary::Figures;
@@ -7,9 +7,10 @@ use super::{RunFailure, Summary};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Samples reduced to the content of a report: its figures, curves with their extremes, and the first error.
+/// Samples reduced to the content of a report: figures, curves with their extremes, and the first error.
 ///
-/// Takes about 20 MB, for a minute as for a day. The plots of up to 16,000 samples show each of them.
+/// It takes about 20 MB, whether the recording lasts a minute or a day. For up to 16,000 samples the plots show each
+/// sample.
 #[derive(Clone, Debug)]
 pub struct Digest {
     samples: u64,

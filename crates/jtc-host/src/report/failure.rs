@@ -14,10 +14,11 @@ use crate::words;
 /// Number of samples shown before and after the first bad sample.
 pub(super) const BEFORE: usize = 3;
 const AFTER: usize = 2;
-/// Share of the velocity limit above which a step of the measured position counts as a jump: noise and time jitter stay below.
+/// A step of the measured position is a jump if it exceeds the velocity limit by this factor. Noise and time jitter cause
+/// smaller steps.
 const STEP_SHARE: f64 = 1.2;
 
-/// Values of a joint at one moment near the failure; unknown values are NaN.
+/// Values of a joint at one moment near the failure. Unknown values are NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Moment {
     /// Time since the start of the run, ms.
@@ -42,36 +43,37 @@ pub struct Moment {
     pub first: bool,
 }
 
-/// The failure of a run.
+/// Failure of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RunFailure {
     /// Problems found, the first error before its consequences.
     pub causes: Vec<String>,
     /// First failed joint; `None` if no joint failed.
     pub joint: Option<Joint>,
-    /// Time since the start of the run, ms; in motion by the controller's count of 1 ms points.
+    /// Time since the start of the run, ms. In motion it comes from the point index of the controller.
     pub at_ms: f64,
     /// Time of the first sample that shows the failure, s, on the clock of the samples.
     pub time_s: f64,
-    /// Time since the last good sample, ms: the failure occurred within this time.
+    /// Time since the last sample without an error, ms. The failure occurred within this time.
     pub within_ms: f64,
     /// Values around the failure.
     pub moments: Vec<Moment>,
-    /// `true` for a log, whose times are those of the device: s since its start.
+    /// `true` for a log. Its times are those of the device, in seconds since its start.
     #[serde(skip)]
     pub in_log: bool,
 }
 
 impl RunFailure {
-    /// Returns the first error in the samples since a trajectory was executed; `None` for a run without errors.
+    /// Returns the first error since the start of the execution. Without an execution, searches all samples. `None` if there
+    /// is no error.
     pub fn find(info: &RecordingInfo, samples: &[Sample]) -> Option<Self> {
         let begin = begin(samples);
         let at = begin + samples.get(begin..)?.iter().position(is_bad)?;
         Some(Self::found(info, &Around::of(samples, at)))
     }
 
-    /// Returns the failure of a recorded run: an error in its samples, else the recorded reason for its end, else the
-    /// fact that the recording does not show its end.
+    /// Returns the failure of a recorded run. It is an error in the samples, or else the recorded reason for the end, or
+    /// else the fact that the recording does not show the end.
     pub fn of_recording(info: &RecordingInfo, samples: &[Sample], ending: &Ending) -> Option<Self> {
         if let Some(found) = Self::find(info, samples) {
             return Some(found);
@@ -80,7 +82,7 @@ impl RunFailure {
         Some(Self::ended_by(info, samples, why_it_ended(ending, unseen)?))
     }
 
-    /// Returns the first error of a log, at the sample of `time_s`, with these causes and this joint.
+    /// Returns the failure of a log, at the sample of `time_s`, with these causes and this joint.
     pub fn in_log(
         info: &RecordingInfo,
         samples: &[Sample],
@@ -93,7 +95,8 @@ impl RunFailure {
         Self { in_log: true, ..Self::at(info, &around, causes, joint) }
     }
 
-    /// Returns the failure of a run that ended without an error in its samples: at the last sample, for the given reason.
+    /// Returns the failure of a run whose samples contain no error. The moment is the last sample, and the cause is the
+    /// given reason.
     pub fn ended_by(info: &RecordingInfo, samples: &[Sample], reason: String) -> Self {
         Self::at(info, &Around::of(samples, samples.len().saturating_sub(1)), vec![reason], None)
     }
@@ -104,7 +107,7 @@ impl RunFailure {
         found.unwrap_or_else(|| Self::ended_by(info, samples, error.to_string())).with_error(error)
     }
 
-    /// Adds details that only the run's error contains: the errors that the drives report themselves.
+    /// Adds details that only the error of the run contains: the errors that the drives report.
     pub fn with_error(self, error: &Error) -> Self {
         match error {
             Error::Motion(MotionError::RunFault { status, .. }) => self.with_status(status),
@@ -112,7 +115,7 @@ impl RunFailure {
         }
     }
 
-    /// Adds the errors that the drives report themselves.
+    /// Adds the errors that the drives report.
     pub(super) fn with_status(self, status: &Status) -> Self {
         let (causes, joint) = causes(&Words::of_status(status));
         if causes.is_empty() { self } else { Self { causes, joint: joint.or(self.joint), ..self } }
@@ -165,7 +168,7 @@ impl RunFailure {
                 first: i == at,
             }
         };
-        // History of the failed joint around the failure; if no joint failed, all joints up to that moment.
+        // If a joint failed, shows this joint before and after the failure. If not, shows all joints up to the failure.
         let moments = match joint {
             Some(joint) => (at.saturating_sub(BEFORE)..samples.len().min(at + AFTER + 1))
                 .map(|i| moment(i, joint))
@@ -180,7 +183,7 @@ impl RunFailure {
         Self { causes, joint, at_ms: into_ms(at), time_s: time(at), within_ms, moments, in_log: false }
     }
 
-    /// Header of the table: text, then figures with their units.
+    /// Header of the table: texts, then figures with their units.
     pub const HEAD: [&'static str; 9] = [
         "ms",
         "joint",
@@ -193,7 +196,7 @@ impl RunFailure {
         "errors",
     ];
 
-    /// Returns the rows of the table; a dash for an unknown value.
+    /// Returns the rows of the table. An unknown value is a dash.
     pub fn rows(&self) -> Vec<[String; 9]> {
         let figure = |v: f64, digits: usize| {
             if v.is_finite() { format!("{v:.digits$}").replace('-', "−") } else { "–".to_owned() }
@@ -251,7 +254,8 @@ pub(super) fn is_bad(sample: &Sample) -> bool {
     sample.errors != 0 || sample.state == ControllerState::Error
 }
 
-/// Returns the reason why a run failed whose samples show no error; `unseen`: the last sample is in motion. `None` if the run did not fail.
+/// Returns the reason why a run failed although its samples show no error. `unseen` is `true` if the last sample is in
+/// motion. Returns `None` if the run did not fail.
 pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     match (ending.is_fault(), ending.reason.as_str()) {
         (true, "") => Some("the run ended in a fault that the recording does not name".to_owned()),
@@ -263,7 +267,7 @@ pub(super) fn why_it_ended(ending: &Ending, unseen: bool) -> Option<String> {
     }
 }
 
-/// A moment, with the samples shown before and after it.
+/// A moment with the samples before and after it that are shown.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Around {
     pub(super) samples: Vec<Sample>,
@@ -280,7 +284,7 @@ impl Around {
         Self { samples: piece.to_vec(), at: at - from, start_s: start_s(samples, at) }
     }
 
-    /// Adds a following sample, if it is near the moment.
+    /// Adds a later sample if it is near enough to the moment.
     pub(super) fn follow(&mut self, sample: &Sample) {
         if self.samples.len() <= self.at + AFTER {
             self.samples.push(*sample);
@@ -288,13 +292,14 @@ impl Around {
     }
 }
 
-/// Returns the joint whose measured position changed by more than its velocity limit permits between two samples around
-/// the sample `at`, with a description. Used if the status names no joint.
+/// Finds a joint whose measured position, around the sample `at`, changed between two samples by more than its velocity
+/// limit permits. Returns the joint and a description. Used if the status does not show which joint failed.
 fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint, String)> {
     let mut worst: Option<(f64, Joint, String)> = None;
     for i in at.max(1)..samples.len().min(at + 2) {
         let since = |i: usize| samples[i].time_s - samples[i.saturating_sub(1)].time_s;
-        // After the fault the times are arrival times: samples that arrived together were not measured together.
+        // After a failure the times are arrival times. Samples that arrive together were not measured together, so the
+        // longest of the last intervals is used.
         let span_s = (1..=i).rev().take(3).map(since).fold(0.0, f64::max);
         for (joint, limits) in Joint::ALL.into_iter().zip(&info.joints) {
             let position = |i: usize| samples[i].joints[joint.index()].position;
@@ -313,12 +318,12 @@ fn stepped(info: &RecordingInfo, samples: &[Sample], at: usize) -> Option<(Joint
     worst.map(|(_, joint, words)| (joint, words))
 }
 
-/// Returns the index of the first sample of the execution, or of the first of all samples.
+/// Returns the index of the first sample in an execution. Without an execution, returns the index of the first sample.
 fn begin(samples: &[Sample]) -> usize {
     samples.iter().position(Sample::is_operating).unwrap_or(0)
 }
 
-/// Returns the start of the run, s; the controller's count of milliseconds at the last sample in motion is the most precise.
+/// Returns the start of the run, s. The point index of the last sample in motion gives it most precisely.
 fn start_s(samples: &[Sample], at: usize) -> f64 {
     let known = &samples[..samples.len().min(at + 1)];
     match known.iter().rfind(|s| s.state == ControllerState::Operate) {
@@ -327,12 +332,12 @@ fn start_s(samples: &[Sample], at: usize) -> f64 {
     }
 }
 
-/// Returns the start of the run of this sample, s.
+/// Returns the start of the run, computed from this sample, s.
 pub(super) fn began_s(sample: &Sample) -> f64 {
     sample.time_s - f64::from(sample.point) * 1e-3
 }
 
-/// Error words of a moment, from a sample or a status.
+/// Error words at one moment, from a sample or a status.
 struct Words {
     errors: u16,
     can: u32,
@@ -379,7 +384,8 @@ impl Words {
     }
 }
 
-/// Returns the problems, joints first because the controller's own errors follow from them, and the first failed joint.
+/// Returns the problems and the first failed joint. The joints come first, because the controller's own errors follow from
+/// them.
 fn causes(words: &Words) -> (Vec<String>, Option<Joint>) {
     let mut all = Vec::new();
     let mut first = None;

@@ -3,7 +3,7 @@ use super::Facts;
 use crate::session::{LinkStatistics, UploadReport};
 
 impl Facts {
-    /// Returns the facts about upload and link of a run on a line of this rate, Bd.
+    /// Returns the facts about upload and link of a run, on a line with this rate (Bd).
     pub fn of_link(upload: &UploadReport, link: &LinkStatistics, baud: Option<u32>) -> Self {
         let share = upload.line_share_percent();
         let share = share.map_or(String::new(), |s| format!(", {s:.1} % of what the line can carry"));

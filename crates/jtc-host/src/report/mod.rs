@@ -1,8 +1,8 @@
-//! Report of a run: figures per joint, a self-contained HTML page with interactive plots, and a small picture.
+//! Report of a run: figures per joint, an HTML page with interactive plots that needs no other files, and a small picture.
 //!
-//! [`Digest`] receives the samples of a minute or of a day one after the other, and keeps the data for a report.
-//! [`Summary`] contains the figures, [`html`] creates the page (it opens offline: plots, styles and data are inside),
-//! and [`picture_svg`] draws commanded and measured positions and the tracking error as one SVG.
+//! [`Digest`] receives the samples one after the other, and keeps the data that a report needs. [`Summary`] contains the
+//! figures. [`html`] creates the page. It can be opened offline, because it contains the plot library, the styles and the
+//! data. [`picture_svg`] draws the commanded and measured positions and the tracking error as one SVG.
 
 mod curves;
 mod digest;
@@ -27,7 +27,7 @@ pub use summary::{JointSummary, Summary};
 use crate::plan::Bound;
 use crate::recording::RecordingInfo;
 
-/// A titled list of facts, which the page shows as a table: link statistics, settings of the run.
+/// Facts with a title, which the page shows as a table: link statistics, settings of the run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Facts {
     /// Heading of the table.
@@ -45,9 +45,9 @@ pub struct ReportInput<'a> {
     pub digest: &'a Digest,
     /// Tables to show next to the plots.
     pub facts: &'a [Facts],
-    /// First error if the run failed; shown at the top of the page.
+    /// First error if the run failed. It is shown at the top of the page.
     pub failure: Option<&'a RunFailure>,
-    /// Binding limits of a motion that was planned but not run; `None` for a run.
+    /// Binding limits of a motion that was planned but not run. `None` for a run.
     pub plan: Option<&'a [Bound]>,
 }
 

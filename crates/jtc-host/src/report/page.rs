@@ -1,4 +1,4 @@
-//! The HTML page: a frame of text, the vendored plot library, the project's style and script, and the data as JSON.
+//! The HTML page: a template, the vendored plot library, the project's style and script, and the data as JSON.
 
 use serde_json::{Value, json};
 
@@ -13,7 +13,7 @@ const SCRIPT: &str = include_str!("assets/report.js");
 const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const PLOT_SCRIPT: &str = include_str!("assets/uPlot.iife.min.js");
 
-/// Returns the complete page; write it to a file and open it, no network is needed.
+/// Returns the complete page. It can be written to a file and opened without a network.
 pub fn html(input: &ReportInput<'_>) -> String {
     // `<` is escaped so that no text can end the script element.
     let data = data(input).to_string().replace('<', "\\u003c");
@@ -24,7 +24,7 @@ pub fn html(input: &ReportInput<'_>) -> String {
     });
     let mut page = String::with_capacity(data.len() + 200_000);
     let mut rest = PAGE;
-    // Searches each mark only after the previous one, so that inserted text is never searched.
+    // Each mark is searched only after the previous one, so that inserted text is never searched.
     for (mark, text) in [
         ("{{title}}", title.as_str()),
         ("{{plot_style}}", PLOT_STYLE),
@@ -60,7 +60,7 @@ fn data(input: &ReportInput<'_>) -> Value {
         (0..6).map(|j| pack(&curves.values(curve, j))).collect()
     };
     let start_s = digest.span_s().map_or(0.0, |(first, _)| first);
-    // Non-finite numbers become `null`, which the page shows as unknown.
+    // JSON has no NaN. It becomes `null`, which the page shows as unknown.
     let joints: Value = (0..6)
         .map(|j| {
             let joint = &info.joints[j];
@@ -110,7 +110,7 @@ fn data(input: &ReportInput<'_>) -> Value {
     })
 }
 
-/// Returns times relative to the first sample: f32 resolves them to microseconds in a run of a few minutes.
+/// Returns times relative to the first sample, because f32 resolves microseconds only in a run of a few minutes.
 fn relative(times: &[f64]) -> Vec<f64> {
     let start = times.first().copied().unwrap_or(0.0);
     times.iter().map(|t| t - start).collect()

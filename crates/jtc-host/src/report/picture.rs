@@ -1,4 +1,4 @@
-//! A small picture of a run: commanded and measured positions of the six joints, and the tracking error below.
+//! A small picture of a run: commanded and measured positions of the six joints, and the tracking error below them.
 
 use std::fmt::Write;
 
@@ -7,14 +7,14 @@ use super::{ReportInput, escape};
 
 const WIDTH: f64 = 960.0;
 const HEIGHT: f64 = 560.0;
-/// Points per line, enough for its width in pixels.
+/// Points per line. They are enough for the width in pixels.
 const POINTS: usize = 260;
 /// Minimum and maximum number of grid lines of an axis.
 const TICKS: (usize, usize) = (3, 12);
-/// Largest value that is drawn; larger values count as invalid.
+/// Largest magnitude that is drawn. Larger values are invalid.
 const DRAWN_MAX: f64 = 1e30;
 
-/// Light colours by default, dark ones if the reader prefers them, as on the page.
+/// Colours of the page: light by default, dark if the reader prefers dark pages.
 const STYLE: &str = "\
 svg{--paper:#fffefb;--ink:#1b1f24;--soft:#5f666f;--grid:#eceae2;--j0:#2559d6;--j1:#dd6412;--j2:#0c8a5b;--j3:#c02c7c;--j4:#7547cf;--j5:#94780a}\
 @media (prefers-color-scheme:dark){svg{--paper:#161a20;--ink:#e9ebee;--soft:#9aa3af;--grid:#262c35;--j0:#7aa5ff;--j1:#ff9d57;--j2:#43d39e;--j3:#ff77b6;--j4:#b79bff;--j5:#e3c84c}}\
@@ -23,15 +23,15 @@ text{font-family:system-ui,-apple-system,'Segoe UI','Noto Sans',sans-serif;font-
 .g{stroke:var(--grid);stroke-width:1}.c{fill:none;stroke-width:6;stroke-linejoin:round;opacity:.25}\
 .m{fill:none;stroke-width:1.5;stroke-linejoin:round}.e{fill:none;stroke-width:1.1;stroke-linejoin:round}";
 
-/// A plot area of the picture with its axes.
+/// Plot area of the picture with its axes.
 struct Panel {
     left: f64,
     top: f64,
     width: f64,
     height: f64,
-    /// First and last time, s; the last one is later.
+    /// First and last time, s. The second must be greater.
     time: (f64, f64),
-    /// Lowest and highest value; the highest one is higher.
+    /// Lowest and highest value. The second must be greater.
     value: (f64, f64),
 }
 
@@ -72,7 +72,7 @@ impl Panel {
     }
 }
 
-/// Returns the picture as SVG; it follows the reader's light or dark setting.
+/// Returns the picture as SVG. It adapts to the reader's light or dark setting.
 pub fn picture_svg(input: &ReportInput<'_>) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\">\n<style>{STYLE}</style>\n\
@@ -168,7 +168,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     thinned
 }
 
-/// Returns the lowest and the highest value of each bucket, so that a peak of one sample stays visible.
+/// Returns the lowest and the highest value of each bucket, so that a peak of one sample is visible.
 fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let bucket = points.len().div_ceil(2 * POINTS).max(1);
     let pair = |bucket: &[(f64, f64)]| {
@@ -192,25 +192,26 @@ fn is_drawn(v: f64) -> bool {
     v.abs() < DRAWN_MAX
 }
 
-/// Returns the minimum span of an axis around `v` at which its labels can be distinguished.
+/// Returns the smallest span of an axis around `v` at which the labels differ.
 fn margin(v: f64) -> f64 {
     1e-9 * v.abs()
 }
 
-/// Returns the axis of positions from `low` to `high`, with a margin even if the joint does not move.
+/// Returns the axis for positions from `low` to `high`. It has a margin even if the joint does not move.
 fn position_axis((low, high): (f64, f64)) -> (f64, f64) {
     let margin = ((high - low) * 0.08).max(0.02).max(margin(low)).max(margin(high));
     (low - margin, high + margin)
 }
 
 /// Returns values and labels of the grid lines between `low` and `high`, as many as [`TICKS`] permits. About four steps
-/// fill `share` of the span; use a smaller share for an axis with more space for labels.
+/// fill `share` of the span. An axis with space for more labels uses a smaller share.
 fn ticks(low: f64, high: f64, share: f64) -> Vec<(f64, String)> {
     let rough = share * (high - low) / 4.0;
     if !(rough.is_finite() && rough > 0.0) {
         return Vec::new();
     }
-    // 1, 2 or 5 times a power of ten: the first step that is large enough, or a finer one if that leaves too few lines.
+    // Steps are 1, 2 or 5 times a power of ten. The first step that is large enough is used, or a finer one if there would
+    // be too few lines.
     let power = 10f64.powf(rough.log10().floor());
     let steps = [10.0, 5.0, 2.0, 1.0, 0.5, 0.2].map(|m| m * power);
     let enough = steps.iter().rposition(|step| *step >= rough).unwrap_or(0);
@@ -233,7 +234,7 @@ enum Digits {
 }
 
 impl Digits {
-    /// Returns enough digits to distinguish numbers up to `most` in steps of `step`.
+    /// Returns a format with enough digits to distinguish numbers up to `most` in steps of `step`.
     fn of(step: f64, most: f64) -> Self {
         if (1e-6..1e6).contains(&step) {
             Self::Plain((-step.log10()).ceil().max(0.0) as usize)
@@ -258,7 +259,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks that labels are distinct, in rising order, and of readable number.
+    /// Checks that the labels differ, are in rising order, and have a readable number.
     fn readable(low: f64, high: f64, share: f64) -> Result<(), TestCaseError> {
         let ticks = ticks(low, high, share);
         prop_assert!((TICKS.0..=TICKS.1).contains(&ticks.len()), "{low}..{high}: {ticks:?}");
@@ -311,7 +312,7 @@ mod tests {
             let (low, high) = position_axis((low, high));
             readable(low, high, 1.0).unwrap();
         }
-        // For a moving joint the grid lines stay unchanged.
+        // A usual range has simple grid lines.
         let words: Vec<String> = ticks(-1.08, 1.08, 1.0).into_iter().map(|tick| tick.1).collect();
         assert_eq!(words, ["−1", "0", "1"]);
         for none in [(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 1.0), (1.0, 0.0), (f64::NAN, f64::NAN)] {

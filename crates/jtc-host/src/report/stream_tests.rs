@@ -7,7 +7,7 @@ use crate::sample::JointSample;
 use jtc_wire::{ControllerState, NodeState, TrajectoryState};
 use proptest::prelude::*;
 
-/// Returns a sample as any source may supply it: unknown values, errors, executions that begin and end.
+/// Returns a sample of any kind: with unknown values, with errors, in an execution or not.
 fn any_sample() -> impl Strategy<Value = Sample> {
     let value = || prop_oneof![4 => -10.0..10.0, 1 => Just(f64::NAN), 1 => Just(0.0)];
     let joint = (prop::array::uniform12(value()), any::<bool>()).prop_map(|(v, fault)| JointSample {
@@ -115,7 +115,7 @@ proptest! {
         let ending = crate::recording::Ending { outcome: outcome.into(), ..Default::default() };
         let (stream, all) =
             (Digest::of(&samples).failure(&info, &ending), RunFailure::of_recording(&info, &samples, &ending));
-        // Compares text, because unknown values are NaN and must count as equal.
+        // Compares text, because unknown values are NaN, and NaN is not equal to itself.
         prop_assert_eq!(format!("{stream:?}"), format!("{all:?}"));
     }
 
@@ -134,7 +134,7 @@ proptest! {
     }
 }
 
-/// Returns the value of sample `i`: noise with single peaks.
+/// Returns the value of sample `i`, which is noise with single peaks.
 fn noise(i: usize) -> f64 {
     let mixed = (i as u64 + 1)
         .wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -143,8 +143,8 @@ fn noise(i: usize) -> f64 {
     (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
-/// The number of points of a curve is bounded for any length of the recording. Each point stands for a piece of equal
-/// length and keeps its lowest and highest value in order. A shorter recording keeps every sample.
+/// The number of points of a curve is bounded, however long the recording is. Each point represents a piece of equal
+/// length, and the lowest and highest values of the piece are kept in order. A shorter recording keeps every sample.
 #[test]
 fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     for n in [1, 2, 15_999, POINTS_MAX, POINTS_MAX + 1, 31_999, 32_000, 32_001, 100_003] {
@@ -184,7 +184,7 @@ fn curves_are_bounded_and_hold_the_extremes_of_each_piece() {
     }
 }
 
-/// States that change with every sample use bounded memory; no error is lost.
+/// States that change with every sample need only bounded memory, and no error is lost.
 #[test]
 fn rows_of_states_are_bounded_and_lose_no_error() {
     let (mut states, mut errors) = (Runs::new(Joined::Longer), Runs::new(Joined::Both));

@@ -5,22 +5,23 @@ use serde::Serialize;
 use crate::recording::RecordingInfo;
 use crate::sample::{JointSample, Sample};
 
-/// Figures of a joint; `None` for a value that the source does not know.
+/// Figures of a joint. `None` for a value that the source does not know.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JointSummary {
     /// Name as in the arm file.
     pub name: String,
-    /// Root mean square of the position error, mrad: the position commanded for the time of a measurement minus the measured one (J-62).
+    /// Root mean square of the position error, mrad. The error is the position that was commanded for the time of a
+    /// measurement, minus the measured one (J-62).
     pub rms_error_mrad: Option<f64>,
-    /// Largest absolute error, mrad.
+    /// Largest magnitude of the position error, mrad.
     pub max_error_mrad: Option<f64>,
-    /// Largest absolute torque, N·m.
+    /// Largest magnitude of the torque, N·m.
     pub peak_torque_nm: Option<f64>,
     /// Torque limit, N·m.
     pub torque_limit_nm: Option<f64>,
-    /// Peak torque as a share of the limit, 0..1.
+    /// Peak torque as a share of the limit, from 0 to 1.
     pub torque_share: Option<f64>,
-    /// Largest absolute speed, rad/s: measured, or commanded if no speed was measured.
+    /// Largest magnitude of the speed, rad/s. It is the measured speed, or the commanded one if no speed was measured.
     pub peak_velocity_rad_s: Option<f64>,
     /// Highest bearing temperature, °C.
     pub peak_temperature_c: Option<f64>,
@@ -31,7 +32,7 @@ pub struct JointSummary {
 pub struct Summary {
     /// Time from the first to the last sample, s.
     pub recorded_s: f64,
-    /// Duration of the execution of the trajectory, s.
+    /// Duration of the execution, s.
     pub executed_s: f64,
     /// Number of samples used for the figures.
     pub samples: usize,
@@ -40,7 +41,7 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Computes the figures over the samples of an execution, or over all samples of a recording without an execution.
+    /// Computes the figures over the samples of an execution. If the recording has no execution, uses all samples.
     pub fn of(info: &RecordingInfo, samples: &[Sample]) -> Self {
         let mut figures = Figures::default();
         samples.iter().for_each(|sample| figures.push(sample));
@@ -53,12 +54,12 @@ impl Summary {
     }
 }
 
-/// Figures of streamed samples: of all, and of an execution, which may begin later.
+/// Figures of streamed samples. They are collected over all samples, and over an execution, which may begin later.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Figures {
     /// Times of the first and the last sample.
     recorded: Option<(f64, f64)>,
-    /// Sums before an execution; sums of all samples without an execution.
+    /// Sums over the samples before an execution. If there is none, these are all samples.
     before: Sums,
     executed: Sums,
 }

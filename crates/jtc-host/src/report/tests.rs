@@ -54,7 +54,7 @@ fn run(samples: usize) -> (RecordingInfo, Vec<Sample>) {
 #[test]
 fn figures_are_those_of_the_execution() {
     let (info, mut samples) = run(1000);
-    samples[3].joints[0].position = 9.0; // before the execution: not counted
+    samples[3].joints[0].position = 9.0; // before the execution: not used for the figures
     let summary = Summary::of(&info, &samples);
     let joint = &summary.joints[0];
     assert!((joint.rms_error_mrad.unwrap() - 1.0).abs() < 1e-9);
@@ -177,7 +177,8 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status names no joint: the report names the joint with an impossible step, and shows the rows before it.
+/// The status does not show which joint failed. The report names the joint with an impossible step, and shows the rows
+/// before it.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {
     let (mut info, mut samples) = run(1000);
@@ -224,7 +225,7 @@ fn a_recording_without_its_end_is_no_success() {
     assert_eq!(of(&samples, "stopped", ""), None);
 }
 
-/// The page of a plan shows the binding limits and the commanded figures; no value was measured.
+/// The page of a plan shows the binding limits and the commanded figures. Measured values are unknown.
 #[test]
 fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let arm = Arm::avena();
@@ -235,7 +236,7 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     let summary = Summary::of(&info, &samples);
     for (of_page, of_check) in summary.joints.iter().zip(&planned.verdict.joints) {
         let (speed, torque) = (of_page.peak_velocity_rad_s.unwrap(), of_page.peak_torque_nm.unwrap());
-        // At the points alone, and colder than in the check before a run.
+        // The page uses only the points, and colder bearings than the check before a run. So its figures differ.
         assert!((speed / of_check.velocity_peak_rad_s - 1.0).abs() < 0.05, "{of_page:?} {of_check:?}");
         let peak = of_check.torque_peak_nm.unwrap();
         assert!((0.95..1.5).contains(&(torque / peak)), "{of_page:?} {of_check:?}");
@@ -250,7 +251,8 @@ fn the_page_of_a_plan_has_its_torques_and_what_binds() {
     assert!(of_run.contains("\"plan\":null") && of_run.contains("\"set_acceleration_rad_s2\":null"));
 }
 
-/// A joint that stands still, moves very little, is far away or has no values: the picture stays small, and each axis readable.
+/// The picture stays small and each axis is readable, even if a joint stands still, moves very little, is far away or has
+/// no values.
 #[test]
 fn a_picture_is_small_whatever_the_joints_do() {
     type Lead = fn(f64) -> f64;

@@ -9,17 +9,17 @@ use super::failure::{Around, BEFORE, began_s, is_bad, why_it_ended};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Searches for the first error in streamed samples, with the same result as [`RunFailure::of_recording`].
+/// Searches for the first error in streamed samples. The result is the same as that of [`RunFailure::of_recording`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Most recent samples.
     recent: VecDeque<Sample>,
     /// `true` if a trajectory was executed.
     begun: bool,
-    /// Start of the run according to the last sample of a motion, else the time of the first sample.
+    /// Start of the run, computed from the last sample in motion. Before a motion it is the time of the first sample.
     start_s: Option<f64>,
     in_motion: bool,
-    /// First error before an execution (used without an execution), and first error since its start.
+    /// First error before an execution, and first error since its start. The former is used only if there is no execution.
     before: Option<Around>,
     since: Option<Around>,
 }
@@ -54,7 +54,7 @@ impl Watch {
     }
 }
 
-/// Returns the last of these samples, and those before it.
+/// Returns the moment of the last of these samples, with the samples before it.
 fn now(recent: &VecDeque<Sample>, start_s: Option<f64>) -> Around {
     Around {
         samples: recent.iter().copied().collect(),

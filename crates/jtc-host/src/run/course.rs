@@ -13,13 +13,14 @@ use crate::trajectory::Trajectory;
 pub enum Course {
     /// Along a trajectory.
     Along(Arc<Trajectory>),
-    /// From the present position of the arm to a pose.
+    /// From the current position of the arm to a pose.
     To {
-        /// Pose.
+        /// Target pose.
         target: Target,
-        /// `true` if the flange moves on a straight line; else the joints move in proportion to each other if that is not slower.
+        /// `true` if the flange moves on a straight line. If not, the joints move in proportion to each other, unless that
+        /// is slower.
         line: bool,
-        /// Torque that the move keeps free, % of each limit.
+        /// Torque margin of the move, % of each limit.
         margin_pct: f64,
     },
 }
@@ -42,12 +43,12 @@ impl Course {
         }
     }
 
-    /// Returns the trajectory, for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is
-    /// the speed of a given trajectory in %; `move_speed` is the speed of a move, which `option` sets.
+    /// Returns the trajectory for an arm at `here` (rad) on a controller with the settings `device`. `speed_pct` is the
+    /// speed of an existing trajectory in %. `move_speed` is the speed of a move, and `option` is the option that sets it.
     ///
     /// # Errors
     ///
-    /// [`PlanError`]; [`Course::message`] returns its message.
+    /// Returns a [`PlanError`], whose message [`Course::message`] returns.
     pub fn planned(
         &self,
         arm: &Arm,

@@ -1,7 +1,7 @@
-//! A run: the motions of an [`Order`], each one checked, uploaded, executed and followed to its end.
+//! A run: each motion of an [`Order`] is checked, uploaded, executed and followed to its end.
 //!
-//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`]: it
-//! shows the steps, decides on changes to the motion, and stores its samples.
+//! All front ends use this procedure. A front end (the command line, the agent, Python) implements [`Observer`]: it shows
+//! the steps, decides on changes to the motion, and stores the samples.
 mod course;
 mod start;
 
@@ -31,9 +31,10 @@ pub struct Order<'a> {
     pub trajectory: &'a Trajectory,
     /// Trajectory of the runs after the first one.
     pub later: &'a Trajectory,
-    /// Number of runs; 0 counts as 1.
+    /// Number of runs. 0 is treated as 1.
     pub runs: u32,
-    /// Speed of an approach, % of the limits. `None`: the arm must be at the first point of each run.
+    /// Speed of an approach, % of the limits. `None`: approaches are not allowed, and the arm must be at the first point of
+    /// each run.
     pub approach_pct: Option<f64>,
 }
 
@@ -62,7 +63,7 @@ impl Phase {
     }
 }
 
-/// Motion of a run, after its end.
+/// Motion of a run that has ended.
 #[derive(Debug)]
 pub struct Leg {
     /// Purpose.
@@ -71,7 +72,7 @@ pub struct Leg {
     pub checked: CheckedTrajectory,
     /// Figures of its upload.
     pub upload: UploadReport,
-    /// End of the motion: an error of [`Session::execute`] or [`Session::follow`] if it failed.
+    /// How the motion ended. If it failed, it is an error of [`Session::execute`] or [`Session::follow`].
     pub outcome: Result<Outcome, Error>,
 }
 
@@ -82,39 +83,39 @@ impl Leg {
     }
 }
 
-/// End of a run.
+/// How a run ended.
 #[derive(Debug)]
 pub struct Ended {
     /// Last motion of the run.
     pub last: Leg,
-    /// Set if the last motion finished, and the observer cancelled the run before the next one.
+    /// `true` if the last motion finished, and the observer cancelled the run before the next one.
     pub cut: bool,
 }
 
-/// Receiver of the samples of a motion, called while the arm moves.
+/// Receiver of the samples of a motion. It is called while the arm moves.
 pub type SampleReceiver = Box<dyn FnMut(&Sample)>;
 
-/// A front end of a run. [`run`] calls each method, in the order listed here.
+/// Front end of a run. [`run`] calls the methods in the order of this list.
 pub trait Observer<P: Port> {
-    /// Failure in the terms of the front end.
+    /// Error type of the front end.
     type Failure;
 
-    /// Converts the reason why a motion does not begin.
+    /// Converts the reason why a motion does not begin into an error of the front end.
     fn refused(&mut self, error: StartError) -> Self::Failure;
 
-    /// Converts an error before a motion began; [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
+    /// Converts an error before a motion began. It is [`Error::Cancelled`] if [`Observer::is_cancelled`] ended the run.
     fn failed(&mut self, error: Error) -> Self::Failure;
 
-    /// Returns `true` once the run must end before its next motion. During a motion [`Observer::status`] decides.
+    /// Returns `true` once the run must end before its next motion. During a motion, [`Observer::status`] decides instead.
     fn is_cancelled(&mut self) -> bool;
 
-    /// The next motion has passed its check.
+    /// Reports that the next motion has passed its check.
     fn checked(&mut self, phase: Phase, checked: &CheckedTrajectory);
 
-    /// A part of the motion was uploaded.
+    /// Reports that a part of the motion was uploaded.
     fn uploading(&mut self, phase: Phase, progress: &Progress);
 
-    /// The whole motion was uploaded.
+    /// Reports that the whole motion was uploaded.
     fn uploaded(&mut self, phase: Phase, upload: &UploadReport);
 
     /// Reports that the motion begins when this call returns. Returns the receiver of its samples.
@@ -129,28 +130,32 @@ pub trait Observer<P: Port> {
         checked: &CheckedTrajectory,
     ) -> Result<SampleReceiver, Self::Failure>;
 
-    /// Evaluates a status during the motion. Returns the next action for the motion.
+    /// Evaluates a status during the motion. Returns the next action.
     fn status(&mut self, phase: Phase, status: &Status) -> Flow;
 
-    /// The flow that [`Observer::status`] returned was applied, with this result. A refused speed or resume does not end the motion.
+    /// Reports that the action that [`Observer::status`] returned was carried out, and its result. If the controller
+    /// rejects a speed or a resume, the motion continues.
     fn applied(&mut self, flow: Flow, result: &Result<(), Error>);
 
-    /// Reports the end of the motion. The action that [`Observer::status`] returned for its last status was not applied.
+    /// Reports the end of the motion. The action that [`Observer::status`] returned for the last status was not carried
+    /// out.
     ///
     /// # Errors
     ///
     /// If this fails, the run ends with the failure.
     fn ended(&mut self, session: &mut Session<P>, leg: &Leg) -> Result<(), Self::Failure>;
 
-    /// Run `n` (from 1) has finished, and another one follows.
+    /// Reports that run `n` (from 1) has finished and that another run follows.
     fn goes_on(&mut self, _n: u32) {}
 }
 
-/// Runs all motions of `order` on an arm that was held at `status`, until one does not finish. **The arm moves.**
+/// Runs all motions of `order` until one does not finish. `status` is a status of the arm while it was held. **The arm
+/// moves.**
 ///
 /// # Errors
 ///
-/// Returns a failure that occurs before a motion begins. A motion that fails ends the run with `Ok`: see [`Leg::outcome`].
+/// Returns a failure that occurs before a motion begins. If a motion itself fails, the run ends with `Ok`, and the failure
+/// is in [`Leg::outcome`].
 pub fn run<P: Port, O: Observer<P>>(
     session: &mut Session<P>,
     order: &Order<'_>,
@@ -167,7 +172,7 @@ pub fn run<P: Port, O: Observer<P>>(
             if !last.is_finished() {
                 return Ok(Ended { last, cut: false });
             }
-            // The approach may have ended a little away from the first point.
+            // The approach may have ended at a small distance from the first point, so the motion is checked again.
             here = positions(session, observer)?;
             let again = CheckedTrajectory::check(order.trajectory_of(n), order.arm, &here, order.options);
             checked = again.map_err(|error| observer.refused(error.into()))?;

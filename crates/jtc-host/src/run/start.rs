@@ -1,4 +1,4 @@
-//! The start of a run: nothing moves before every motion of the run has passed its check (J-55).
+//! Start of a run. The arm does not move before every motion of the run has passed its check (J-55).
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 use jtc_core::JOINTS;
 use jtc_wire::Joint;
@@ -12,30 +12,30 @@ use crate::trajectory::Trajectory;
 /// First motion of a run.
 #[derive(Clone, Debug)]
 pub struct Start {
-    /// Motion, checked from the position of the arm.
+    /// Motion that was checked from the position of the arm.
     pub checked: CheckedTrajectory,
-    /// Set if the motion is the approach to the first point.
+    /// `true` if the motion is the approach to the first point.
     pub is_approach: bool,
 }
 
 /// Reason why a motion does not begin.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// A trajectory of the run was refused.
+    /// A trajectory of the run did not pass the check.
     #[error(transparent)]
     Check(#[from] CheckError),
-    /// The arm is not at the first point, no other problem exists, and the order has no approach.
+    /// The only problem is that the arm is not at the first point, and the order does not allow an approach.
     #[error(transparent)]
     Elsewhere(CheckError),
     /// An approach of the run is not possible.
     #[error("the straight way from where the arm stands to the first point is refused: {0}")]
     Approach(#[from] ApproachError),
-    /// A run cannot follow the previous run.
+    /// The next run cannot begin where the run before it ends.
     #[error(transparent)]
     Open(#[from] OpenPath),
 }
 
-/// Path that ends too far from the first point of the next run.
+/// The end of a path is too far from the first point of the next run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error(
     "it ends {distance:.3} rad from where it begins ({joint}), more than {tolerance} rad: it cannot be repeated as it is; nothing was \
@@ -46,12 +46,13 @@ pub struct OpenPath {
     pub joint: Joint,
     /// Distance of this joint, rad.
     pub distance: f64,
-    /// Largest distance at which a run begins, rad.
+    /// Largest distance at which the controller starts a run, rad.
     pub tolerance: f64,
 }
 
 impl OpenPath {
-    /// Compares the end of `before` with the first point of `next`. Returns `Some` if they are further apart than `tolerance` (rad).
+    /// Compares the end of `before` with the first point of `next`. Returns `None` if the distance is at most `tolerance`
+    /// (rad).
     pub fn between(before: &Trajectory, next: &Trajectory, tolerance: f64) -> Option<Self> {
         let (last, first) = before.points.last().zip(next.points.first())?;
         let (joint, distance) = furthest_joint(&last.position, &first.position);
@@ -95,7 +96,7 @@ impl Diagnose for OpenPath {
 }
 
 impl Order<'_> {
-    /// Returns the first motion of run `n` (from 1), for an arm at `here` (rad). Before the first run it checks the
+    /// Returns the first motion of run `n` (from 1) for an arm at `here` (rad). Before the first run, it checks the
     /// trajectories and the approaches of all runs, with the limits, the payload and the settings of the controller.
     ///
     /// # Errors
@@ -121,7 +122,7 @@ impl Order<'_> {
         }
     }
 
-    /// Checks the runs after the first one, and that each ends at the start of the next one.
+    /// Checks the runs after the first one, and checks that each run ends at the start of the next one.
     fn check_later(&self, here: &[f64; JOINTS]) -> Result<(), StartError> {
         let next = self.later;
         if next != self.trajectory {
@@ -129,7 +130,7 @@ impl Order<'_> {
             CheckedTrajectory::check(next, self.arm, &begin, self.options)?;
         }
         let tolerance = self.arm.config_on_device(&self.options.device).start_tolerance_rad;
-        // Later runs follow each other only if there are at least two.
+        // The end of a later run is compared only if there are at least two later runs.
         let before = [self.trajectory, next];
         for before in before.into_iter().take(if self.runs > 2 { 2 } else { 1 }) {
             let Some(open) = OpenPath::between(before, next, tolerance) else { continue };
@@ -152,12 +153,12 @@ mod tests {
 
     const THERE: [f64; JOINTS] = [0.3, 0.2, -0.3, 0.0, 0.0, 0.0];
 
-    /// A motion of joint 2 from the zero pose.
+    /// Returns a motion of joint 2 from the zero pose.
     fn trajectory(percent: f64) -> Trajectory {
         joint_move(&[0.0; JOINTS], &[0.0, 1.2, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
     }
 
-    /// Has `runs` runs, the first of `trajectory`, all others of `later`.
+    /// Order with `runs` runs: the first on `trajectory`, all others on `later`.
     struct Course<'a> {
         trajectory: &'a Trajectory,
         later: &'a Trajectory,
@@ -188,7 +189,7 @@ mod tests {
         assert!(!start(&course, [0.0; JOINTS], |_| ()).unwrap().is_approach);
         let without = Course { approach_pct: None, ..course };
         assert!(matches!(start(&without, THERE, |_| ()), Err(StartError::Elsewhere(_))));
-        // Limits, payload and settings of the controller, and each kind of problem.
+        // The limits, the payload and the settings of the controller are used, and each kind of problem is found.
         let slow = |config: &mut Config| config.joints[1].velocity_max = 0.3;
         let weak = |config: &mut Config| config.joints[1].torque_max = 90.0;
         let loaded = |config: &mut Config| config.payload.mass = 6.0;
@@ -218,7 +219,7 @@ mod tests {
         }
         let then = Course { later: &outside, ..course };
         assert!(matches!(start(&then, [0.0; JOINTS], |_| ()), Err(StartError::Check(_))));
-        // An approach leaves the pose at the end of the path: its speed is too high for the controller's limit at that pose.
+        // An approach would begin at the end of the path. Its speed is too high for the controller's limit there.
         let none = Course { approach_pct: Some(0.0), ..course };
         assert!(matches!(start(&none, [0.0; JOINTS], |_| ()), Err(StartError::Approach(_))));
     }
@@ -239,7 +240,7 @@ mod tests {
         let twice = start(&and_back(2), [0.0; JOINTS], |_| ());
         assert!(twice.is_ok(), "{twice:?}");
         assert!(matches!(start(&and_back(3), [0.0; JOINTS], |_| ()), Err(StartError::Open(_))));
-        // A problem that no approach solves is reported first.
+        // A problem that an approach cannot solve is reported first.
         assert!(matches!(start(&course(2), THERE, |_| ()), Err(StartError::Open(_))));
         assert!(matches!(start(&course(1), THERE, |_| ()), Err(StartError::Elsewhere(_))));
     }

@@ -1,4 +1,4 @@
-//! Absent joints, for work on a bench (J-53).
+//! Joints that are marked as absent, for work on a bench (J-53).
 
 use jtc_core::{JOINTS, settings};
 use jtc_wire::{Joint, SettingValue};
@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Returns the model position of each joint that is set absent, rad; `None` for the other joints.
+    /// Returns the position that the model uses for each joint that is marked as absent, rad. `None` for the other joints.
     ///
     /// # Errors
     ///
@@ -18,8 +18,9 @@ impl<P: Port> Session<P> {
         Ok(std::array::from_fn(|j| config.absent[j].then_some(config.absent_position[j])))
     }
 
-    /// Sets the joints with a position (rad) absent and the others present. The controller must be in Init or Error.
-    /// While a joint is absent the controller executes no motion, and an answer of that joint's drive is an error.
+    /// Marks the joints that have a position (rad) as absent, and the others as present. The controller must be in Init or
+    /// Error. While a joint is absent, the controller executes no motion, and an answer from that joint's drive is an
+    /// error.
     ///
     /// # Errors
     ///

@@ -1,17 +1,17 @@
-//! Time of statuses, which contain no time stamp.
+//! Times for statuses, which contain no time stamp.
 
 use std::time::Duration;
 
 use jtc_wire::Status;
 
-/// Maximum assumed transmission delay of a status, s.
+/// Maximum transmission delay of a status that the clock assumes, s.
 const DELAY_S: f64 = 0.1;
-/// Minimum time between two statuses, s: statuses that a slow computer reads at once remain separate samples.
+/// Minimum time between two statuses, s. It keeps statuses apart that a slow computer reads at once.
 const APART_S: f64 = 1e-6;
 
-/// Clock for statuses. While the controller follows the path, the clock uses the controller's own milliseconds, without
-/// transmission jitter; otherwise the time of arrival. At another speed path time runs slower (J-57), so the clock
-/// stays within 0.1 s of the arrival.
+/// Clock for statuses. While the controller moves along the path, the clock uses the milliseconds of the controller, which
+/// have no transmission jitter. Otherwise it uses the time of arrival. At a reduced speed the path time runs slower (J-57),
+/// so the clock is limited to 0.1 s around the time of arrival.
 pub struct StatusClock {
     start: Duration,
     arrived: Duration,
@@ -21,13 +21,13 @@ pub struct StatusClock {
 }
 
 impl StatusClock {
-    /// Starts a clock at this time of the port, with the controller at this point.
+    /// Starts a clock at `now` of the port, with the controller at `point`.
     pub fn begin(now: Duration, point: u32) -> Self {
         Self { start: now, arrived: now, point, time_s: None }
     }
 
-    /// Returns the time of the next status, which arrived at this time of the port: s since the start of the clock. The
-    /// time always increases.
+    /// Returns the time of the next status, in seconds since the start of the clock. `now` is the time of the port at which
+    /// the status arrived. The returned times always increase.
     pub fn at(&mut self, now: Duration, status: &Status) -> f64 {
         let moved = f64::from(status.point.saturating_sub(self.point)) * 1e-3;
         let waited = now.saturating_sub(self.arrived).as_secs_f64();
@@ -57,19 +57,21 @@ mod tests {
 
     #[test]
     fn j57_time_is_the_controllers_at_full_speed_and_never_far_from_ours() {
-        // Transmission delays have no effect.
+        // Different transmission delays have no effect.
         assert_eq!(times(&[(40, 40), (95, 80), (121, 120), (160, 160)]), [0.04, 0.08, 0.12, 0.16]);
-        // At half the speed, and during a standstill.
+        // Half of the full speed, then a standstill.
         let slow: Vec<_> = (1..=100).map(|n| (40 * n, 20 * n as u32)).collect();
         assert!((times(&slow)[99] - 3.9).abs() < 1e-9);
         assert!((times(&[(40, 40), (80, 40), (1_080, 40)])[2] - 1.08).abs() < 1e-9);
-        // Read at once, at a standstill or ahead of the host's time: all times differ, because a recording merges samples with equal times.
+        // Several statuses are read at once, at a standstill or ahead of the host's time. All times must differ, because a
+        // recording merges samples with equal times.
         let at_once = times(&[(40, 40), (200, 40), (200, 40), (200, 400), (200, 440), (200, 440)]);
         assert!(at_once.is_sorted_by(|a, b| a < b), "{at_once:?}");
     }
 
     proptest! {
-        /// Any input: missing statuses, a point index that starts again, another trajectory at another point.
+        /// The input is arbitrary: statuses may be missing, the point index may begin again, or another trajectory may be
+        /// at another point.
         #[test]
         fn time_goes_on_and_is_that_of_arrival_to_a_tenth_of_a_second(
             begins_at in any::<u32>(),

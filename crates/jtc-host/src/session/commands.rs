@@ -12,10 +12,10 @@ use crate::error::{Error, LinkError, MotionError, StateError, accepted};
 use crate::port::Port;
 use crate::words;
 
-/// Maximum time for which a controller delays teaching until the arm is held, plus some reserve.
+/// Maximum time for which a controller delays teaching until the arm is held at rest, plus a reserve.
 const TEACHING: Duration = Duration::from_secs(11);
 
-/// Parameter that the controller needs.
+/// Parameter that a controller needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Parameter {
@@ -51,9 +51,9 @@ impl Parameter {
 }
 
 impl<P: Port> Session<P> {
-    /// Marks the start of a motion request. Call this before each motion if the session is used for several motions. On
-    /// a shared line, requests made before another client's Stop are rejected. The time of a request is the beginning of
-    /// the session or the last call of this function.
+    /// Marks the start of a motion request. Call this before each motion if the session is used for several motions. On a
+    /// shared line, a request is rejected if it was made before another client's Stop. The time of a request is the last
+    /// call of this function, or else the beginning of the session.
     ///
     /// # Errors
     ///
@@ -62,11 +62,11 @@ impl<P: Port> Session<P> {
         Ok(self.port.ask_to_move()?)
     }
 
-    /// Clears current errors: the controller's own, and those of the nodes in `nodes` (bits 0..6).
+    /// Clears current errors of the controller itself and of the nodes in `nodes` (bits 0..6).
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if the controller rejects the command in its state; [`LinkError::NotConfirmed`],
+    /// [`LinkError::Refused`] if the controller rejects the command in its current state; [`LinkError::NotConfirmed`],
     /// [`LinkError::NoLink`] and [`LinkError::Port`] for errors of the line.
     pub fn clear(&mut self, jtc: bool, nodes: u8) -> Result<(), LinkError> {
         self.command(&fixed::clear_current_errors(jtc, nodes))
@@ -114,12 +114,13 @@ impl<P: Port> Session<P> {
         self.command(&fixed::reset_can_devices(nodes))
     }
 
-    /// Switches teaching on (only in HoldPos) or off. Teaching begins once the arm is held at rest; this function waits for it.
+    /// Switches teaching on (only in HoldPos) or off. Teaching begins when the arm is held at rest. This function waits
+    /// until then.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::clear`]; [`StateError::Timeout`] if teaching does not begin because the arm
-    /// does not come to rest; [`StateError::Device`] if the controller has an error instead.
+    /// Returns the errors of [`Session::clear`]; [`StateError::Timeout`] if teaching does not begin because the arm does
+    /// not come to rest; [`StateError::Device`] if the controller reports an error instead.
     pub fn teach(&mut self, on: bool) -> Result<(), Error> {
         if on {
             return self.teach_until(|| false);
@@ -127,12 +128,12 @@ impl<P: Port> Session<P> {
         Ok(self.command(&fixed::empty(FrameType::TeachingModeDisable))?)
     }
 
-    /// Ends teaching, including teaching that another client has switched on.
+    /// Ends teaching, even if another client has switched it on.
     ///
     /// # Errors
     ///
-    /// Returns the errors of [`Session::teach`], except a denial: an agent that denies this has ended the teaching of
-    /// its other client itself.
+    /// Returns the errors of [`Session::teach`], except a denial. An agent that denies this request has itself ended the
+    /// teaching of the other client.
     pub fn end_teaching(&mut self) -> Result<(), Error> {
         match self.teach(false) {
             Err(Error::Link(LinkError::Denied { .. })) => Ok(()),
@@ -140,9 +141,9 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches teaching on, and stops waiting once `ended` returns `true`. If teaching does not begin in time, it is
-    /// switched off again. Otherwise the arm would become compliant as soon as it is at rest, when the operator no
-    /// longer expects it.
+    /// Switches teaching on and waits until it begins, at most until `ended` returns `true`. If it has not begun then, it is
+    /// switched off again. Otherwise the arm would become compliant as soon as it is at rest, when the operator no longer
+    /// expects that.
     ///
     /// # Errors
     ///
@@ -152,7 +153,8 @@ impl<P: Port> Session<P> {
         self.read_host_timeout()?;
         self.presence.command(self.port.now());
         let begun = match self.command(&fixed::empty(FrameType::TeachingModeEnable)) {
-            // The controller does not teach, or another client has switched teaching on.
+            // The controller has rejected the request, or another client has switched teaching on. So it is not switched
+            // off here.
             Err(error) if !error.is_loss() => return Err(error.into()),
             Err(error) => Err(error.into()),
             Ok(()) => {
@@ -163,7 +165,7 @@ impl<P: Port> Session<P> {
             }
         };
         if begun.is_err() {
-            // Report the first error; this command is accepted in every state, so its result is ignored.
+            // The first error is reported. The result of this command is ignored, because it is accepted in every state.
             let _ = self.teach(false);
         }
         begun
@@ -186,7 +188,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::gripper_control(pump))
     }
 
-    /// Commands the controller to use its default of one parameter.
+    /// Commands the controller to use its built-in default for one parameter.
     ///
     /// # Errors
     ///
@@ -195,7 +197,7 @@ impl<P: Port> Session<P> {
         self.command(&fixed::empty(parameter.use_default()))
     }
 
-    /// Commands the controller to use its defaults: friction polynomial, gains and arm model.
+    /// Commands the controller to use its built-in defaults: friction polynomial, gains and arm model.
     ///
     /// # Errors
     ///
@@ -206,13 +208,14 @@ impl<P: Port> Session<P> {
             .try_for_each(|p| self.use_default(p))
     }
 
-    /// Starts the trajectory that was just uploaded, from its first point; after a pause from the paused point. **The arm moves.**
+    /// Starts the trajectory that was just uploaded, from its first point. After a pause it continues at the paused point.
+    /// **The arm moves.**
     ///
     /// # Errors
     ///
-    /// [`MotionError::NotUploaded`], and nothing is sent, unless this session uploaded exactly this trajectory and the
-    /// controller still holds it. [`LinkError::Refused`] if the controller does not start it: the arm is not at the
-    /// first point (J-34) or is not held. [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
+    /// [`MotionError::NotUploaded`], before anything is sent, unless this session uploaded exactly this trajectory and the
+    /// controller still has it. [`LinkError::Refused`] if the controller does not start it, because the arm is not at the
+    /// first point (J-34) or is not held. [`MotionError::LinkLost`] if no confirmation arrived. The arm may then be moving.
     pub fn execute(&mut self, checked: &CheckedTrajectory) -> Result<(), Error> {
         self.catch_up()?;
         if self.uploaded.as_ref().map(CheckedTrajectory::number) != Some(checked.number()) {
@@ -221,20 +224,20 @@ impl<P: Port> Session<P> {
         self.go()
     }
 
-    /// Sends Execute without checking the trajectory in the controller.
+    /// Sends Execute without checking which trajectory the controller has.
     pub(super) fn go(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Execute, Status::is_executing)
     }
 
-    /// Resumes after a pause. If this session uploaded the trajectory and settings or payload changed since its check,
-    /// the remainder is checked again. The session cannot check another client's trajectory.
+    /// Resumes after a pause. If this session uploaded the trajectory, and settings or payload have changed since its
+    /// check, the remainder is checked again. The trajectory of another client cannot be checked by this session.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RestRefused`], and nothing is sent, if the remainder no longer passes the check.
-    /// [`StateError::HeldStop`], and nothing is sent, while the cause of a held stop is not cleared.
-    /// [`MotionError::NotPaused`], and nothing is sent, if no motion is paused; [`LinkError::Refused`] if the arm was
-    /// moved since; [`MotionError::LinkLost`] if no confirmation arrived.
+    /// [`MotionError::RestRefused`], before anything is sent, if the remainder no longer passes the check.
+    /// [`StateError::HeldStop`], before anything is sent, while the cause of a held stop is not cleared.
+    /// [`MotionError::NotPaused`], before anything is sent, if no motion is paused. [`LinkError::Refused`] if the arm has
+    /// been moved since. [`MotionError::LinkLost`] if no confirmation arrived.
     pub fn resume(&mut self) -> Result<(), Error> {
         self.port.ask_to_resume().map_err(LinkError::Port)?;
         let status = self.fresh_status()?;
@@ -257,24 +260,27 @@ impl<P: Port> Session<P> {
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
+    /// [`LinkError::Refused`] if no motion is in progress; [`MotionError::LinkLost`] if no confirmation arrived. The arm
+    /// may then be moving.
     pub fn pause(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Pause, |s| s.trajectory == TrajectoryState::Pause)
     }
 
-    /// Ends the trajectory; the next execution starts at its first point.
+    /// Ends the trajectory. The next execution begins at its first point.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived: the arm may be moving.
+    /// [`LinkError::Refused`] if no motion can be stopped; [`MotionError::LinkLost`] if no confirmation arrived. The arm
+    /// may then be moving.
     pub fn stop(&mut self) -> Result<(), Error> {
         self.exec(ExecCommand::Stop, |s| s.trajectory == TrajectoryState::Stop)
     }
 
-    /// Sends an execution command. Without a confirmation the motion of the arm is unknown; [`MotionError::LinkLost`] reports this.
+    /// Sends an execution command. If it is not confirmed, it is unknown whether the arm moves, and
+    /// [`MotionError::LinkLost`] reports this.
     fn exec(&mut self, command: ExecCommand, reached: impl Fn(&Status) -> bool) -> Result<(), Error> {
         let stopping = command != ExecCommand::Execute;
-        // A Stop or a Pause is sent without any preceding frame.
+        // A Stop or a Pause is the first frame that is sent.
         if !stopping {
             self.introduce()?;
             self.read_host_timeout()?;
@@ -283,21 +289,22 @@ impl<P: Port> Session<P> {
         let retries = self.statistics.retries;
         let mut record = match self.request(&fixed::exec(command)) {
             Ok(record) => record,
-            // Only the record was lost.
+            // The command took effect, and only its record was lost.
             Err(LinkError::NotConfirmed { .. }) if !stopping && self.last.is_some_and(|s| reached(&s)) => {
                 return Ok(());
             }
             Err(error) => return Err(self.link_lost(error, command == ExecCommand::Stop)),
         };
         if stopping && record.data == DataStatus::IncorrectValue {
-            // The code is generic because no introduction preceded the command: a Stop can only be
-            // rejected because of the state (J-51).
+            // Without a preceding extension request, the controller reports a general code (J-51). A Stop or a Pause can be
+            // rejected only because of the state.
             record.data = DataStatus::NotAllowed;
         }
         if accepted(&record) {
             return Ok(());
         }
-        // The command was repeated after its confirmation was lost. The repetition is rejected although the first one took effect.
+        // The confirmation of the first transmission was lost, so the command was sent again. The controller rejects the
+        // repetition, because the first command has already taken effect.
         if not_allowed(&record) && self.statistics.retries > retries && self.last.is_some_and(|s| reached(&s))
         {
             return Ok(());
@@ -305,7 +312,8 @@ impl<P: Port> Session<P> {
         Err(self.refused(record).into())
     }
 
-    /// Returns an error of the link while the arm moves or may move, with the known state of the motion; returns a rejection unchanged.
+    /// Returns an error of the link while the arm moves or may move, with what is known about the motion. Returns a
+    /// rejection unchanged.
     pub(super) fn link_lost(&self, error: LinkError, stop_sent: bool) -> Error {
         if !error.is_loss() {
             return error.into();
@@ -313,12 +321,12 @@ impl<P: Port> Session<P> {
         MotionError::LinkLost { last: self.last.map(Box::new), stop_sent, source: Box::new(error) }.into()
     }
 
-    /// Waits until the controller is in HoldPos; returns an error at once if it reports errors.
+    /// Waits until the controller is in HoldPos. Returns an error at once if the controller reports errors.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop
-    /// is not cleared, [`StateError::Timeout`] if it is not in HoldPos in this time; the errors of
+    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop is
+    /// not cleared, [`StateError::Timeout`] if the controller is not in HoldPos within `timeout`; the errors of
     /// [`Session::next_status`].
     pub fn wait_hold(&mut self, timeout: Duration) -> Result<Status, Error> {
         let status = self.wait_for("HoldPos", timeout, |s| {
@@ -327,15 +335,15 @@ impl<P: Port> Session<P> {
         self.without_error(status)
     }
 
-    /// Waits until the controller holds the arm in HoldPos with every drive enabled, except drives of joints that are
-    /// set absent. Returns an error at once if the controller reports errors. The positions of the returned status are
-    /// measured; they are the pose from which a run starts.
+    /// Waits until the controller holds the arm in HoldPos, and all drives are enabled, except those of joints that are
+    /// marked as absent. Returns an error at once if the controller reports errors. The positions in the returned status
+    /// are measured. They are the pose from which a run starts.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop
-    /// is not cleared, [`StateError::Timeout`] if it does not hold the arm in this time (parameters may be missing);
-    /// the errors of [`Session::next_status`].
+    /// [`StateError::Device`] if the controller reports errors, [`StateError::HeldStop`] while the cause of a held stop is
+    /// not cleared, [`StateError::Timeout`] if the arm is not held within `timeout`, for example because parameters are
+    /// missing; the errors of [`Session::next_status`].
     pub fn wait_ready(&mut self, timeout: Duration) -> Result<Status, Error> {
         self.wait_ready_until(timeout, || false)
     }

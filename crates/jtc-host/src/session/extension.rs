@@ -1,4 +1,4 @@
-//! Extensions of the protocol of existing devices: identity, settings, the arm as a whole, jogging (J-50 to J-58).
+//! Protocol extensions: identity, settings, the arm as a whole, jogging (J-50 to J-58). Existing devices do not have them.
 
 use std::time::Duration;
 
@@ -14,12 +14,13 @@ use crate::arm::Arm;
 use crate::error::{Error, ExtensionError, LinkError, StateError};
 use crate::port::Port;
 
-/// Interval of extension requests: a device reports every reason only to a host that sent such a request within the last 2 s (J-51).
+/// Interval of extension requests. A device reports specific reasons only to a host that has sent an extension request
+/// within the last 2 s (J-51).
 pub(super) const ASK_AGAIN: Duration = Duration::from_secs(1);
-/// Maximum time in which a device stores an arm, including the erasing of a flash sector.
+/// Maximum time that a device needs to store an arm, including the erasing of a flash sector.
 const STORING: Duration = Duration::from_secs(30);
 
-/// State of knowledge about the device's extensions.
+/// What the session knows about the extensions of the device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Extensions {
     /// The session has not asked yet.
@@ -27,12 +28,12 @@ pub(super) enum Extensions {
     Unknown,
     /// The device has no extensions.
     None,
-    /// The device has extensions; the last request was sent at this time of the port.
+    /// The device has extensions. The value is the port's time of the last request.
     Asked(Duration),
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the identity of the device; `None` if it has no extensions.
+    /// Returns the identity of the device. `None` if the device has no extensions.
     ///
     /// # Errors
     ///
@@ -49,12 +50,14 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the device's reactions to detected problems (J-69); `None` if the device does not report them or the line does not answer.
+    /// Returns the reactions of the device to detected problems (J-69). `None` if the device does not report them, or if
+    /// the line does not answer.
     pub fn reactions(&mut self) -> Option<Reactions> {
         self.info().ok().flatten()?.reactions
     }
 
-    /// Returns the cause of the device's last held stop (J-69); `None` if the device does not report it or the line does not answer.
+    /// Returns the cause of the last held stop of the device (J-69). `None` if the device does not report it, or if the
+    /// line does not answer.
     pub fn stop_cause(&mut self) -> Option<StopCause> {
         self.reactions()?.stop.map(|(cause, _)| cause)
     }
@@ -67,7 +70,8 @@ impl<P: Port> Session<P> {
         Err(StateError::HeldStop { status: Box::new(*status), cause: self.stop_cause() }.into())
     }
 
-    /// Asks the device for its identity, if the last request is older than 1 s: only then it reports each reason of a rejection (J-51).
+    /// Requests the identity of the device if the last extension request is more than 1 s old. The device then reports
+    /// specific reasons for rejections (J-51).
     pub(super) fn introduce(&mut self) -> Result<(), LinkError> {
         let due = match self.extensions {
             Extensions::Unknown => true,
@@ -78,7 +82,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.info() {
-            // Statuses arrive: the command itself is worth a try.
+            // Statuses still arrive, so the command itself may succeed.
             Err(LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::Denied { .. }) => {
                 self.extensions = Extensions::Asked(self.port.now());
                 Ok(())
@@ -87,14 +91,14 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends an extension request; returns an error if it is rejected or unknown.
+    /// Sends an extension request. Returns an error if the device rejects the request or does not know it.
     pub(super) fn extension(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         let request = frame_type(type_byte(frame));
         if self.extensions == Extensions::None {
             return Err(LinkError::NoExtension { request });
         }
         let record = match self.request(frame) {
-            // An existing device reports an unknown type (J-50).
+            // An existing device reports an unknown frame type (J-50).
             Err(LinkError::NotConfirmed { last: Some(last), .. })
                 if last.status == FrameStatus::IncorrectFrameType =>
             {
@@ -121,7 +125,7 @@ impl<P: Port> Session<P> {
         for _ in 0..self.timeouts.tries {
             self.answers.clear();
             self.extension(frame)?;
-            // The answer follows the record.
+            // The answer arrives after the record.
             let mut limit = Limit::new(self.confirmation_time(jtc_wire::ANSWER_MAX));
             loop {
                 while let Some(bytes) = self.answers.pop_front() {
@@ -139,8 +143,8 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request, tries: self.timeouts.tries, last: None })
     }
 
-    /// Requests data longer than a frame page by page: `request` builds the request for the page from an index on, and
-    /// `take` returns that page and the total length.
+    /// Requests data that are longer than a frame, page by page. `request` builds the request for the page that begins at
+    /// an index. `take` returns this page and the total length.
     fn ask_pages<T, const N: usize>(
         &mut self,
         request: impl Fn(u16) -> [u8; N],
@@ -158,12 +162,12 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the identity of the device, which `request` needs.
+    /// Returns the identity of the device, which is needed for `request`.
     fn info_for(&mut self, request: FrameType) -> Result<Info, LinkError> {
         self.info()?.ok_or(LinkError::NoExtension { request })
     }
 
-    /// Returns every setting of the device, in the order of its table.
+    /// Returns every setting of the device, in the order of the settings table.
     ///
     /// # Errors
     ///
@@ -177,7 +181,7 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Returns the active settings of the device; the built-in ones if it has no extensions.
+    /// Returns the active settings of the device. If the device has no extensions, returns the built-in settings.
     ///
     /// # Errors
     ///
@@ -187,7 +191,7 @@ impl<P: Port> Session<P> {
             return Ok(Config::avena());
         }
         let values = self.settings()?;
-        // Settings of a later version that this version does not know are ignored.
+        // Settings of a later firmware that this program does not know are ignored.
         let known = values.into_iter().filter(|value| settings::setting(value.setting).is_some());
         let config = settings::with_values(&Config::avena(), known);
         Ok(config.map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
@@ -203,12 +207,12 @@ impl<P: Port> Session<P> {
         Ok(Arm::from_image(&image).map_err(|e| ExtensionError::NoArm { why: e.to_string() })?)
     }
 
-    /// Changes settings; either all of them or none.
+    /// Changes settings. The device changes either all of them or none.
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] if a value is out of range or the state does not permit it; [`LinkError::NoExtension`],
-    /// and the errors of the line.
+    /// [`LinkError::Refused`] if a value is out of range, or if the device does not permit changes in its state;
+    /// [`LinkError::NoExtension`], and the errors of the line.
     pub fn set_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let mut frame = vec![0; 6 + jtc_wire::VALUE_LEN * values.len().min(SET_VALUES_MAX)];
         let n = set_settings(&mut frame, values.iter().copied())?;
@@ -222,7 +226,7 @@ impl<P: Port> Session<P> {
         matches!(self.extensions, Extensions::Asked(_))
     }
 
-    /// Returns the speed override in path seconds per second (J-57); 1 if the device has none.
+    /// Returns the speed override (path seconds per second, J-57). It is 1 if the device does not have this setting.
     ///
     /// # Errors
     ///
@@ -244,7 +248,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sets the speed override, 0.05 to 1. A running motion reaches it along a ramp; later motions use it, too (J-57).
+    /// Sets the speed override, from 0.05 to 1. A running motion changes its speed along a ramp. Later motions also use the
+    /// override (J-57).
     ///
     /// # Errors
     ///
@@ -262,11 +267,11 @@ impl<P: Port> Session<P> {
         self.extension(&fixed::set_name(name))
     }
 
-    /// Returns the active arm as a whole: a [`jtc_wire::ArmImage`].
+    /// Returns the active arm as a whole, in the form of a [`jtc_wire::ArmImage`].
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Changed`] if the arm changed meanwhile; the errors of [`Session::settings`].
+    /// [`ExtensionError::Changed`] if the arm changed while it was read; the errors of [`Session::settings`].
     pub fn arm_image(&mut self) -> Result<Vec<u8>, Error> {
         let info = self.info_for(FrameType::GetArm)?;
         let image = self.ask_pages(fixed::get_arm, |answer, from| match answer {
@@ -281,7 +286,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Stores the active arm in non-volatile memory, and waits until it is stored; returns its number.
+    /// Stores the active arm in non-volatile memory and waits until it is stored. Returns the sequence number of the stored
+    /// arm.
     ///
     /// # Errors
     ///
@@ -304,7 +310,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Switches the torque off at rest and returns to Init; afterwards the parameters must be sent again (J-53).
+    /// Switches the torque off and returns to Init. The arm must be at rest. Afterwards the parameters must be sent again
+    /// (J-53).
     ///
     /// # Errors
     ///
@@ -313,19 +320,20 @@ impl<P: Port> Session<P> {
         self.extension(&fixed::DISABLE)
     }
 
-    /// Jogs at these joint velocities, rad/s, base to wrist: **the arm moves**, for 200 ms, unless this is called again earlier (J-58).
+    /// Jogs at these joint velocities (rad/s, base to wrist). **The arm moves** for 200 ms, or until this function is
+    /// called again (J-58).
     ///
     /// # Errors
     ///
-    /// [`LinkError::Refused`] outside HoldPos, while a trajectory is paused, or for a velocity beyond its limit;
+    /// [`LinkError::Refused`] outside HoldPos, while a trajectory is paused, or if a velocity exceeds its limit;
     /// [`LinkError::NoExtension`], and the errors of the line.
     pub fn jog(&mut self, velocity: &[f64; JOINTS]) -> Result<(), Error> {
         let mut frame = [0; 30];
         floats(&mut frame, FrameType::Jog, velocity.iter().copied())?;
         let halts = self.port.halts();
         match self.extension(&frame) {
-            // Another program's Stop has overtaken the frame (J-04). The port reports the program that
-            // stopped the arm, and sends no frame that moves it.
+            // Another program's Stop has overtaken the frame (J-04). If the frame is sent again, the port blocks it, and
+            // its error contains the program that stopped the arm.
             Err(LinkError::Refused { .. }) if self.port.halts() != halts => Ok(self.extension(&frame)?),
             done => Ok(done?),
         }

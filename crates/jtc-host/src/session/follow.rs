@@ -1,4 +1,4 @@
-//! Follows an execution to its end.
+//! Following an execution to its end.
 
 use std::time::Duration;
 
@@ -8,52 +8,53 @@ use super::Session;
 use crate::error::{Error, LinkError, MotionError};
 use crate::port::{Port, PortError};
 
-/// Action that a callback requests.
+/// Action that a callback requests. All except Continue and Cancel are possible only while a motion is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flow {
-    /// Continue without a change.
+    /// Continue unchanged.
     #[default]
     Continue,
-    /// Pause on the path (only while following).
+    /// Pause on the path.
     Pause,
-    /// Resume after a pause (only while following).
+    /// Resume after a pause.
     Resume,
-    /// Another speed on the path, % (only while following, and if the device supports it).
+    /// Set the speed on the path, %, if the device supports it.
     Speed(u8),
-    /// Stop the motion and follow it to standstill (only while following).
+    /// Stop the motion and follow it until the arm is at rest.
     Stop,
-    /// Return at once; the motion continues unobserved.
+    /// Return at once. The motion continues without being followed.
     Cancel,
 }
 
-/// End of an execution.
+/// How an execution ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
     /// The motion reached its last point.
     Finished(Status),
-    /// The motion was stopped before its end, by this client or another one.
+    /// This client or another one stopped the motion before its end.
     Stopped(Status),
 }
 
-/// Time within which a confirmed command appears in the status.
+/// Maximum time until a confirmed command appears in the status.
 const SETTLE: Duration = Duration::from_millis(300);
 
 impl<P: Port> Session<P> {
     /// Follows the execution that was just started. `each` receives every status.
     ///
-    /// If the link is lost during the motion, a Stop is sent, which may still arrive. The error states that the arm may be moving.
+    /// If the link is lost during the motion, a Stop is sent, because frames may still arrive. The error states that the
+    /// arm may be moving.
     ///
     /// # Errors
     ///
-    /// [`MotionError::RunFault`] if the controller ended the motion with an error, [`MotionError::HeldStop`] if it
-    /// stopped the motion and holds the arm, [`Error::Cancelled`] if `each` returned [`Flow::Cancel`],
-    /// [`MotionError::LinkLost`] if no more data arrive: the arm may be moving.
+    /// [`MotionError::RunFault`] if the controller ended the motion with an error, [`MotionError::HeldStop`] if it stopped
+    /// the motion and holds the arm, [`Error::Cancelled`] if `each` returned [`Flow::Cancel`], [`MotionError::LinkLost`] if
+    /// data no longer arrive. The arm may then be moving.
     pub fn follow(&mut self, each: impl FnMut(&Status) -> Flow) -> Result<Outcome, Error> {
         self.follow_with(each, |_, _| {})
     }
 
-    /// Like [`Session::follow`]; calls `done` with each action that `each` requested and its result. A rejected speed
-    /// or resume does not end the motion.
+    /// Like [`Session::follow`]. Calls `done` with each action that `each` requested, and with its result. If a speed or a
+    /// resume is rejected, the motion is followed further.
     ///
     /// # Errors
     ///
@@ -65,7 +66,7 @@ impl<P: Port> Session<P> {
     ) -> Result<Outcome, Error> {
         let start = self.port.now();
         let (mut begun, mut stopping) = (false, false);
-        // On an error the controller deletes the trajectory and its point index.
+        // On an error the controller deletes the trajectory and its point index, so the last one is kept here.
         let mut point = 0;
         let mut occurred = None;
         loop {
@@ -92,7 +93,7 @@ impl<P: Port> Session<P> {
             match (status.trajectory.known(), status.state.known()) {
                 (Some(TrajectoryState::Finish), _) if begun => return Ok(Outcome::Finished(status)),
                 (Some(TrajectoryState::Stop), _) if begun => return Ok(Outcome::Stopped(status)),
-                // The trajectory was deleted, or nodes have left operation.
+                // The trajectory was deleted, or nodes are no longer in operation.
                 (Some(TrajectoryState::Null), _)
                 | (_, Some(ControllerState::Start | ControllerState::Init))
                     if begun =>
@@ -101,7 +102,8 @@ impl<P: Port> Session<P> {
                 }
                 _ => {}
             }
-            // A stopping motion stays stopped, even if a key is pressed then or another client pauses it.
+            // After a Stop was requested, the motion must not continue, even if the user presses a key or another client
+            // pauses it.
             let again = stopping && status.trajectory == TrajectoryState::Pause;
             let flow = match flow {
                 _ if again => Flow::Stop,
@@ -114,7 +116,7 @@ impl<P: Port> Session<P> {
                 Flow::Pause if status.is_executing() => unless_ended(self.pause()),
                 Flow::Resume => self.resume(),
                 Flow::Speed(percent) => self.set_speed(f64::from(percent) / 100.0),
-                // An accepted Stop is not repeated: the controller decelerates to standstill by itself.
+                // An accepted Stop is not repeated. The controller decelerates to standstill without further commands.
                 Flow::Stop if !stopping || again => {
                     stopping = true;
                     unless_ended(self.stop())
@@ -124,7 +126,7 @@ impl<P: Port> Session<P> {
             done(flow, &did);
             match (flow, did) {
                 (_, Ok(())) => {}
-                // The motion continues unchanged, or stays paused, and is followed further.
+                // The motion continues unchanged or stays paused, so it is followed further.
                 (
                     Flow::Resume,
                     Err(Error::Link(LinkError::Denied { .. } | LinkError::Port(PortError::Halted { .. }))),
@@ -142,7 +144,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Sends a Stop after the link is lost: frames may still arrive, and an unobserved arm should not move.
+    /// Sends a Stop after the link is lost. Frames may still arrive, and an arm that is not observed should not move.
     fn lost_in_motion(&mut self, error: LinkError) -> Error {
         let sent =
             self.last.is_none_or(|s| s.is_executing()) && self.write(&fixed::exec(ExecCommand::Stop)).is_ok();
@@ -150,13 +152,13 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the occurred errors of the joints; errors that the controller handles by itself are included (J-66).
+/// Returns the occurred errors of the joints. They include errors to which the controller reacts by itself (J-66).
 fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// Accepts a rejected pause or stop if the motion has just ended, and a pause that crosses the Stop of another program:
-/// neither is a failure.
+/// Changes two errors to success, because they are not failures: a pause or stop is rejected because the motion has just
+/// ended, or a pause crosses the Stop of another program.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

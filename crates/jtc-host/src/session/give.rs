@@ -6,7 +6,7 @@ use crate::arm::{Arm, ParameterSet};
 use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
-/// Part of an arm that the device has received.
+/// Part of an arm that the device has just received.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmPart<'a> {
     /// Number of settings.
@@ -18,21 +18,21 @@ pub enum ArmPart<'a> {
 }
 
 impl<P: Port> Session<P> {
-    /// Sends the complete arm to the device: settings and name if they differ, then friction, gains and model. Reads
+    /// Sends the complete arm to the device: settings and name if they differ, then friction, gains and model. Then reads
     /// the arm back and compares it. If settings differ, the device must be in Init or Error.
     ///
     /// # Errors
     ///
     /// [`ExtensionError::Incomplete`] for an arm without gains or friction,
     /// [`ParametersError::Unstable`](crate::ParametersError) if the arm is not stable with its gains,
-    /// [`ExtensionError::Differs`] if the arm read back differs; the errors of [`Session::set_settings`] and
+    /// [`ExtensionError::Differs`] if the arm that was read back differs; the errors of [`Session::set_settings`] and
     /// [`Session::push`].
     pub fn push_arm(&mut self, arm: &Arm, done: impl FnMut(ArmPart<'_>)) -> Result<Vec<PushReport>, Error> {
         self.push_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_arm`], until `ended` returns `true` because the user cancels: then sends nothing more, and
-    /// the device keeps the parts for which `done` was called.
+    /// Like [`Session::push_arm`], but stops once `ended` returns `true` because the user cancels. The device then keeps
+    /// the parts for which `done` was called.
     ///
     /// # Errors
     ///
@@ -51,9 +51,9 @@ impl<P: Port> Session<P> {
         Ok(pushed)
     }
 
-    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54); returns the number of the stored arm.
-    /// The arm has no torque meanwhile: with friction, gains and model the controller would leave Init and hold it, so
-    /// the received parts are withdrawn before the last of the three arrives.
+    /// Sends the complete arm like [`Session::push_arm`] and stores it (J-54). Returns the number of the stored arm. The
+    /// arm has no torque meanwhile. With friction, gains and model the controller would leave Init and hold the arm. So the
+    /// parts that it has received are withdrawn before the last of the three is sent.
     ///
     /// # Errors
     ///
@@ -67,8 +67,8 @@ impl<P: Port> Session<P> {
         self.push_and_store_arm_until(arm, || false, done)
     }
 
-    /// Like [`Session::push_and_store_arm`], until `ended` returns `true` because the user cancels: then sends nothing
-    /// more, and the device keeps the parts for which `done` was called.
+    /// Like [`Session::push_and_store_arm`], but stops once `ended` returns `true` because the user cancels. The device
+    /// then keeps the parts for which `done` was called.
     ///
     /// # Errors
     ///
@@ -93,19 +93,20 @@ impl<P: Port> Session<P> {
         pushed.extend(self.push_until(&last, &ended, |report| done(ArmPart::Parameter(report)))?);
         self.has_arm(arm, hash)?;
         let number = self.store_arm()?;
-        // As after a start: a later host request activates the complete stored arm.
+        // The device is now in the same state as after a start. A later request of the host activates the complete stored
+        // arm.
         self.withdraw_arm()?;
         Ok((pushed, number))
     }
 
-    /// Makes a device without torque drop its arm in use, so that parts of another arm are not combined with it (J-71).
+    /// If the device has no torque, makes it drop its active arm, so that parts of two arms are not combined (J-71).
     fn withdraw_arm(&mut self) -> Result<(), Error> {
         let state = self.fresh_status()?.state;
         if state == ControllerState::Init {
             self.disable()?;
         } else if state == ControllerState::Error {
             match self.disable() {
-                // Older firmware rejects this in Error; it accepts each part separately.
+                // Older firmware rejects this in Error, but it accepts each part separately.
                 Err(LinkError::Refused { .. }) => {}
                 done => done?,
             }
@@ -113,7 +114,7 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Sends settings and name, if they differ.
+    /// Sends settings and name, each only if it differs.
     fn push_settings(
         &mut self,
         arm: &Arm,
@@ -138,7 +139,7 @@ impl<P: Port> Session<P> {
         goes_on()
     }
 
-    /// Checks that the arm in the device, read back, is this arm.
+    /// Reads the arm back from the device, and checks that it equals this arm.
     fn has_arm(&mut self, arm: &Arm, hash: u64) -> Result<(), Error> {
         if self.info()?.is_some_and(|info| info.hash == hash) {
             return Ok(());
@@ -148,7 +149,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns all parameter frames that a device needs for an arm, and the arm's hash.
+/// Returns all parameters of an arm that a device needs, and the hash of the arm.
 fn whole(arm: &Arm) -> Result<(ParameterSet, u64), Error> {
     let set = arm.parameter_set();
     let Some(hash) = arm.hash()? else {

@@ -9,14 +9,14 @@ use crate::error::{Error, LinkError, StateError};
 use crate::port::halt::Halt;
 use crate::port::{Port, Standstill};
 
-/// Interval at which a velocity is repeated: the controller drops it after 200 ms (J-58).
+/// Interval at which a velocity is sent again. The controller drops a velocity after 200 ms (J-58).
 pub const JOG_AGAIN: Duration = Duration::from_millis(50);
-/// Maximum time in which an arm comes to rest.
+/// Maximum time that an arm needs to come to rest.
 const REST: Duration = Duration::from_secs(3);
 
 impl<P: Port> Session<P> {
-    /// Waits until joints may be jogged: joints whose load was just caught are not jogged yet. Any other reason
-    /// against jogging is an error at once.
+    /// Waits until joints may be jogged. A controller that has just caught the load of a joint does not jog yet. If there
+    /// is any other reason against jogging, returns an error at once.
     ///
     /// # Errors
     ///
@@ -56,7 +56,8 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Jogs at this velocity (rad/s) until `over` returns `true`. **The arm moves.** Call [`Session::jog_to_rest`] afterwards.
+    /// Jogs at this velocity (rad/s) until `over` returns `true`. **The arm moves.** Call [`Session::jog_to_rest`]
+    /// afterwards.
     ///
     /// # Errors
     ///
@@ -73,14 +74,14 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Stops jogging and waits until every joint is at rest; returns `None` if a joint is not at rest within 3 s.
+    /// Stops jogging and waits until every joint is at rest. Returns `None` if a joint is not at rest within 3 s.
     ///
     /// # Errors
     ///
-    /// [`StateError::Device`] if the controller has released the arm, [`StateError::HeldStop`] if it has stopped it;
-    /// the errors of the line.
+    /// [`StateError::Device`] if the controller has switched the torque off, [`StateError::HeldStop`] if it is in a held
+    /// stop; the errors of the line.
     pub fn jog_to_rest(&mut self) -> Result<Option<Status>, Error> {
-        // A rejection is acceptable, because no joint is jogged then.
+        // If the controller rejects this frame, no joint is being jogged.
         match self.jog(&[0.0; JOINTS]) {
             Ok(()) | Err(Error::Link(LinkError::Refused { .. } | LinkError::NoExtension { .. })) => {}
             Err(error) => return Err(error),
@@ -94,7 +95,7 @@ impl<P: Port> Session<P> {
             standstill.see(self.now(), &status);
             let late = self.now() > end;
             if late || standstill.is_reached() {
-                // A load may be lowered for longer than that; the controller handles it.
+                // The controller may lower a load for longer than that. It is then in a held stop.
                 self.without_held_stop(&status)?;
             }
             if standstill.is_reached() {
@@ -106,7 +107,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Receives statuses for this time.
+    /// Receives statuses for the given time.
     ///
     /// # Errors
     ///

@@ -1,12 +1,12 @@
-//! Timeout for an answer of the controller, tolerant of a busy host computer.
+//! Timeout for an answer of the controller that tolerates a busy host computer.
 
 use std::time::Duration;
 
 /// Maximum duration of a single wait.
 const STEP: Duration = Duration::from_millis(50);
 
-/// Remaining time for an answer. Each wait counts with at most its planned length: a computer that wakes this program
-/// late may also have delayed the answer, or the simulator that sends it.
+/// Remaining time for an answer. A wait that takes longer than planned is subtracted only with its planned length. A
+/// computer that wakes this program late may also have delayed the answer, or the simulator that sends it.
 #[derive(Debug)]
 pub(super) struct Limit {
     left: Duration,
@@ -18,12 +18,12 @@ impl Limit {
         Self { left: time }
     }
 
-    /// Returns the length of the next wait; `None` if no time is left.
+    /// Returns the length of the next wait. `None` if no time is left.
     pub fn next_wait(&self) -> Option<Duration> {
         (!self.left.is_zero()).then(|| self.left.min(STEP))
     }
 
-    /// Subtracts a wait that was planned for `planned` and lasted `took`.
+    /// Subtracts a wait that was planned to last `planned` and lasted `took`.
     pub fn waited(&mut self, planned: Duration, took: Duration) {
         self.left = self.left.saturating_sub(took.min(planned));
     }
@@ -33,7 +33,7 @@ impl Limit {
 mod tests {
     use super::*;
 
-    /// Returns the total time of waits until the limit ends, if each wait takes this share of its planned length.
+    /// Returns the total time of all waits until the limit ends. Each wait takes `share` of its planned length.
     fn waited(limit_ms: u64, share: f64) -> Duration {
         let mut limit = Limit::new(Duration::from_millis(limit_ms));
         let mut all = Duration::ZERO;

@@ -1,4 +1,4 @@
-//! Fetches the flight recorder log of a device page by page, with the device data that a replay needs (J-56).
+//! Fetching the flight recorder log of a device page by page, with the device data that a replay needs (J-56).
 
 use jtc_core::recorder::BLOCK_BYTES;
 use jtc_wire::{Answer, LOG_NO_BLOCK, LogState, RawPoint, fixed};
@@ -11,9 +11,9 @@ use crate::port::Port;
 /// State of a flight recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LogStatus {
-    /// Current activity, or the reason why recording stopped.
+    /// What the recorder is doing, or the reason why it has stopped.
     pub state: LogState,
-    /// Number after that of the newest block.
+    /// Number after the number of the newest block.
     pub end: u32,
 }
 
@@ -28,16 +28,16 @@ struct Page {
 }
 
 impl<P: Port> Session<P> {
-    /// Returns the state of the flight recorder. The recorder continues to record.
+    /// Returns the state of the flight recorder. The recorder continues.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] by a device without a recorder; the errors of the line.
+    /// [`LinkError::NoExtension`]; [`LinkError::Refused`] if the device has no recorder; the errors of the line.
     pub fn log_status(&mut self) -> Result<LogStatus, LinkError> {
         self.log_page(LOG_NO_BLOCK, 0).map(|page| page.status)
     }
 
-    /// Deletes the log; the recorder starts a new one.
+    /// Deletes the log. The recorder starts a new log.
     ///
     /// # Errors
     ///
@@ -60,9 +60,9 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Reads the complete log, the active arm, and the points of the trajectory that the log needs. Recording is
-    /// suspended meanwhile; the arm may move. Calls `done` after each part with the received bytes of the log and the
-    /// total.
+    /// Reads the complete log, the active arm, and the points of the trajectory that the log needs. The recorder pauses
+    /// meanwhile. The arm may move. Calls `done` after each part with the number of bytes received and the total number of
+    /// bytes.
     ///
     /// # Errors
     ///
@@ -71,7 +71,7 @@ impl<P: Port> Session<P> {
         self.fetch_log_until(|| false, done)
     }
 
-    /// Like [`Session::fetch_log`], until `ended` returns `true`.
+    /// Like [`Session::fetch_log`], but stops once `ended` returns `true`.
     ///
     /// # Errors
     ///
@@ -88,13 +88,13 @@ impl<P: Port> Session<P> {
             if ended() {
                 return Err(Error::Cancelled);
             }
-            // The first answer contains the start of the log.
+            // The first answer shows where the log begins.
             let (block, offset) =
                 (first.unwrap_or(0) + (bytes.len() / BLOCK_BYTES) as u32, bytes.len() % BLOCK_BYTES);
             let page = self.log_page(block, offset as u16)?;
             (log.state, log.points_hash) = (page.status.state, page.points_hash);
             if page.block != block || first.is_none() || usize::from(page.offset) != offset {
-                // Oldest block, or the first one after the log was cleared and restarted.
+                // This is the oldest block, or the first block of a log that was cleared and started again.
                 bytes.clear();
                 first = Some(page.block);
             }
@@ -118,7 +118,7 @@ impl<P: Port> Session<P> {
         Ok(log)
     }
 
-    /// Returns points of the trajectory in the device's memory; fewer than `count` if the memory has fewer.
+    /// Returns points of the trajectory in the device's memory. If the memory has fewer than `count`, returns fewer.
     fn log_points(&mut self, first: usize, count: usize) -> Result<Vec<RawPoint>, LinkError> {
         let mut all = Vec::new();
         while all.len() < count {

@@ -1,7 +1,7 @@
-//! A session with the controller: a single writer, the stream of its statuses, each request confirmed.
+//! Session with the controller. It is the only writer, receives the stream of statuses, and confirms each request.
 //!
-//! Records of the controller are one-shot (J-04): exactly one status answers each received frame, in order. The session
-//! queues the records and passes each to the request that waits for it.
+//! Records of the controller are one-shot (J-04): for each received frame, exactly one status contains its record, in the
+//! order of the frames. The session queues the records and passes each one to the request that waits for it.
 
 mod bench;
 mod clock;
@@ -56,17 +56,17 @@ use crate::check::CheckedTrajectory;
 use crate::error::{Error, LinkError, StateError, accepted};
 use crate::port::{Port, line_time};
 
-/// Callback that receives each status and the port's time.
+/// Callback that receives the port's time and each status.
 type Observer = Box<dyn FnMut(Duration, &Status)>;
 
-/// Timeouts of a session, and number of attempts.
+/// Timeouts of a session, and number of transmissions of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeouts {
-    /// Maximum silence of the controller before the link counts as lost.
+    /// Time without data from the controller after which the link is considered lost.
     pub status: Duration,
     /// Time for a confirmation, in addition to the transmission time.
     pub confirmation: Duration,
-    /// Number of times that a frame is sent before it counts as not confirmed.
+    /// Number of times that a frame is sent before it is considered not confirmed.
     pub tries: u32,
 }
 
@@ -82,7 +82,7 @@ pub struct Session<P> {
     receiver: StatusReceiver,
     arrived: VecDeque<Status>,
     records: VecDeque<Response>,
-    /// Answers to extension requests, as received.
+    /// Answers to extension requests, in the form in which they were received.
     answers: VecDeque<Vec<u8>>,
     extensions: Extensions,
     presence: Presence,
@@ -91,14 +91,14 @@ pub struct Session<P> {
     start: Duration,
     last_received: Duration,
     observer: Option<Observer>,
-    /// Trajectory from this session that the controller holds.
+    /// Trajectory that this session uploaded and that the controller still has.
     uploaded: Option<CheckedTrajectory>,
     /// Time limits.
     pub timeouts: Timeouts,
 }
 
 impl<P: Port> Session<P> {
-    /// Creates a session over an open port, without sending or waiting.
+    /// Creates a session on an open port. Neither sends nor waits.
     pub fn new(port: P) -> Self {
         let start = port.now();
         Self {
@@ -119,7 +119,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Calls `observer` with each status that arrives from now on, independent of the session's activity.
+    /// Calls `observer` with each status that arrives from now on, whichever function of the session receives it.
     pub fn observe(&mut self, observer: impl FnMut(Duration, &Status) + 'static) {
         self.observer = Some(Box::new(observer));
     }
@@ -134,7 +134,8 @@ impl<P: Port> Session<P> {
         &self.port
     }
 
-    /// Returns the port for functions that only the port has. Bytes written past the session disturb it.
+    /// Returns the port, for functions that only the port has. Bytes that are written directly to the port disturb the
+    /// session.
     pub fn port_mut(&mut self) -> &mut P {
         &mut self.port
     }
@@ -158,12 +159,12 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the last status that arrived, at any age.
+    /// Returns the last status, however old it is.
     pub fn last(&self) -> Option<&Status> {
         self.last.as_ref()
     }
 
-    /// Returns the next status; `None` if none arrives in this time.
+    /// Returns the next status. `None` if none arrives within `timeout`.
     ///
     /// # Errors
     ///
@@ -181,11 +182,11 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the next status; an error if the controller is silent.
+    /// Returns the next status. Returns an error if the controller sends nothing.
     ///
     /// # Errors
     ///
-    /// [`LinkError::NoLink`] if none arrives within [`Timeouts::status`], [`LinkError::Port`] if the port is lost.
+    /// [`LinkError::NoLink`] if no status arrives within [`Timeouts::status`], [`LinkError::Port`] if the port is lost.
     pub fn next_status(&mut self) -> Result<Status, LinkError> {
         let (start, bytes) = (self.port.now(), self.statistics.bytes_received);
         let mut limit = Limit::new(self.timeouts.status);
@@ -204,7 +205,7 @@ impl<P: Port> Session<P> {
         })
     }
 
-    /// Returns a status that arrives after this call; discards the statuses that arrived before.
+    /// Returns a status that arrives after this call. Discards those that arrived before.
     ///
     /// # Errors
     ///
@@ -216,7 +217,7 @@ impl<P: Port> Session<P> {
 
     /// Reads all received bytes without waiting.
     fn catch_up(&mut self) -> Result<(), LinkError> {
-        // Bounded, so that a line with continuous data cannot block this loop.
+        // The number of reads is limited, so that a line with continuous data cannot block this loop.
         for _ in 0..64 {
             if self.read(Duration::ZERO)? == 0 {
                 break;
@@ -226,7 +227,8 @@ impl<P: Port> Session<P> {
         Ok(())
     }
 
-    /// Reads all received bytes, and discards records and denials of earlier frames; some of them may have arrived just now.
+    /// Reads all received bytes, and discards records and denials of earlier frames. Some of them may have arrived just
+    /// now.
     fn forget_the_past(&mut self) -> Result<(), LinkError> {
         self.catch_up()?;
         self.records.clear();
@@ -248,14 +250,14 @@ impl<P: Port> Session<P> {
                         self.extensions = Extensions::Asked(at);
                     }
                     let mut bytes = vec![0; jtc_wire::ANSWER_MAX];
-                    // The emitted answer has the length of the received one.
+                    // The encoded answer has the same length as the received one.
                     let n = answer.emit(&mut bytes).unwrap_or(0);
                     bytes.truncate(n);
                     self.answers.push_back(bytes);
                 }
             }
         }
-        // Limits the queue if no caller reads the answers.
+        // Limits the queue in case no caller reads the answers.
         while self.answers.len() > 64 {
             self.answers.pop_front();
         }
@@ -276,7 +278,7 @@ impl<P: Port> Session<P> {
             self.last = Some(*status);
             self.last_received = now;
         }
-        // Limits the queue if no caller reads the statuses.
+        // Limits the queue in case no caller reads the statuses.
         while self.arrived.len() > 256 {
             self.arrived.pop_front();
         }
@@ -292,14 +294,14 @@ impl<P: Port> Session<P> {
 
     /// Returns the maximum time until the confirmation of a frame of `len` bytes must arrive.
     fn confirmation_time(&self, len: usize) -> Duration {
-        // The frame, a status that is being sent, and the status with the record.
+        // This covers the frame, a status that is already being sent, and the status with the record.
         line_time(len + 2 * jtc_wire::STATUS_LEN, self.port.baud()) + self.timeouts.confirmation
     }
 
-    /// Sends a frame and waits for its record. A frame that arrived damaged, or whose record does not arrive, is
-    /// repeated. Execute and TeachingModeEnable are repeated only if they arrived damaged: without a record they may
-    /// have been executed, and the arm may have been stopped on another line since. Not public, because a frame can
-    /// start a motion.
+    /// Sends a frame and waits for its record. If the frame arrived damaged, or its record does not arrive, the frame is
+    /// sent again. Execute and TeachingModeEnable are sent again only if they arrived damaged. Without a record they may
+    /// have been executed, and the arm may have been stopped over another line since. This function is not public, because
+    /// a frame can start a motion.
     fn request(&mut self, frame: &[u8]) -> Result<Response, LinkError> {
         let kind = type_byte(frame);
         let once = frame == fixed::EXECUTE || frame == fixed::TEACHING_MODE_ENABLE;
@@ -314,12 +316,14 @@ impl<P: Port> Session<P> {
             let begun = self.port.now();
             match self.record_for(kind, frame.len())? {
                 Some(record) if record.status == FrameStatus::NoError => return Ok(record),
-                // The first time the frame may be damaged; the second time the device does not know the type.
+                // After the first such record, the frame may have been damaged. After the second one, the device does not
+                // know the type.
                 Some(record) if record.status == FrameStatus::IncorrectFrameType && bad == Some(record) => {
                     break;
                 }
                 Some(record) => (bad, due) = (Some(record), true),
-                // No status arrived either: the device is late and has lost no frame. A Stop is repeated nevertheless.
+                // No status has arrived either, so the device is late and has not lost the frame. A Stop is sent again
+                // anyway.
                 None if !halts && self.last_received < begun => {
                     due = false;
                     self.next_status()?;
@@ -333,12 +337,12 @@ impl<P: Port> Session<P> {
         Err(LinkError::NotConfirmed { request: frame_type(kind), tries: self.timeouts.tries, last: bad })
     }
 
-    /// Returns the record of the frame just sent; `None` if none arrived in time.
+    /// Returns the record of the frame that was just sent. `None` if none arrived in time.
     fn record_for(&mut self, kind: u8, len: usize) -> Result<Option<Response>, LinkError> {
         let mut limit = Limit::new(self.confirmation_time(len));
         loop {
             while let Some(record) = self.records.pop_front() {
-                // A good record of another type belongs to a request that has timed out.
+                // A record without an error but of another type belongs to a request that has timed out.
                 if record.status != FrameStatus::NoError || record.frame_type == kind {
                     return Ok(Some(record));
                 }
@@ -349,7 +353,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Reads the bytes of the next wait of a limit; returns `false` if no time is left.
+    /// Reads bytes during the next wait of a limit. Returns `false` if no time is left.
     fn wait_within(&mut self, limit: &mut Limit) -> Result<bool, LinkError> {
         let Some(wait) = limit.next_wait() else { return Ok(false) };
         let begun = self.port.now();
@@ -358,14 +362,15 @@ impl<P: Port> Session<P> {
         Ok(true)
     }
 
-    /// Sends a command; returns an error if it is rejected.
+    /// Sends a command. Returns an error if it is rejected.
     fn command(&mut self, frame: &[u8]) -> Result<(), LinkError> {
         self.introduce()?;
         let record = self.request(frame)?;
         if accepted(&record) { Ok(()) } else { Err(self.refused(record)) }
     }
 
-    /// Returns the error for the rejected request with this record: rejected by the device, or by an agent that shares the line.
+    /// Returns the error for the request that this record rejects. The device has rejected it, or an agent that shares the
+    /// line.
     fn refused(&mut self, record: Response) -> LinkError {
         if let Some(reason) = self.port.take_denial() {
             return LinkError::Denied { request: frame_type(record.frame_type), reason };
@@ -379,7 +384,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Waits until `reached` returns `true`; `what` names the condition in the error.
+    /// Waits until `reached` returns `true`. `what` describes the condition in the error.
     ///
     /// # Errors
     ///
@@ -405,7 +410,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns the type byte of a frame as on the wire; 0, an invalid type, if the bytes are too short for a frame.
+/// Returns the type byte of a frame. If the bytes are too short for a frame, returns 0, which is not a valid type.
 fn type_byte(frame: &[u8]) -> u8 {
     frame.get(1).copied().unwrap_or(0)
 }

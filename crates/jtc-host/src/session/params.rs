@@ -11,34 +11,35 @@ use crate::error::{Error, LinkError, ParametersError, StateError};
 use crate::frame;
 use crate::port::Port;
 
-/// Trial time of gains that are set under torque (J-71), plus the time until the controller has reported the result.
+/// Time for which new gains are on trial while torque is on (J-71), plus the time until the controller has reported the
+/// result.
 const TRIAL: Duration = Duration::from_millis(2_500);
 
-/// A parameter that the controller confirmed.
+/// Parameter that the controller has confirmed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PushReport {
     /// Parameter.
     pub parameter: Parameter,
     /// Size of its frame, bytes.
     pub bytes: usize,
-    /// Number of intended transmissions (the friction table: two).
+    /// Number of times that the frame must be sent: two for the friction table.
     pub times: u32,
     /// Duration, s.
     pub time_s: f64,
 }
 
 impl<P: Port> Session<P> {
-    /// Checks all of `set`, then sends its parameters; calls `done` after each.
+    /// Checks `set`, then sends its parameters. Calls `done` after each of them.
     ///
-    /// Gains that are set while the arm is held are on trial for two seconds. If the arm is not stable with them, the
-    /// controller restores the old gains and holds the arm in a held stop of the kind [`jtc_wire::StopKind::Gains`]
-    /// (J-71). [`Session::await_trial`] waits for the result.
+    /// If gains are set while the arm is held, they are on trial for two seconds. If the arm is not stable with them, the
+    /// controller restores the old gains and goes into a held stop of the kind [`jtc_wire::StopKind::Gains`] (J-71).
+    /// [`Session::await_trial`] waits for the result.
     ///
     /// # Errors
     ///
-    /// [`ParametersError::Value`] before anything is sent, for values that no frame can carry or that are not physical;
-    /// [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and keeps its
-    /// old one; the other [`LinkError`]s of the line.
+    /// [`ParametersError::Value`], before anything is sent, for values that do not fit into their frame or that are not
+    /// physical; [`ParametersError::BeyondBounds`] or [`LinkError::Refused`] if the controller rejects a parameter and
+    /// keeps its old one; the other [`LinkError`]s of the line.
     pub fn push(
         &mut self,
         set: &ParameterSet,
@@ -47,7 +48,7 @@ impl<P: Port> Session<P> {
         self.push_until(set, || false, done)
     }
 
-    /// Like [`Session::push`], until `ended` returns `true` because the user cancels: then sends nothing more.
+    /// Like [`Session::push`], but stops once `ended` returns `true` because the user cancels.
     ///
     /// # Errors
     ///
@@ -61,7 +62,8 @@ impl<P: Port> Session<P> {
         set.check()?;
         let mut frames = Vec::new();
         if let Some(friction) = &set.friction {
-            // The table is too long for CRC-16 to detect every double bit error: it is sent twice, and both must be confirmed.
+            // The table is too long for CRC-16 to detect every double bit error. So it is sent twice, and both
+            // transmissions must be confirmed.
             let (parameter, times) = match friction {
                 jtc_core::Friction::Table(_) => (Parameter::FrictionTable, 2),
                 jtc_core::Friction::Polynomial(_) => (Parameter::FrictionPolynomial, 1),
@@ -74,7 +76,7 @@ impl<P: Port> Session<P> {
         if let Some(model) = &set.model {
             frames.push((Parameter::ArmModel, frame::arm_model(model)?, 1));
         }
-        // Complete parameters switch the torque on, so a Stop of another program ends the transfer.
+        // The last parameter switches the torque on. So a Stop of another program ends the transfer.
         let stops = self.port.halts().stops;
         let mut all = Vec::new();
         for (parameter, frame, times) in frames {
@@ -93,21 +95,21 @@ impl<P: Port> Session<P> {
         Ok(all)
     }
 
-    /// Waits while new gains are on trial (J-71); if they are, calls `begun` first. Call it right after
-    /// [`Session::push`] or [`Session::push_arm`]. Returns `true` if there was a trial; `false` without torque, and on a
-    /// device without extensions.
+    /// Waits while new gains are on trial (J-71). If they are, calls `begun` first. Call this function right after
+    /// [`Session::push`] or [`Session::push_arm`]. Returns `true` if there was a trial. Returns `false` without torque, and
+    /// for a device without extensions.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] if the controller restored the old gains, or stopped the arm for another reason
-    /// meanwhile, [`StateError::Device`] if the arm was released; the [`LinkError`]s of the line.
+    /// [`StateError::HeldStop`] if the controller restored the old gains, or stopped the arm for another reason meanwhile;
+    /// [`StateError::Device`] if the arm lost its torque; the [`LinkError`]s of the line.
     pub fn await_trial(&mut self, begun: impl FnOnce()) -> Result<bool, Error> {
         let age = |reactions: Reactions| reactions.stop.map(|(_, ms)| ms);
         let state = self.fresh_status()?.state;
         let under_torque = state.is_in(&[ControllerState::HoldPos, ControllerState::Teaching]);
         let Some(reactions) = self.reactions().filter(|_| under_torque) else { return Ok(false) };
         begun();
-        // The arm may have been in an earlier held stop.
+        // The arm may still be in an earlier held stop.
         let before = age(reactions).unwrap_or(u32::MAX);
         let end = self.port.now() + TRIAL;
         while self.port.now() < end {
@@ -123,12 +125,12 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// Returns an error that names the rejected value, if a value of the set is beyond the bounds of known controllers.
+/// If a value of the set is out of the bounds of known controllers, returns an error that contains this value.
 fn explained(error: LinkError, set: &ParameterSet) -> Error {
     let LinkError::Refused { request, code: DataStatus::IncorrectValue, .. } = error else {
         return error.into();
     };
-    // Only the values that this frame carried.
+    // Only values that were in this frame can be the reason.
     let part = match request {
         FrameType::PidParam => ParameterSet { pid: set.pid, ..ParameterSet::default() },
         FrameType::ArmModel => ParameterSet { model: set.model, ..ParameterSet::default() },

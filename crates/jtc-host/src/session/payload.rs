@@ -9,7 +9,7 @@ use crate::error::{Error, ExtensionError, LinkError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Returns the payload that the controller assumes at the flange; [`Payload::NONE`] if it has no extensions.
+    /// Returns the payload that the controller assumes at the flange. Without extensions it is [`Payload::NONE`].
     ///
     /// # Errors
     ///
@@ -18,18 +18,19 @@ impl<P: Port> Session<P> {
         Ok(self.device_config()?.payload)
     }
 
-    /// Sets the payload, which enters the torque over half a second. Execute, teaching and jogging wait for that.
+    /// Sets the payload. The controller takes half a second to include it in the torque. Execute, teaching and jogging wait
+    /// for that.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::NoBody`] if the payload is not a physical body, and nothing is sent;
+    /// [`ExtensionError::NoBody`], before anything is sent, if the payload is not a physical body;
     /// [`ExtensionError::TooHeavy`] if a joint could not hold it in the pose of the arm;
     /// [`ExtensionError::PayloadInMotion`] during a commanded motion; the errors of [`Session::set_settings`]. After an
     /// error the controller keeps its payload.
     pub fn set_payload(&mut self, payload: &Payload) -> Result<(), Error> {
         payload.check().map_err(|e| ExtensionError::NoBody { why: e.to_string() })?;
         let values: Vec<_> = settings::payload_values(payload).collect();
-        // A payload that every controller rejects.
+        // This payload is rejected by every controller.
         let alone = settings::with_values(&Config::avena(), values.iter().copied());
         if let Err(settings::SettingError::Value { .. }) = alone.as_ref() {
             return Err(
@@ -47,7 +48,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns the reason why a physically valid payload was rejected, if it can be determined.
+    /// Returns the reason why the controller rejected a physically valid payload, if it can be determined.
     fn why_refused(&mut self, payload: &Payload) -> Result<Option<ExtensionError>, Error> {
         let config = self.device_config()?;
         if let Err(e) = config.parameter_bounds.check_payload(payload) {

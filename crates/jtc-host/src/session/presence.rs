@@ -1,7 +1,8 @@
-//! Host supervision (J-59): while the arm moves for this session, the session repeats GetInfo, so that the controller
-//! knows that its host is alive.
+//! Host supervision (J-59). While the arm moves for this session, the session repeats GetInfo, so that the controller knows
+//! that its host is alive.
 //!
-//! A session that only observes sends nothing. The request also tells the controller that its host knows every data status (J-51).
+//! A session that only observes sends nothing. A GetInfo also tells the controller that its host knows all data statuses
+//! (J-51).
 
 use std::time::Duration;
 
@@ -13,9 +14,9 @@ use super::extension::{ASK_AGAIN, Extensions};
 use crate::error::LinkError;
 use crate::port::Port;
 
-/// Time within which a command appears in the statuses.
+/// Maximum time until a command appears in the statuses.
 const SHOWS: Duration = Duration::from_secs(1);
-/// Shortest time between two requests: a status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
+/// Shortest time between two requests. A status is sent every 40 ms, and an answer takes 13 ms at 115,200 Bd.
 const SHORTEST: Duration = Duration::from_millis(20);
 
 /// State of host supervision in the session.
@@ -25,10 +26,10 @@ pub(super) struct Presence {
     commanded: Option<Duration>,
     /// `true` while the session waits for teaching to begin.
     waits: bool,
-    /// `true` if the arm moves, or can be guided by hand, according to the last status.
+    /// `true` if the last status shows that the arm moves or can be guided by hand.
     moves: bool,
-    /// The controller's `host_timeout_ms` at the last read or write, ms; 0: no supervision. A controller without torque
-    /// may get another value.
+    /// Last known `host_timeout_ms` of the controller, ms. 0 means no supervision. A controller without torque may get
+    /// another value, so the value is forgotten then.
     host_timeout_ms: Option<f64>,
     /// `true` if the controller has accepted an extension request.
     answered: bool,
@@ -39,7 +40,7 @@ pub(super) struct Presence {
 }
 
 impl Presence {
-    /// Notes that the session commands a motion or teaching.
+    /// Records that the session commands a motion or teaching.
     pub fn command(&mut self, now: Duration) {
         self.commanded = Some(now);
     }
@@ -49,7 +50,7 @@ impl Presence {
         self.waits = waits;
     }
 
-    /// Notes that the controller has accepted an extension request.
+    /// Records that the controller has accepted an extension request.
     pub fn accepted(&mut self) {
         self.answered = true;
     }
@@ -65,12 +66,13 @@ impl Presence {
         }
     }
 
-    /// Returns `true` if the arm moves for this session.
+    /// Returns `true` if the arm moves because of a command of this session.
     fn is_shown(&self) -> bool {
         self.commanded.is_some() && (self.moves || self.waits)
     }
 
-    /// Returns the time between two requests: at least three requests within the controller's timeout.
+    /// Returns the time between two requests. It is short enough for at least three requests within the controller's
+    /// timeout.
     fn period(&self) -> Duration {
         match self.host_timeout_ms {
             Some(ms) if ms > 0.0 => Duration::from_secs_f64(ms / 3000.0).clamp(SHORTEST, ASK_AGAIN),
@@ -78,7 +80,7 @@ impl Presence {
         }
     }
 
-    /// Evaluates an answer; returns the time at which the answered GetInfo was sent.
+    /// Evaluates an answer. If it answers a GetInfo, returns the time at which that GetInfo was sent.
     pub fn take_answer(&mut self, answer: &Answer<'_>) -> Option<Duration> {
         match answer {
             Answer::Info(_) => {
@@ -99,14 +101,14 @@ impl Presence {
     }
 }
 
-/// Returns the setting `host_timeout_ms` among these values, ms.
+/// Returns the value of the setting `host_timeout_ms` (ms) in `values`.
 pub fn host_timeout_ms(mut values: impl Iterator<Item = SettingValue>) -> Option<f64> {
     let setting = settings::named("host_timeout_ms")?;
     values.find(|value| value.setting == setting.number).map(|value| value.value)
 }
 
 impl<P: Port> Session<P> {
-    /// Sends GetInfo if it is due; returns the time until it is due again.
+    /// Sends GetInfo if it is due. Returns the time until it is due again.
     pub(super) fn show_presence(&mut self) -> Result<Duration, LinkError> {
         let Extensions::Asked(at) = self.extensions else { return Ok(Duration::MAX) };
         if !self.presence.is_shown() {
@@ -128,7 +130,8 @@ impl<P: Port> Session<P> {
         self.presence.take(values.iter().copied());
     }
 
-    /// Waits for the answers to requests of [`show_presence`](Self::show_presence): a device rejects another request meanwhile (J-50).
+    /// Waits for the answers to the requests of [`show_presence`](Self::show_presence). Until then the device would reject
+    /// another request (J-50).
     pub(super) fn await_presence(&mut self) -> Result<(), LinkError> {
         let end = self.presence.asked_at + self.confirmation_time(jtc_wire::ANSWER_MAX);
         while self.presence.unanswered > 0 && self.port.now() < end {
@@ -144,7 +147,7 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match self.settings() {
-            // Without the timeout the default period is used; the following command detects a lost line.
+            // If the timeout cannot be read, the default period is used. If the line is lost, the next command reports it.
             Err(
                 LinkError::NotConfirmed { .. } | LinkError::Refused { .. } | LinkError::NoExtension { .. },
             ) => Ok(()),

@@ -1,4 +1,4 @@
-//! Waiting for an arm that is ready to move.
+//! Waiting until an arm is ready to move.
 
 use std::time::Duration;
 
@@ -9,19 +9,19 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{held_stop, words};
 
-/// Timeout for the drives: their first enable takes 4 s.
+/// Maximum time until the drives are enabled. Their first enable takes 4 s.
 pub const BRING_UP: Duration = Duration::from_secs(15);
 
 impl<P: Port> Session<P> {
-    /// Waits until the controller holds the arm with all drives enabled, if the controller is starting up. Returns the
-    /// status for the check of a motion. Calls `waits` with a description of the wait.
+    /// If the controller is starting up, waits until it holds the arm with all drives enabled. Returns the status for the
+    /// check of a motion. Calls `waits` with a description of the state that is awaited.
     ///
     /// # Errors
     ///
-    /// [`StateError::HeldStop`] if the cause of a held stop is not cleared, [`StateError::NotReady`] if the controller
-    /// is not starting up, [`StateError::Absent`] if joints are set absent, [`StateError::EncoderJumped`] if an encoder
-    /// has jumped, [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns
-    /// `true`; the errors of the line.
+    /// [`StateError::HeldStop`] if the cause of a held stop is not cleared, [`StateError::NotReady`] if the controller is
+    /// not starting up, [`StateError::Absent`] if joints are marked as absent, [`StateError::EncoderJumped`] if an encoder
+    /// has jumped, [`StateError::Device`] and [`StateError::Timeout`]; [`Error::Cancelled`] once `ended` returns `true`;
+    /// the errors of the line.
     pub fn ready_to_move(
         &mut self,
         mut waits: impl FnMut(&'static str),

@@ -1,4 +1,4 @@
-//! Recovery to HoldPos from every state, with each step reported.
+//! Recovery from every state to HoldPos. Each step is reported.
 
 mod parameters;
 mod source;
@@ -18,39 +18,40 @@ use crate::error::{Error, LinkError, StateError};
 use crate::port::Port;
 use crate::words;
 
-/// Maximum time until a node is ready: the first enable of a drive takes 4 s, after a reset longer.
+/// Maximum time until a node is ready. The first enable of a drive takes 4 s, and longer after a reset.
 const NODE_TIME: Duration = Duration::from_secs(15);
 /// Maximum time from reset to Init.
 const START_TIME: Duration = Duration::from_secs(3);
-/// Maximum time from a stop to standstill, with reserve.
+/// Maximum time from a stop to standstill, with a reserve.
 const STOP_TIME: Duration = Duration::from_secs(5);
 /// Time from the reset of a node until it answers.
 const BOOT: Duration = Duration::from_secs(1);
-/// Time from a parameter's confirmation to the status that shows it.
+/// Maximum time from the confirmation of a parameter until a status shows it.
 const TAKEN_IN: Duration = Duration::from_millis(60);
 /// Maximum number of steps before the recovery fails.
 const ACTS_MAX: u8 = 24;
-/// Maximum number of clears of a held stop: meanwhile a compliant joint comes to rest, or an operator frees the joint.
+/// Maximum number of times that a held stop is cleared. Meanwhile a compliant joint comes to rest, or an operator frees the
+/// joint.
 const HELD_CLEARS: u8 = 6;
 /// Maximum number of times that errors are cleared.
 const CLEARS_MAX: u8 = 6;
 /// Time until a command takes effect.
 const EFFECT: Duration = Duration::from_millis(500);
-/// Interval of the check whether the user cancels.
+/// Interval at which the recovery checks whether the user cancels.
 const LOOK: Duration = Duration::from_millis(100);
 /// Time for the operator to release the emergency stop.
 const PERSON_TIME: Duration = Duration::from_secs(60);
 
 impl<P: Port> Session<P> {
-    /// Brings the controller to HoldPos without errors. If friction, gains or arm model are missing, `parameters`
-    /// selects their source; without a source, or if the source lacks a part, an error is returned before anything is
-    /// sent. No trajectory is resumed.
+    /// Brings the controller to HoldPos without errors. `parameters` gives friction, gains and arm model if the controller
+    /// lacks some of them. If there is no source, or the source is incomplete, an error is returned before anything is
+    /// sent. A trajectory is never resumed.
     ///
     /// # Errors
     ///
-    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm),
-    /// before anything is sent, if no parameters are available; [`StateError::Device`] and [`StateError::Timeout`] if
-    /// an error persists; the errors of the line.
+    /// [`NoSource`](crate::ParametersError::NoSource) and [`IncompleteArm`](crate::ParametersError::IncompleteArm), before
+    /// anything is sent, if parameters are not available; [`StateError::Device`] and [`StateError::Timeout`] if an error
+    /// persists; the errors of the line.
     pub fn recover(
         &mut self,
         parameters: ParameterSource<'_>,
@@ -59,8 +60,8 @@ impl<P: Port> Session<P> {
         self.recover_until(parameters, || false, report)
     }
 
-    /// Like [`Session::recover`], until `ended` returns `true` because the user cancels: then sends nothing more and
-    /// returns [`Error::Cancelled`]; a motion is first stopped and followed to standstill.
+    /// Like [`Session::recover`], but ends once `ended` returns `true` because the user cancels. Then nothing more is sent,
+    /// and [`Error::Cancelled`] is returned. A motion is first stopped and followed to standstill.
     ///
     /// # Errors
     ///
@@ -89,7 +90,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Receives statuses for this time, or until `ended` returns `true`.
+    /// Receives statuses for the given time, or until `ended` returns `true`.
     fn pause_for(&mut self, time: Duration, ended: impl Fn() -> bool) -> Result<(), Error> {
         let end = self.port.now() + time;
         loop {
@@ -102,7 +103,7 @@ impl<P: Port> Session<P> {
     }
 }
 
-/// A recovery in progress, with its actions so far.
+/// Recovery in progress, with what it has done so far.
 struct Recovery<'a, P, Ended, Report> {
     session: &'a mut Session<P>,
     parameters: ParameterSource<'a>,
@@ -118,11 +119,11 @@ struct Recovery<'a, P, Ended, Report> {
     held_clears: u8,
     /// `true` if nodes were reset because they did not start up.
     reset_slow: bool,
-    /// Time since which the operator is asked to release the emergency stop.
+    /// Time at which the operator was first asked to release the emergency stop.
     asked: Option<Duration>,
     /// Number of steps left before the recovery fails.
     acts_left: u8,
-    /// Number of Stops of other programs before the start: a later Stop ends the recovery.
+    /// Number of Stops of other programs before the start. A later Stop ends the recovery.
     stops: u64,
 }
 
@@ -151,7 +152,8 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         }
     }
 
-    /// Proceeds from the state in `status` to HoldPos without errors: one step for each state on the way.
+    /// Brings the controller from the state in `status` to HoldPos without errors. Takes one step for each state on the
+    /// way.
     fn from(&mut self, mut status: Status) -> Result<Status, Error> {
         while self.acts_left > 0 {
             self.acts_left -= 1;
@@ -182,7 +184,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
                 Some(ControllerState::Operate) => self.end_motion()?,
                 Some(ControllerState::Teaching) => self.end_teaching()?,
                 Some(ControllerState::Error) => self.leave_error(&status)?,
-                // No step is taken in a state that this version does not know.
+                // This program does not know the state, so it does nothing.
                 None => break,
             }
             status = self.session.fresh_status()?;
@@ -238,7 +240,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
 
     fn leave_error(&mut self, status: &Status) -> Result<(), Error> {
         let nodes = faulty(status);
-        // Errors latch: only clearing shows if the safety input is high again.
+        // Errors are latched. Only an attempt to clear them shows if the safety input is high again.
         let safety_input = status.errors & error::EMERGENCY_INPUT != 0;
         if safety_input && self.clears > 0 && nodes == 0 && status.can_current == 0 {
             return self.wait_for_a_person(status);
@@ -258,7 +260,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
         Ok(())
     }
 
-    /// Clears errors until the safety input is high again, for at most 60 s.
+    /// Clears errors again and again, for at most 60 s, until the safety input is high again.
     fn wait_for_a_person(&mut self, status: &Status) -> Result<(), Error> {
         let since = *self.asked.get_or_insert_with(|| {
             (self.report)(&RecoverStep::SafetyInput);
@@ -272,7 +274,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 
     fn clear(&mut self, nodes: u8) -> Result<(), Error> {
-        // The caller evaluates a persistent fault again.
+        // If the fault persists, the caller finds it in the next status.
         self.session.clear_if_possible(true, nodes)?;
         self.session.pause_for(EFFECT, &self.ended)
     }
@@ -284,7 +286,7 @@ impl<'a, P: Port, Ended: Fn() -> bool, Report: FnMut(&RecoverStep)> Recovery<'a,
     }
 }
 
-/// Returns the nodes that report a fault of their own.
+/// Returns the nodes that report a fault of themselves.
 fn faulty(s: &Status) -> u8 {
     let joints = s
         .joints

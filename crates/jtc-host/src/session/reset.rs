@@ -8,7 +8,7 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::words;
 
-/// Returns `true` if a reset of these nodes (bits 0..6) can remove the torque that the arm has in a state.
+/// Returns `true` if the arm has torque in this state, and a reset of these nodes (bits 0..6) can remove it.
 ///
 /// # Errors
 ///
@@ -22,7 +22,7 @@ pub fn reset_takes_torque(nodes: u8, state: Code<ControllerState>) -> Result<boo
 }
 
 impl<P: Port> Session<P> {
-    /// Resets nodes (bits 0..6); if the arm has torque, only if `may_fall` is set.
+    /// Resets nodes (bits 0..6). If the arm has torque, `may_fall` must be set.
     ///
     /// # Errors
     ///

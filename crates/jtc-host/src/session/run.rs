@@ -1,4 +1,4 @@
-//! A run from its start to its end, with its samples.
+//! Execution of a trajectory from its start to its end, with the samples.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,14 +13,14 @@ use crate::report::Summary;
 use crate::sample::Sample;
 use crate::{Arm, Error};
 
-/// Result of a run: its end, and a sample of each status from its start.
+/// Result of a run: how it ended, and a sample for each status.
 #[derive(Debug)]
 #[must_use = "a run may have failed: look at its outcome"]
 pub struct Run {
-    /// End of the run: an error of [`Session::execute`] or of [`Session::follow`] if it failed. A failed run has
-    /// samples, too, for the analysis of the failure.
+    /// How the run ended. If it failed, it is an error of [`Session::execute`] or of [`Session::follow`]. A failed run also
+    /// has samples, with which the failure can be analysed.
     pub outcome: Result<Outcome, Error>,
-    /// Samples, oldest first; commanded values are those of the trajectory at the point that the controller reports.
+    /// Samples, oldest first. The commanded values are those of the trajectory at the point that the controller reports.
     pub samples: Vec<Sample>,
 }
 
@@ -34,7 +34,8 @@ impl Run {
 impl<P: Port> Session<P> {
     /// Executes the trajectory that was just uploaded and follows it to its end. **The arm moves.**
     ///
-    /// `each` receives each status and returns the next action: continue, pause, resume, stop. This call replaces an earlier observer.
+    /// `each` receives each status and returns the next action: continue, pause, resume, stop. An observer that was set
+    /// earlier is removed.
     pub fn run(&mut self, checked: &CheckedTrajectory, each: impl FnMut(&Status) -> Flow) -> Run {
         let samples = Rc::<RefCell<Vec<Sample>>>::default();
         let taken = Rc::clone(&samples);
@@ -42,8 +43,8 @@ impl<P: Port> Session<P> {
         Run { outcome, samples: samples.take() }
     }
 
-    /// Like [`Session::run`], for a run of any length: `observe` receives each sample on arrival, and `done` each
-    /// [`Flow`] with its result, as in [`Session::follow_with`].
+    /// Like [`Session::run`], for a run of any length. `observe` receives each sample when it arrives. `done` receives each
+    /// [`Flow`] with its result, like in [`Session::follow_with`].
     ///
     /// # Errors
     ///

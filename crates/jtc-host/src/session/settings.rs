@@ -1,4 +1,4 @@
-//! Settings that users name: all are checked before any is sent (J-53).
+//! Changes of settings by a user. All values are checked before any of them is sent (J-53).
 
 use jtc_core::settings;
 use jtc_wire::SettingValue;
@@ -8,12 +8,13 @@ use crate::error::{Error, ExtensionError};
 use crate::port::Port;
 
 impl<P: Port> Session<P> {
-    /// Changes settings, all of them or none, like [`Session::set_settings`]. Before anything is sent, checks each
-    /// value, and all values together with the settings that the device has.
+    /// Changes settings like [`Session::set_settings`], either all of them or none. Before anything is sent, each value is
+    /// checked, and all values are checked together with the device's settings.
     ///
     /// # Errors
     ///
-    /// [`ExtensionError::Setting`], with the value and its limit; those of [`Session::device_config`] and [`Session::set_settings`].
+    /// [`ExtensionError::Setting`] with the value and its limit; the errors of [`Session::device_config`] and
+    /// [`Session::set_settings`].
     pub fn change_settings(&mut self, values: &[SettingValue]) -> Result<(), Error> {
         let config = self.device_config()?;
         settings::with_values(&config, values.iter().copied()).map_err(ExtensionError::Setting)?;

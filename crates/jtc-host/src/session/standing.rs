@@ -9,13 +9,13 @@ use crate::error::{Error, StateError};
 use crate::port::Port;
 use crate::{sample, words};
 
-/// Movement within [`WATCHED`] below which the arm is at rest, rad: the slowest jog moves twice as far.
+/// Movement within [`WATCHED`] below which the arm is at rest, rad. The slowest jog moves twice as far.
 const STILL: f64 = 1.2e-3;
-/// Observation time: a slow jog appears in no field of the status.
+/// Time for which the arm is observed. A slow jog does not appear in any field of the status.
 const WATCHED: Duration = Duration::from_millis(250);
 
 impl<P: Port> Session<P> {
-    /// Observes the arm and returns its status if it is at rest: the positions are those of a pose.
+    /// Observes the arm and returns its status if it is at rest. The positions in the status can be saved as a pose.
     ///
     /// # Errors
     ///
@@ -36,7 +36,7 @@ impl<P: Port> Session<P> {
 
 fn stands(begin: &Status, now: &Status) -> Result<(), StateError> {
     let moving = |what: String| Err(StateError::Moving { what });
-    // Also at the beginning, at a reversal and at the end of a motion, when the speed is zero for a moment.
+    // This also detects the beginning, a reversal and the end of a motion, at which the speed is zero for a moment.
     if now.is_executing() {
         return moving("the arm is on the path of a trajectory".into());
     }
@@ -66,7 +66,7 @@ mod tests {
 
     use super::*;
 
-    /// A slow jog appears in no field of the status; different positions show it.
+    /// A slow jog does not appear in any field of the status, but the positions differ.
     #[test]
     fn an_arm_that_is_jogged_slowly_does_not_stand() {
         let at = |q: f32| {
@@ -82,7 +82,7 @@ mod tests {
         }
         let executing = Status { trajectory: TrajectoryState::Execute.into(), ..at(0.5) };
         assert_eq!(stands(&executing, &executing).unwrap_err().diagnosis().kind, ErrorKind::Refused);
-        // An arm that is guided by hand or paused may be at rest.
+        // An arm may be at rest while it is guided by hand or paused.
         stands(&at(0.5), &Status { trajectory: TrajectoryState::Pause.into(), ..at(0.5) }).unwrap();
     }
 }

@@ -11,18 +11,18 @@ pub struct LinkStatistics {
     pub frames_sent: u64,
     /// Complete statuses received.
     pub statuses: u64,
-    /// Bytes from the controller that belong to no status.
+    /// Bytes from the controller that are not part of a status.
     pub bad_bytes: u64,
     /// Records of frames that the controller received damaged.
     pub bad_frames: u64,
     /// Frames that were repeated.
     pub retries: u64,
-    /// Time since the session began, or counting time, s.
+    /// Time since the session began, or since the earlier snapshot, s.
     pub time_s: f64,
 }
 
 impl LinkStatistics {
-    /// Returns the statistics since `before`, a snapshot of the same session.
+    /// Returns the statistics since `before`, which is an earlier snapshot of the same session.
     pub fn since(&self, before: &Self) -> Self {
         Self {
             bytes_sent: self.bytes_sent.saturating_sub(before.bytes_sent),

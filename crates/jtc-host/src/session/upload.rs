@@ -1,4 +1,4 @@
-//! Upload of a trajectory: several frames in flight, each segment confirmed, lost segments repeated.
+//! Upload of a trajectory. Several frames are in flight, each segment is confirmed, and lost segments are sent again.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -19,7 +19,7 @@ use crate::trajectory::UploadOptions;
 const SEGMENT_TRIES: u32 = 16;
 /// Maximum number of restarts of the complete upload.
 const RESTARTS: u32 = 3;
-/// Number of records that the controller queues, minus one for safety.
+/// Number of records that the controller queues, minus one as a reserve.
 const WINDOW_MAX: usize = 7;
 
 /// Progress of an upload.
@@ -54,7 +54,7 @@ pub struct UploadReport {
     pub time_s: f64,
     /// Bytes per second.
     pub bytes_per_s: f64,
-    /// Share of the capacity of the line, if the line has a rate.
+    /// Used share of the capacity of the line. `None` if the line has no rate.
     pub line_share: Option<f64>,
     /// Number of repeated segments.
     pub retries: u32,
@@ -63,7 +63,7 @@ pub struct UploadReport {
 }
 
 impl UploadReport {
-    /// Returns the share of the capacity of the line, %; `None` for a pseudo-terminal that is faster than its rate.
+    /// Returns the used share of the capacity of the line, %. `None` for a pseudo-terminal that is faster than its rate.
     pub fn line_share_percent(&self) -> Option<f64> {
         self.line_share.map(|s| s * 100.0).filter(|s| *s < 101.0)
     }
@@ -83,7 +83,7 @@ struct Upload {
     /// Remainder of the frame that is being written.
     writing: Option<(usize, usize)>,
     line_done: Duration,
-    /// `true`: segments are sent singly until the state of the controller is clear.
+    /// `true` if segments are sent one at a time, until the state of the controller is known again.
     probing: bool,
     tries: u32,
     retries: u32,
@@ -113,7 +113,7 @@ impl Upload {
             .map(|(i, chunk)| frame::segment(options.number, i as u16, count as u16, step_ms, chunk))
             .collect::<Result<Vec<Vec<u8>>, _>>()?;
         let longest = frames.first().map_or(0, Vec::len);
-        // Enough frames in flight for 60 ms, which covers the latency of USB adapters.
+        // The frames in flight take 60 ms, which covers the latency of USB adapters.
         let time = line_time(longest, baud).as_secs_f64();
         let window = if time > 0.0 { (0.060 / time).ceil() as usize + 2 } else { WINDOW_MAX };
         Ok(Self {
@@ -130,7 +130,7 @@ impl Upload {
             restarts: 0,
             halts: 0,
             window: window.clamp(3, WINDOW_MAX),
-            // Equivalent of 10 ms on the line, so that statuses are received meanwhile.
+            // As many bytes as the line transmits in 10 ms, so that statuses are received between two writes.
             chunk: baud.map_or(4096, |b| (b as usize / 1000).clamp(256, 4096)),
             start: now,
             bytes_done: 0,
@@ -159,7 +159,7 @@ impl Upload {
         self.tries = 0;
     }
 
-    /// Repeats everything from the first unconfirmed segment, at first singly.
+    /// Returns to the first unconfirmed segment. The next segments are sent one at a time.
     fn go_back(&mut self) {
         self.retries += (self.next - self.confirmed) as u32;
         self.next = self.confirmed;
@@ -183,18 +183,18 @@ impl Upload {
 }
 
 impl<P: Port> Session<P> {
-    /// Uploads a trajectory that passed the check; returns when the controller reports it complete (TES Stop). The arm
-    /// does not move. Calls `progress` after each confirmed segment; it may cancel the upload with [`Flow::Cancel`].
+    /// Uploads a trajectory that passed the check. Returns when the controller reports that the trajectory is complete
+    /// (trajectory state Stop). The arm does not move. Calls `progress` after each confirmed segment, which can cancel the
+    /// upload with [`Flow::Cancel`].
     ///
-    /// The first segment deletes the previous trajectory of the controller.
+    /// The first segment deletes the trajectory that the controller had.
     ///
     /// # Errors
     ///
-    /// [`UploadError::SegmentRefused`] if the controller rejects a segment, for example because it does not hold the
-    /// arm or because its own check (J-36) found a problem; [`UploadError::Incomplete`] if the line lost too much to
-    /// complete it; [`Error::Cancelled`] if `progress` ended it; the errors of [`Session::next_status`] if the
-    /// controller or the port is lost. After an error the controller holds no complete trajectory, and no motion can be
-    /// executed.
+    /// [`UploadError::SegmentRefused`] if the controller rejects a segment, for example because it does not hold the arm,
+    /// or because its own check (J-36) found a problem; [`UploadError::Incomplete`] if too many frames were lost;
+    /// [`Error::Cancelled`] if `progress` cancelled the upload; the errors of [`Session::next_status`] if the controller or
+    /// the port is lost. After an error the controller has no complete trajectory and cannot execute a motion.
     pub fn upload(
         &mut self,
         checked: &CheckedTrajectory,
@@ -208,7 +208,7 @@ impl<P: Port> Session<P> {
         Ok(report)
     }
 
-    /// Sends points at intervals of `step_ms`.
+    /// Sends points that are `step_ms` apart in time.
     fn send(
         &mut self,
         points: &[RawPoint],
@@ -269,7 +269,7 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Returns `true` if the controller has the complete trajectory.
+    /// Returns `true` if the controller reports that the trajectory is complete.
     fn complete(&mut self) -> Result<bool, Error> {
         if self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop) {
             return Ok(true);
@@ -282,11 +282,12 @@ impl<P: Port> Session<P> {
         Ok(false)
     }
 
-    /// Writes a piece or waits for a record; returns `true` if a segment was confirmed.
+    /// Writes a piece or waits for a record. Returns `true` if a segment was confirmed.
     fn advance(&mut self, up: &mut Upload) -> Result<bool, Error> {
         if up.writing.is_none() && up.may_send() {
             if up.next == 0 {
-                // If no request precedes segment 0, the controller assumes a host without support for extensions (J-30).
+                // Without an extension request before segment 0, the controller assumes that the host does not know the
+                // extensions (J-30).
                 self.introduce()?;
             }
             up.writing = Some((up.next, 0));
@@ -340,7 +341,8 @@ impl<P: Port> Session<P> {
             return Ok(());
         }
         match record.data {
-            // The only segment in flight is rejected as out of order: it had arrived, but its confirmation was lost.
+            // The only segment in flight is rejected as out of order. So it had arrived earlier, and only its confirmation
+            // was lost.
             DataStatus::IncorrectSegmentOrder if up.probing && up.confirmed > 0 => {
                 up.confirm();
                 Ok(())
@@ -351,7 +353,8 @@ impl<P: Port> Session<P> {
                     return Err(LinkError::Denied { request: FrameType::Trajectory, reason }.into());
                 }
                 if self.port.halts().all != up.halts {
-                    // The controller dropped the upload at the Stop of another program before the port withheld the remaining segments.
+                    // The Stop of another program made the controller drop the upload. The port had not yet blocked this
+                    // segment.
                     return Err(LinkError::Port(PortError::Halted { by: None }).into());
                 }
                 Err(UploadError::SegmentRefused { segment: up.confirmed, segments: up.frames.len(), code }
@@ -360,12 +363,13 @@ impl<P: Port> Session<P> {
         }
     }
 
-    /// Handles a record that did not arrive in time.
+    /// Handles the case that a record did not arrive in time.
     fn overdue(&mut self, up: &mut Upload) -> Result<(), Error> {
         if self.port.now() - self.last_received > self.timeouts.status {
             self.next_status()?;
         }
-        // All segments are sent and the trajectory is complete: only confirmations were lost. (TES is Null since segment 0 was confirmed.)
+        // All segments are sent, and the status shows that the trajectory is complete. So only confirmations were lost. (An
+        // old status cannot be the reason: the trajectory state has been Null since segment 0 was confirmed.)
         if up.next == up.frames.len()
             && up.confirmed > 0
             && self.last.is_some_and(|s| s.trajectory == TrajectoryState::Stop)
@@ -378,7 +382,7 @@ impl<P: Port> Session<P> {
         self.start_over(up)
     }
 
-    /// Waits for the frames in flight, then goes back to the first segment that is not confirmed.
+    /// Waits for the frames in flight, then returns to the first segment that is not confirmed.
     fn start_over(&mut self, up: &mut Upload) -> Result<(), Error> {
         if up.tries >= SEGMENT_TRIES {
             return Err(self.upload_failed(up).into());
@@ -388,7 +392,7 @@ impl<P: Port> Session<P> {
             self.statistics.bytes_sent += (up.frames[index].len() - at) as u64;
         }
         let quiet = up.line_done.max(self.port.now()) + line_time(2 * STATUS_LEN, self.port.baud());
-        // Records follow their frames at once; late ones get another status period.
+        // A record is sent right after its frame. A late record may take one more status period.
         let end = quiet + Duration::from_millis(60);
         loop {
             let now = self.port.now();

@@ -1,4 +1,5 @@
-//! Tables of numbers: with a header line, or the header-less 19 columns of existing programs as int16 or float.
+//! Tables of numbers, with a header line or in the form of existing programs: 19 columns of int16 or float without a
+//! header.
 
 use std::fmt::Write as _;
 
@@ -10,7 +11,7 @@ use super::{Form, Loaded, Point, ScaleError, Trajectory};
 use crate::file::{FileError, Place, number, rows, short};
 use crate::waypoints;
 
-/// Number of columns of the header-less forms: time, 6 positions, 6 velocities, 6 accelerations.
+/// Number of columns of the forms without a header: time, 6 positions, 6 velocities, 6 accelerations.
 const COLUMNS: usize = 1 + 3 * JOINTS;
 
 pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
@@ -47,7 +48,7 @@ pub(super) fn read(text: &str) -> Result<Loaded, FileError> {
             return Err(FileError::at(Place::line(line), format!("{n} columns and no header; {help}")));
         }
     }
-    // The float form always contains a fraction; the int16 form never does.
+    // The float form always contains a decimal point, and the int16 form never does.
     let whole = rows(text)
         .all(|(_, cells)| cells.iter().all(|c| c.bytes().all(|b| b.is_ascii_digit() || b"+-".contains(&b))));
     if whole { int16(text) } else { float(text) }
@@ -154,12 +155,13 @@ fn finish(samples: Samples, lines: &[usize], form: Form) -> Result<Loaded, FileE
     }
 }
 
-/// Returns the name of column `c` after the time.
+/// Returns the name of column `c`; the time column is not counted.
 fn channel_name(c: usize) -> String {
     format!("{}{}", ["q", "qd", "qdd"][c / JOINTS % 3], c % JOINTS + 1)
 }
 
-/// Returns the value that a header names, and its unit relative to the header-less forms: 0 is the time, 1.. are their columns.
+/// Returns the column for a name in a header, and the factor from its unit. Column 0 is the time. From 1 on the columns are
+/// those of the forms without a header.
 fn column_of(name: &str) -> Option<(usize, f64)> {
     let name = name.trim_matches(|c: char| c == '"' || c.is_whitespace()).to_ascii_lowercase();
     if ["t", "t_s", "time", "time_s", "time_from_start"].contains(&name.as_str()) {
@@ -237,7 +239,7 @@ fn with_header(text: &str, header_line: usize, header: &[&str]) -> Result<Loaded
 }
 
 impl Trajectory {
-    /// Returns the trajectory as CSV with a header, all channels, full precision.
+    /// Returns the trajectory as CSV with a header, with all channels at full precision.
     pub fn to_csv(&self) -> String {
         self.csv_with(|v| format!(",{v}"))
     }
@@ -248,11 +250,12 @@ impl Trajectory {
         self.csv_with(|v| format!(",{:.16e}", v + 0.0))
     }
 
-    /// Returns the trajectory in the header-less form of 19 columns of integers: exactly the values on the wire.
+    /// Returns the trajectory in the form of 19 columns of integers without a header. These are exactly the values in the
+    /// frames.
     ///
     /// # Errors
     ///
-    /// Returns the first value that a trajectory frame cannot carry.
+    /// Returns the first value that does not fit into a trajectory frame.
     pub fn to_int16_csv(&self) -> Result<String, ScaleError> {
         let mut out = String::new();
         for (i, raw) in self.raw()?.iter().enumerate() {

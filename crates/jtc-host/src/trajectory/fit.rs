@@ -4,29 +4,30 @@
 //!
 //! # Derived values
 //!
-//! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives velocities and
-//!   accelerations. Its end conditions are rest: the velocity at the first and at the last sample is 0. The acceleration there is
+//! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives
+//!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration there is not 0,
+//!   so the motion begins and ends with a step in acceleration.
 //!   not, so the motion begins and ends with a step in acceleration.
-//! - **Positions and velocities**: a cubic spline through the velocities, of each joint alone, gives the accelerations; the rounding
-//!   of positions does not disturb it. The end conditions are those of a natural spline: the jerk is 0 at the ends. The
-//!   velocities are used unchanged, at the ends too.
+//! - **Positions and velocities**: for each joint, a cubic spline through the velocities gives the accelerations. So the
+//!   rounding of positions has no effect on them. It is a natural spline: the jerk is 0 at the ends. The velocities are
+//!   used unchanged, at the ends too.
 //! - **All three channels**: nothing is derived.
 //!
 //! # Time
 //!
-//! Samples whose times lie on a grid of whole milliseconds (to 50 µs, steps of 1..1000 ms) become the points unchanged.
-//! All others are resampled to 10 ms, or to a longer step if 10 ms would give more points than the controller holds.
-//! Between samples the trajectory follows a quintic with the position, velocity and acceleration of both its ends. If
-//! the duration is not a whole number of steps, the last step is longer than its share: the last point is the last
-//! sample.
+//! If the times of the samples are on a grid of whole milliseconds (within 50 µs, steps of 1 to 1000 ms), the samples
+//! become the points unchanged. All others are resampled to 10 ms, or to a longer step if 10 ms would give more points than
+//! the controller can store. Between samples the trajectory follows a quintic with the position, velocity and acceleration
+//! of both samples. The last point is the last sample. If the duration is not a whole number of steps, the remainder
+//! of the motion is stretched to a whole step.
 //!
 //! # Overshoot
 //!
-//! A spline passes through every sample, and between samples it may leave the interval of its two neighbours: after a
-//! step it overshoots by some 10 % of the step if the samples are equally spaced. The fit limits nothing;
-//! [`Fitted::overshoot`] reports the overshoot of each joint.
+//! A spline passes through every sample, but between two samples it may leave the interval between their positions. After a
+//! step it overshoots by some 10 % of the step if the samples are equally spaced. The fit does not limit this.
+//! [`Fitted::overshoot`] reports the overshoot of each joint, and
 //! [`CheckedTrajectory::check`](crate::CheckedTrajectory::check) checks the fitted trajectory, also between the points.
-//! Denser samples near a change of direction keep the overshoot small.
+//! With denser samples near a change of direction the overshoot is small.
 //!
 //! # Example
 //!
@@ -55,13 +56,14 @@ use super::{Point, Trajectory};
 /// Samples of a motion, as read from a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// Times, s, strictly increasing; the first one need not be 0.
+    /// Times, s. They strictly increase. The first one need not be 0.
     pub times: Vec<f64>,
-    /// Positions, rad, one for each time.
+    /// Positions, rad, one row for each time.
     pub position: Vec<[f64; JOINTS]>,
-    /// Velocities, rad/s, one for each time; `None`: derived.
+    /// Velocities, rad/s, one row for each time. `None`: they are derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
-    /// Accelerations, rad/s², one for each time; `None`: derived. Accelerations without velocities are not used.
+    /// Accelerations, rad/s², one row for each time. `None`: they are derived. Accelerations without velocities are
+    /// ignored.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }
 
@@ -70,20 +72,20 @@ pub struct Samples {
 pub struct Fitted {
     /// Points at a fixed step.
     pub trajectory: Trajectory,
-    /// Derived and resampled values, as text.
+    /// Description of the derived and resampled values.
     pub notes: Vec<String>,
-    /// Overshoot of each joint: the spline through positions alone leaves the interval between two samples. Empty if velocities were given.
+    /// Overshoot of each joint whose spline leaves the interval between two samples. Empty if the samples have velocities.
     pub overshoot: Vec<Overshoot>,
 }
 
 /// Step for resampling irregular files, ms.
 const STEP_MS: u16 = 10;
-/// Maximum deviation of a regular time column, s.
+/// Maximum deviation of a time from the grid, s.
 const REGULAR: f64 = 50e-6;
-/// Longest trajectory that is resampled, s: a longer one does not fit into the controller at any useful step.
+/// Longest duration that is resampled, s. A longer trajectory does not fit into the controller at any useful step.
 const DURATION_MAX: f64 = 86_400.0;
 
-/// Reason why samples give no trajectory.
+/// Reason why no trajectory can be fitted to the samples.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FitError {
@@ -94,26 +96,27 @@ pub enum FitError {
         channel: &'static str,
         /// Number of samples in the channel.
         samples: usize,
-        /// Required number.
+        /// Number of times.
         times: usize,
     },
-    /// A value is not a finite number, at this sample (from 0).
+    /// A value of this sample (from 0) is not a finite number.
     #[error("sample {0}: a number is not finite")]
     NotFinite(usize),
-    /// Time does not increase at this sample (from 0).
+    /// The time of this sample (from 0) is not later than the time before it.
     #[error("sample {0}: its time does not lie after that of the sample before")]
     Time(usize),
-    /// The samples are longer than a day, s.
+    /// The samples last longer than a day. The value is their duration, s.
     #[error("{0} s are longer than a day")]
     Duration(f64),
 }
 
 impl Samples {
-    /// Returns the trajectory through the samples; without samples an empty trajectory, which no check passes.
+    /// Returns the trajectory through the samples. Without samples it is empty, and does not pass a check.
     ///
     /// # Errors
     ///
-    /// [`FitError`]: channels of different length, a value that is not finite, times that do not increase, or more than a day.
+    /// [`FitError`] for channels of different length, values that are not finite, times that do not increase, or a duration
+    /// of more than a day.
     pub fn fit(self) -> Result<Fitted, FitError> {
         self.whole()?;
         let mut notes = Vec::new();
@@ -177,7 +180,7 @@ impl Samples {
         self.times.iter().enumerate().all(regular).then_some(step as u16)
     }
 
-    /// Returns the samples with velocity and acceleration.
+    /// Returns the samples with their velocities and accelerations.
     fn points(&self) -> Vec<Point> {
         let mut points: Vec<Point> =
             self.position.iter().map(|p| Point { position: *p, ..Point::default() }).collect();
@@ -282,7 +285,7 @@ mod tests {
         assert_eq!(resampled_step(1200.0), 101);
     }
 
-    /// The documented overshoot: joint 1 steps by 1 rad between two of ten equally spaced samples.
+    /// The documented overshoot. Joint 1 steps by 1 rad between two of ten equally spaced samples.
     #[test]
     fn a_spline_swings_over_after_a_step() {
         let position: Vec<_> = (0..10).map(|i| [f64::from(u8::from(i >= 5)); 6]).collect();
@@ -294,7 +297,7 @@ mod tests {
         };
         let over = points.windows(2).map(between).fold(0.0, f64::max) - 1.0;
         assert!((0.08..0.12).contains(&over), "{over}");
-        // End conditions: at rest, but with acceleration if the path begins to bend at once.
+        // The ends are at rest, but they have an acceleration if the path begins to bend at once.
         assert_eq!((points[0].velocity, points[9].velocity), ([0.0; 6], [0.0; 6]));
         let bent = Samples {
             times: vec![0.0, 0.5, 1.0],
@@ -319,7 +322,7 @@ mod tests {
         let never = Samples { times: vec![f64::NAN], position: vec![[0.0; 6]], ..Samples::default() };
         assert_eq!(never.fit(), Err(FitError::NotFinite(0)));
         assert_eq!(Samples::default().fit().unwrap().trajectory.points.len(), 0);
-        // Accelerations alone are not used, because they would contradict the derived velocities.
+        // Accelerations alone are ignored, because they would contradict the derived velocities.
         let alone = Samples { velocity: None, acceleration: Some(vec![[9.0; 6]; 3]), ..good };
         assert!(alone.fit().unwrap().trajectory.points.iter().all(|p| p.acceleration[0] != 9.0));
     }

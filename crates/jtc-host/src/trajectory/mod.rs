@@ -1,4 +1,4 @@
-//! Trajectories: points at a fixed step, read from common file formats.
+//! Trajectories: points at a fixed step. They can be read from common file formats.
 
 mod csv;
 pub mod fit;
@@ -33,7 +33,7 @@ pub struct Point {
 }
 
 impl From<&Point> for SetPoint {
-    /// Converts the point before the wire rounds it.
+    /// Converts the point without the rounding of a frame.
     fn from(p: &Point) -> Self {
         Self { position: p.position, velocity: p.velocity, acceleration: p.acceleration }
     }
@@ -54,30 +54,30 @@ pub struct Trajectory {
 pub enum Form {
     /// CSV with a header.
     Csv,
-    /// 19 columns of integers, scaled as on the wire.
+    /// 19 columns of integers, with the scale of the frames.
     Int16,
     /// 19 columns of floats.
     Float,
     /// JSON in the project's own form.
     Json,
-    /// `trajectory_msgs/JointTrajectory` as YAML or JSON.
+    /// `trajectory_msgs/JointTrajectory`, as YAML or JSON.
     JointTrajectory,
-    /// A recording of a run, MCAP or CSV.
+    /// A recording of a run, as MCAP or CSV.
     Recording,
 }
 
-/// A trajectory from a file.
+/// Trajectory from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// Trajectory.
     pub trajectory: Trajectory,
     /// Form of the file.
     pub form: Form,
-    /// Derived, resampled and ignored data.
+    /// Descriptions of derived, resampled and ignored data.
     pub notes: Vec<String>,
-    /// Overshoot of the curve beyond the waypoints of a file with positions alone.
+    /// Overshoot of the curve beyond the waypoints, if the file has only positions.
     pub overshoot: Vec<Overshoot>,
-    /// `true` if the file names the units of its numbers.
+    /// `true` if the file states the units of its numbers.
     pub units_named: bool,
 }
 
@@ -87,11 +87,11 @@ impl Loaded {
         Self { trajectory, form, notes, overshoot, units_named: matches!(form, Form::Json | Form::Recording) }
     }
 
-    /// Reads a file of any form; `joint_names` are the names of the arm's joints, if known.
+    /// Reads a file of any form. `joint_names` are the names of the arm's joints, if they are known.
     ///
     /// # Errors
     ///
-    /// Returns an error, with line and column, if the file cannot be read or is not a trajectory of a known form.
+    /// Returns an error with line and column if the file cannot be read or is not a trajectory of a known form.
     pub fn load(path: &Path, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         if replay::is_recording(path, None) {
             return replay::load(path);
@@ -106,7 +106,8 @@ impl Loaded {
         read.map_err(|e| e.in_file(path))
     }
 
-    /// Reads the measured motion of a recording instead of the commanded one: its last motion by hand, or else its last execution.
+    /// Reads the measured motion of a recording instead of the commanded one. It is the last motion by hand, or, if there
+    /// is none, the last execution.
     ///
     /// # Errors
     ///
@@ -115,7 +116,7 @@ impl Loaded {
         replay::load_measured(path)
     }
 
-    /// Converts the values from degrees, degrees/s and degrees/s²; returns an error if the file names its units itself.
+    /// Converts the values from degrees, degrees/s and degrees/s². Returns an error if the file states its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN));
@@ -136,7 +137,7 @@ impl Loaded {
     ///
     /// # Errors
     ///
-    /// Returns an error, with line and column, if the text is not a trajectory of a known form.
+    /// Returns an error with line and column if the text is not a trajectory of a known form.
     pub fn parse(text: &str, joint_names: Option<&[String; JOINTS]>) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let keyed = || start.lines().any(|l| l.trim_start_matches([' ', '-']).starts_with("joint_names:"));
@@ -150,7 +151,7 @@ impl Loaded {
     }
 }
 
-/// A value that a trajectory frame cannot carry.
+/// A value does not fit into a trajectory frame.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("point {point}, {joint}: {channel} {value} is outside the scale of ±{limit} {unit}")]
 pub struct ScaleError {
@@ -162,7 +163,7 @@ pub struct ScaleError {
     pub channel: &'static str,
     /// Value.
     pub value: f64,
-    /// Largest possible value.
+    /// Largest value that fits.
     pub limit: f64,
     /// Unit of both values.
     pub unit: &'static str,
@@ -180,17 +181,18 @@ impl From<&RawPoint> for Point {
 }
 
 impl Point {
-    /// Returns the point as on the wire; `index` is for the error.
+    /// Returns the point in the form in which it is sent. `index` is used in the error.
     ///
     /// # Errors
     ///
-    /// Returns the first value that a trajectory frame cannot carry.
+    /// Returns the first value that does not fit into a trajectory frame.
     pub fn raw(&self, index: usize) -> Result<RawPoint, ScaleError> {
         let channel = |values: &[f64; JOINTS], scale: f64, channel, unit| {
             let mut out = [0i16; JOINTS];
             for (joint, (to, v)) in Joint::ALL.into_iter().zip(out.iter_mut().zip(values)) {
                 let exact = v * 32767.0 / scale;
-                // Neither clipped nor wrapped; a small tolerance covers the rounding of the multiplication. NaN is outside every range.
+                // The value is neither clipped nor wrapped. A small tolerance covers the rounding of the multiplication.
+                // NaN is outside every range.
                 if !(-32768.0 - 1e-9..=32767.0 + 1e-9).contains(&exact) {
                     return Err(ScaleError { point: index, joint, channel, value: *v, limit: scale, unit });
                 }
@@ -207,11 +209,11 @@ impl Point {
 }
 
 impl Trajectory {
-    /// Returns all points as on the wire.
+    /// Returns all points in the form in which they are sent.
     ///
     /// # Errors
     ///
-    /// Returns the first value that a trajectory frame cannot carry.
+    /// Returns the first value that does not fit into a trajectory frame.
     pub fn raw(&self) -> Result<Vec<RawPoint>, ScaleError> {
         self.points.iter().enumerate().map(|(i, p)| p.raw(i)).collect()
     }

@@ -1,4 +1,4 @@
-//! Overshoot of the curve through waypoints.
+//! Overshoot of a curve through waypoints.
 
 use jtc_wire::Joint;
 
@@ -17,10 +17,11 @@ pub struct Overshoot {
     pub after: usize,
 }
 
-/// Smallest overshoot that is reported, rad: 1 mm at a metre.
+/// Smallest overshoot that is reported, rad. It moves a point at a distance of one metre by 1 mm.
 const LEAST: f64 = 1e-3;
 
-/// Returns the largest overshoot of each joint that has one, for the cubics with these positions and velocities at these times (s).
+/// Returns the largest overshoot of each joint that has one. The curve consists of the cubics with these positions and
+/// velocities at these times (s).
 pub(super) fn overshoots(times: &[f64], points: &[Point]) -> Vec<Overshoot> {
     let of_joint = |joint: Joint| {
         let j = joint.index();
@@ -43,10 +44,10 @@ fn outside(x: f64, low: f64, high: f64) -> f64 {
     (x - high).max(low - x)
 }
 
-/// Returns the extrema of a cubic over the unit interval, from 0 to `d` with the slopes `v0` and `v1`.
+/// Returns the extrema of a cubic in the unit interval. It goes from 0 to `d`, with the slopes `v0` and `v1` at the ends.
 fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
     let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
-    // v0 + 2·c2·u + 3·c3·u² = 0, solved in the form without cancellation.
+    // v0 + 2·c2·u + 3·c3·u² = 0, solved in a form without cancellation.
     let root = (c2 * c2 - 3.0 * c3 * v0).sqrt();
     let q = -(c2 + root.copysign(c2));
     [q / (3.0 * c3), v0 / q].map(|u| (u > 0.0 && u < 1.0).then_some(u * (v0 + u * (c2 + u * c3))))
@@ -81,14 +82,15 @@ mod tests {
         let loaded = Loaded::parse(text, None).unwrap();
         let [over] = loaded.overshoot[..] else { panic!("{:?}", loaded.overshoot) };
         assert_eq!((over.joint.number(), over.after), (1, 2));
-        // The spline through 0, 0.5, 0.5, 0 at rest at its ends turns at 1.5 s: slopes ±0.5 rad/s there and back.
+        // The spline goes through 0, 0.5, 0.5, 0 with rest at both ends. It turns at 1.5 s, with slopes of ±0.5 rad/s at
+        // the two middle points.
         assert!(
             (over.beyond_rad - 0.125).abs() < 1e-9 && (over.position_rad - 0.625).abs() < 1e-9,
             "{over:?}"
         );
         let words = overshoot_words(&loaded.overshoot).unwrap();
         assert!(words.contains("joint 1 by 0.125 rad (to +0.625 rad, after waypoint 2)"), "{words}");
-        // Resampled times change nothing.
+        // The overshoot is the same if the times are resampled.
         let uneven = text.replace("\n3,", "\n3.0004,");
         let over = Loaded::parse(&uneven, None).unwrap().overshoot;
         assert!(over.len() == 1 && (over[0].beyond_rad - 0.125).abs() < 1e-3, "{over:?}");

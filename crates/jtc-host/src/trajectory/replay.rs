@@ -1,7 +1,7 @@
-//! Extraction of the trajectory from a recording.
+//! Extraction of a trajectory from a recording.
 //!
-//! A sample of an execution contains the controller's path time in milliseconds. Therefore the path can be
-//! reconstructed even if line, host or pauses disturbed the times of the samples.
+//! A sample of an execution contains the path time of the controller in milliseconds. So the path can be reconstructed even
+//! if the times of the samples are disturbed by the line, the host or pauses.
 
 use std::path::Path;
 
@@ -15,18 +15,18 @@ use crate::file::{FileError, Place};
 use crate::recording::{NothingLeft, Recording, RecordingError};
 use crate::sample::Sample;
 
-/// Minimum spacing of points, ms; points further apart are kept.
+/// Minimum spacing of points, ms. If two points are this far apart or more, all are kept.
 const GRID_MS: u32 = 10;
 
-/// Spacing of measured positions, s: with closer ones the encoder noise appears as speed.
+/// Spacing of measured positions, s. With a smaller spacing the encoder noise would appear as speed.
 const MEASURED_S: f64 = 0.04;
-/// Movement below which the arm counts as at rest, rad.
+/// Movement below which the arm is considered at rest, rad.
 const STILL: f64 = 0.002;
 
 /// First columns in the header of a recording as CSV.
 const CSV_HEADER: &str = "time_s,state,tes,point,";
 
-/// Returns `true` if the file is a recording: MCAP by its name, CSV by its header.
+/// Returns `true` if the file is a recording. MCAP is recognised by the file name, and CSV by the header.
 pub(super) fn is_recording(path: &Path, text: Option<&str>) -> bool {
     let mcap = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     mcap || text.is_some_and(|text| text.trim_start_matches('\u{feff}').starts_with(CSV_HEADER))
@@ -53,7 +53,8 @@ pub(super) fn load(path: &Path) -> Result<Loaded, FileError> {
     loaded.map_err(|e| e.in_file(path))
 }
 
-/// Returns the trajectory stored in the recording of a run, exactly as it was run; complete even if the run was interrupted.
+/// Returns the trajectory that is stored in the recording of a run. It is exactly the trajectory of the run, and complete
+/// even if the run was interrupted.
 fn held(recording: &Recording) -> Option<Loaded> {
     let whole = recording.info.as_ref()?.commanded.as_deref()?;
     let note = match recording.broken_off(whole) {
@@ -88,7 +89,7 @@ fn read(path: &Path) -> Result<Recording, FileError> {
     })
 }
 
-/// Reads a recording and extracts the measured motion: its last teaching, or else its last execution.
+/// Reads a recording and extracts the measured motion. It is the last teaching, or, if there is none, the last execution.
 pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     let recording = read(path)?;
     let mut loaded = measured(&recording.samples).map_err(|e| e.in_file(path))?;
@@ -98,7 +99,8 @@ pub(super) fn load_measured(path: &Path) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the measured motion, by hand or else along a trajectory (the last one), without the standstill before and after it.
+/// Returns the last measured motion, without the standstill before and after it. It is a motion by hand, or, if there is
+/// none, a motion along a trajectory.
 fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     let by_hand = samples.iter().any(|s| s.state == ControllerState::Teaching);
     let timed = if by_hand { led(samples) } else { followed(samples) };
@@ -118,7 +120,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
         let problem = "the recording holds no motion by hand and no execution in which the arm moves";
         return Err(FileError::at(Place::default(), problem));
     };
-    // Includes a pose at rest at each end.
+    // Keeps one position at rest at each end.
     let kept = first.saturating_sub(1)..(last + 2).min(path.times.len());
     let (times, position) = (path.times[kept.clone()].to_vec(), path.position[kept].to_vec());
     let start = times.first().copied().unwrap_or(0.0);
@@ -131,7 +133,7 @@ fn measured(samples: &[Sample]) -> Result<Loaded, FileError> {
     Ok(loaded)
 }
 
-/// Returns the last motion by hand, on the clock of the recording.
+/// Returns the last motion by hand, with the times of the recording.
 fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let taught = |s: &Sample| s.state == ControllerState::Teaching;
     let end = samples.iter().rposition(taught).map_or(0, |i| i + 1);
@@ -139,8 +141,8 @@ fn led(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     samples[begin..end].iter().map(|s| (s.time_s, s)).collect()
 }
 
-/// Returns the last execution, including its pauses, on the clock of its path. The host's clock has jitter, and no
-/// meaning in virtual time. The last sample is the pose in which the arm came to rest.
+/// Returns the last execution including its pauses, with the times of its path. The times of the host have jitter, and they
+/// are meaningless in virtual time. The last sample is the pose in which the arm came to rest.
 fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     let on_path = |s: &Sample| s.trajectory.is_in(&[TrajectoryState::Execute, TrajectoryState::Pause]);
     let end = samples.iter().rposition(on_path).map_or(0, |i| i + 1);
@@ -161,7 +163,7 @@ fn followed(samples: &[Sample]) -> Vec<(f64, &Sample)> {
     timed
 }
 
-/// Observed positions of a path, by the controller's milliseconds.
+/// Positions of a path that the recording contains, with the controller's milliseconds.
 #[derive(Default)]
 struct Seen {
     ms: Vec<u32>,
@@ -169,7 +171,8 @@ struct Seen {
 }
 
 impl Seen {
-    /// Keeps every tenth millisecond and both ends: a path known at each millisecond has more points than the controller holds.
+    /// Keeps every tenth millisecond and both ends. A path that is known at each millisecond has more points than the
+    /// controller can store.
     fn thinned(self) -> Self {
         let last = self.ms.len().saturating_sub(1);
         if self.ms.iter().zip(self.ms.iter().skip(1)).any(|(a, b)| b - a >= GRID_MS) {
@@ -208,7 +211,7 @@ fn executed(samples: &[Sample]) -> Result<Loaded, FileError> {
                 velocity: sample.joints.map(|joint| joint.set_velocity),
                 acceleration: sample.joints.map(|joint| joint.set_acceleration),
             },
-            // Set values are known on the path only. The path ends at rest, close to the previous sample.
+            // The recording contains set values only on the path. The path ends at rest, close to the previous sample.
             (Some(TrajectoryState::Finish), Some(place)) => {
                 Point { position: place.position, ..Point::default() }
             }
@@ -256,7 +259,7 @@ mod tests {
         let s = f64::from(point) / 2_000.0;
         let q = 0.3 * s * s * (3.0 - 2.0 * s);
         let joint = JointSample { set_position: q, position: q + 1e-4, ..JointSample::UNKNOWN };
-        // The host's times have no meaning in virtual time.
+        // The host's times are meaningless in virtual time.
         Sample { trajectory: trajectory.into(), point, joints: [joint; JOINTS], ..Sample::default() }
     }
 
@@ -272,7 +275,7 @@ mod tests {
         let loaded = executed(&samples).unwrap();
         assert_eq!(loaded.form, Form::Recording);
         assert!((loaded.trajectory.duration_s() - 2.0).abs() < 1e-9);
-        // The last 40 ms of the path are unknown.
+        // The last 40 ms of the path are not in the recording.
         for (i, point) in loaded.trajectory.points.iter().enumerate() {
             let s = i as f64 * f64::from(loaded.trajectory.step_ms) / 2_000.0;
             let q = 0.3 * s * s * (3.0 - 2.0 * s);
@@ -289,7 +292,7 @@ mod tests {
         assert!((loaded.trajectory.duration_s() - 0.15).abs() < 1e-9);
     }
 
-    /// `jtc sim` records each millisecond: a minute of it has more points than the controller holds. The commanded
+    /// `jtc sim` records each millisecond, and a minute of it has more points than the controller can store. The commanded
     /// values are restored, including velocities and accelerations.
     #[test]
     fn a_long_path_known_at_each_millisecond_can_be_run_again() {
@@ -314,7 +317,7 @@ mod tests {
         }
     }
 
-    /// A motion by hand is found between rests of any length and after any earlier execution.
+    /// A motion by hand is found between standstills of any length, and after earlier executions.
     #[test]
     fn a_motion_by_hand_is_found_as_it_was_measured() {
         let at = |ms: u32| {
@@ -334,7 +337,7 @@ mod tests {
         let (first, last) = (led.points[0], led.points.last().unwrap());
         assert!(first.position[3].abs() < 2e-3 && (last.position[3] - 0.4).abs() < 2e-3);
         assert_eq!((first.velocity, last.velocity), ([0.0; JOINTS], [0.0; JOINTS]));
-        // Without a motion by hand, the last execution is used.
+        // If there is no motion by hand, the last execution is used.
         let run: Vec<Sample> = (0..50)
             .map(|k| Sample {
                 time_s: f64::from(k) * 0.04,

@@ -1,11 +1,11 @@
-//! Segmentation of a trajectory for the upload.
+//! Division of a trajectory into segments for the upload.
 //!
-//! Frames are short (113 points, 4,082 bytes): above 4,095 bytes CRC-16 misses some double bit errors, because x has
-//! order 32,767 modulo its polynomial.
+//! Frames are short (113 points, 4,082 bytes). In frames above 4,095 bytes CRC-16 does not detect all double bit errors,
+//! because x has the order 32,767 modulo its polynomial.
 
 use jtc_core::{SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-/// Maximum number of points of a segment whose frame CRC-16 protects against every double bit error.
+/// Maximum number of points of a segment for which CRC-16 detects every double bit error in the frame.
 const SEGMENT_POINTS: usize = 113;
 /// Points per segment if 113 would need more than 100 segments.
 const SEGMENT_POINTS_LONG: usize = 120;
@@ -13,7 +13,7 @@ const SEGMENT_POINTS_LONG: usize = 120;
 /// Options for the upload.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UploadOptions {
-    /// Points per segment; `None`: chosen automatically.
+    /// Points per segment. `None`: chosen automatically.
     pub points_per_segment: Option<usize>,
     /// Number of the trajectory.
     pub number: u16,

@@ -1,4 +1,5 @@
-//! Curves through points: the cubic spline of a file with positions alone, and the quintic between two points of a trajectory.
+//! Curves through points: the cubic spline for a file with only positions, and the quintic between two points of a
+//! trajectory.
 
 use jtc_core::JOINTS;
 
@@ -8,7 +9,8 @@ pub(super) fn column(rows: &[[f64; JOINTS]], j: usize) -> Vec<f64> {
     rows.iter().map(|r| r[j]).collect()
 }
 
-/// Returns the first derivatives at the knots of a cubic spline through `y`; its ends are at rest, or else without curvature.
+/// Returns the first derivatives of a cubic spline through `y` at its knots. If `rest` is set, the ends are at rest. If
+/// not, they have no curvature.
 pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     let n = y.len();
     if n < 2 {
@@ -43,7 +45,7 @@ pub(super) fn spline_slopes(t: &[f64], y: &[f64], rest: bool) -> Vec<f64> {
     right
 }
 
-/// Returns the second derivatives at the knots of the cubic spline with these slopes.
+/// Returns the second derivatives of the cubic spline with these slopes at its knots.
 pub(super) fn spline_bends(t: &[f64], y: &[f64], slopes: &[f64]) -> Vec<f64> {
     let n = y.len();
     if n < 2 {
@@ -62,7 +64,7 @@ pub(super) fn spline_bends(t: &[f64], y: &[f64], slopes: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Returns the quintic through both points at the fraction `u` of `h` seconds, with its derivatives.
+/// Returns the quintic through both points, with its derivatives, at the fraction `u` of its duration `h` (s).
 pub(super) fn quintic(a: &Point, b: &Point, h: f64, u: f64) -> Point {
     let mut out = Point::default();
     for j in 0..JOINTS {

@@ -26,7 +26,7 @@ struct JsonPoint {
     acceleration_rad_s2: Option<[f64; JOINTS]>,
 }
 
-/// A `trajectory_msgs/JointTrajectory`, alone or inside the messages that contain it.
+/// `trajectory_msgs/JointTrajectory`, alone or inside a message that contains it.
 #[derive(Deserialize)]
 struct RosForm {
     joint_names: Option<Vec<String>>,
@@ -70,7 +70,7 @@ impl RosTime {
 
 pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
     let wrong = |e: serde_json::Error| FileError::at(Place::line(e.line()), format!("JSON: {e}"));
-    // The ROS form is tried only if the project's own form does not fit.
+    // The ROS form is tried only if the text does not have the project's own form.
     match serde_json::from_str::<JsonForm>(text) {
         Ok(form) => own(form),
         Err(e) if text.contains("position_rad") => Err(wrong(e)),
@@ -79,12 +79,12 @@ pub(super) fn read_json(text: &str, names: Option<&[String; JOINTS]>) -> Result<
 }
 
 pub(super) fn read_yaml(text: &str, names: Option<&[String; JOINTS]>) -> Result<Loaded, FileError> {
-    // 12,000 points have some 300,000 nodes.
+    // A trajectory of 12,000 points has some 300,000 nodes.
     let options = serde_saphyr::options! {
         budget: serde_saphyr::budget! { max_nodes: 2_000_000, max_events: 4_000_000 },
         with_snippet: false,
     };
-    // `ros2 topic echo` ends each message with a line of dashes.
+    // `ros2 topic echo` writes a line of dashes after each message.
     let text = text.trim_end().trim_end_matches("---");
     let form = serde_saphyr::from_str_with_options::<RosForm>(text, options).map_err(|e| {
         let line = e.location().map(|l| l.line() as usize);
@@ -117,14 +117,15 @@ fn own(form: JsonForm) -> Result<Loaded, FileError> {
     samples.acceleration = all_or_none(&form.points, "acceleration_rad_s2", |p| p.acceleration_rad_s2)?;
     let exact = form.step_ms;
     let mut loaded = finish(samples, Form::Json)?;
-    // Keeps the step of the file itself, even if a step above 1 s would count as irregular.
+    // A single point keeps the step of the file, even if the step is above 1 s, so that the times would be considered
+    // irregular.
     if let (Some(step_ms), 1) = (exact, loaded.trajectory.points.len()) {
         loaded.trajectory.step_ms = step_ms;
     }
     Ok(loaded)
 }
 
-/// Returns the values if all points have them; `None` if no point has them.
+/// Returns the values if all points have them. Returns `None` if none of the points has them.
 fn all_or_none<P, const N: usize>(
     points: &[P],
     name: &str,
@@ -208,7 +209,7 @@ fn finish(mut samples: Samples, form: Form) -> Result<Loaded, FileError> {
     }
 }
 
-/// Returns the index in the file of each joint of the arm, base to wrist.
+/// Returns, for each joint of the arm from base to wrist, its index in the file.
 fn joint_order(
     found: &[String],
     names: Option<&[String; JOINTS]>,
@@ -225,7 +226,8 @@ fn joint_order(
     if let Some(exact) = exact {
         order.copy_from_slice(&exact);
     } else {
-        // Prefixes differ between files of the same arm; the number at the end is the joint number.
+        // The names of the joints have different prefixes in files of the same arm. The number at the end is the number of
+        // the joint.
         let mut ends: Vec<(u32, usize)> =
             found.iter().enumerate().filter_map(|(i, n)| Some((last_number(n)?, i))).collect();
         ends.sort_unstable();

@@ -11,7 +11,7 @@ use crate::file::{FileError, Place, number, rows, short};
 pub(super) const KNOWN: &str = "known: q1..q6 (rad) or q1_deg..q6_deg, t (s), pose (a name from the arm file), leg (joint, line, via or arc), and of the flange x, y, z (m) with \
                      qx, qy, qz, qw or roll, pitch, yaw (rad, or roll_deg and so on)";
 
-/// Content of a column, or of a key of an object.
+/// Content of a column, or of a key in a JSON object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Column {
     Time,
@@ -19,11 +19,11 @@ pub(super) enum Column {
     Leg,
     /// Joint, from 0.
     Joint(usize),
-    /// Value of the flange, from 0, in the order of the names.
+    /// Value of a flange pose: its index in the list of names.
     Flange(usize),
 }
 
-/// Positions of the columns, and the factor from each unit to radians.
+/// Columns of the table, and the factor from the unit of each column to radians.
 #[derive(Default)]
 struct Header {
     names: Vec<String>,
@@ -53,13 +53,13 @@ pub(super) fn read(text: &str) -> Result<WaypointFile, FileError> {
     Ok(WaypointFile { waypoints, units_named, ..WaypointFile::default() })
 }
 
-/// Returns `true` if the name of a column contains the unit of an angle, in upper or lower case.
+/// Returns `true` if the name of a column contains a unit of angle, in upper or lower case.
 pub(super) fn names_unit(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     name.contains("_deg") || name.contains("_rad")
 }
 
-/// Returns the column for a name, in upper or lower case, and the factor from its unit to radians.
+/// Returns the column of this name, in upper or lower case, and the factor from its unit to radians.
 pub(super) fn column(name: &str) -> Option<(Column, f64)> {
     let name = name.trim_matches('"').to_ascii_lowercase();
     match name.as_str() {
@@ -177,7 +177,7 @@ impl Header {
         Ok(FileWaypoint { target, time, leg, place })
     }
 
-    /// Returns a pose of the flange, or the `point` alone; empty cells count as missing.
+    /// Returns a flange pose, or only its position if `point` is set. Empty cells are treated as missing.
     fn flange(&self, line: usize, cells: &[&str], point: bool) -> Result<Target, FileError> {
         let mut given = [None; NAMES.len()];
         for (to, column) in given.iter_mut().zip(&self.flange) {

@@ -1,4 +1,5 @@
-//! Waypoints as JSON: a list of objects with the keys of the table's header, alone or as `waypoints` of an object.
+//! Waypoints as JSON: a list of objects whose keys are the names in the table's header. The list is the whole file, or
+//! `waypoints` of an object.
 
 use std::fmt;
 
@@ -18,7 +19,7 @@ struct Whole {
     waypoints: Vec<Entry>,
 }
 
-/// A waypoint as written in the file; angles in rad.
+/// A waypoint as written in the file. Angles are in rad.
 #[derive(Default)]
 struct Entry {
     time: Option<f64>,
@@ -26,9 +27,9 @@ struct Entry {
     leg: Option<String>,
     joints: [Option<f64>; JOINTS],
     flange: [Option<f64>; NAMES.len()],
-    /// `true` if a key contains the unit of an angle.
+    /// `true` if a key contains a unit of angle.
     unit_named: bool,
-    /// Two keys for the same value, as written in the file.
+    /// Two keys for the same value, if the file has both.
     twice: Option<(String, String)>,
 }
 
@@ -105,7 +106,7 @@ impl<'de> Visitor<'de> for Keys {
     }
 }
 
-/// Stores a value if it is present; returns `true` if it is.
+/// Stores a value if it is present. Returns `true` if it is.
 fn set<T>(to: &mut Option<T>, value: Option<T>) -> bool {
     let given = value.is_some();
     if given {

@@ -1,10 +1,10 @@
-//! Waypoint files: positions for a motion, with or without times, for [`plan`](crate::plan).
+//! Waypoint files: positions for a motion, with or without times. They are used by [`plan`](crate::plan).
 //!
-//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a
-//! pose of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). For a pose of the flange the
-//! joint positions nearest to the previous waypoint are used. `leg` selects the motion to the waypoint: straight in
-//! joint space, or with the flange on a [line or an arc](LegKind). Times are s from the first waypoint. The forms are
-//! CSV with a header and JSON with the same keys:
+//! A waypoint is a joint position (rad, base to wrist), the name of one of the arm's [poses](crate::Arm::poses), or a pose
+//! of the flange in the base frame (m, with a quaternion or roll, pitch and yaw). If a flange pose has several solutions,
+//! the joint positions nearest to the previous waypoint are used. `leg` selects the motion to the waypoint: straight in
+//! joint space, or with the flange on a [line or an arc](LegKind). Times are in s from the first waypoint. A file is CSV
+//! with a header, or JSON with the same keys:
 //!
 //! ```
 //! use jtc_host::waypoints::WaypointFile;
@@ -55,7 +55,7 @@ pub enum Target {
 pub struct FileWaypoint {
     /// Position.
     pub target: Target,
-    /// Time of the waypoint, s from the first one; `None`: as soon as the limits permit.
+    /// Time of the waypoint from the first one, s. `None`: as soon as the limits permit.
     pub time: Option<f64>,
     /// Motion from the previous waypoint, if the file specifies it.
     pub leg: Option<LegKind>,
@@ -68,7 +68,7 @@ pub struct FileWaypoint {
 pub struct WaypointFile {
     /// Waypoints, in order.
     pub waypoints: Vec<FileWaypoint>,
-    /// `true` if the file names the units of its numbers.
+    /// `true` if the file states the units of its numbers.
     pub units_named: bool,
     path: PathBuf,
 }
@@ -80,7 +80,7 @@ pub enum WaypointError {
     /// The file cannot be read, or its form is unknown.
     #[error(transparent)]
     File(#[from] FileError),
-    /// A name in the file is not a pose that the arm has and can reach.
+    /// A name in the file is not a pose of the arm, or the arm cannot reach the pose.
     #[error("{}{place}: {source}", path.display())]
     Pose {
         /// The file.
@@ -100,7 +100,7 @@ pub enum WaypointError {
         /// Reason.
         source: Box<kinematics::PoseError>,
     },
-    /// No such path through the waypoints exists; the error contains the number of the waypoint.
+    /// The path through the waypoints is not possible. The error contains the number of the waypoint.
     #[error(transparent)]
     Route(#[from] PlanError),
 }
@@ -112,7 +112,7 @@ impl Diagnose for WaypointError {
             Self::Pose { source, .. } => source.diagnosis(),
             Self::Route(e) => e.diagnosis(),
             Self::Flange { source, .. } => {
-                // Values that are not a valid pose for any arm.
+                // The values are not a valid pose for any arm.
                 let kind = match **source {
                     kinematics::PoseError::NotFinite { .. } | kinematics::PoseError::NotUnit { .. } => {
                         ErrorKind::Usage
@@ -135,18 +135,18 @@ impl Diagnose for WaypointError {
 }
 
 impl WaypointFile {
-    /// Reads a CSV or JSON file, recognised by its content.
+    /// Reads a CSV or JSON file. The form is recognised by its content.
     ///
     /// # Errors
     ///
-    /// Returns an error, with line, column and value, if the file cannot be read or is not one of the forms.
+    /// Returns an error with line, column and value if the file cannot be read or has none of these forms.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let text = read_text(path)?;
         let file = Self::parse(&text).map_err(|e| e.in_file(path))?;
         Ok(Self { path: path.to_owned(), ..file })
     }
 
-    /// Sets the path of the file, which errors name.
+    /// Sets the path of the file, for error messages.
     pub fn in_file(self, path: &Path) -> Self {
         Self { path: path.to_owned(), ..self }
     }
@@ -155,7 +155,7 @@ impl WaypointFile {
     ///
     /// # Errors
     ///
-    /// As [`load`](Self::load).
+    /// Returns the errors of [`load`](Self::load).
     pub fn parse(text: &str) -> Result<Self, FileError> {
         let start = text.trim_start_matches('\u{feff}').trim_start();
         let file = if start.starts_with(['{', '[']) { json::read(start)? } else { csv::read(text)? };
@@ -170,7 +170,7 @@ impl WaypointFile {
         Ok(file)
     }
 
-    /// Checks that each `via` point is followed by the end of an arc, and that each arc has a `via` point before it.
+    /// Checks that each `via` point is followed by the end of an arc, and that each arc is preceded by a `via` point.
     fn check_arcs(&self) -> Result<(), FileError> {
         let kind = |i: usize| self.waypoints.get(i).and_then(|w| w.leg);
         for (i, waypoint) in self.waypoints.iter().enumerate() {
@@ -193,13 +193,14 @@ impl WaypointFile {
         Ok(())
     }
 
-    /// Returns `true` if the flange moves on a line or an arc on any leg; `line`: legs without a specified motion are lines.
+    /// Returns `true` if the flange moves on a line or an arc on any leg. If `line` is set, legs without a specified motion
+    /// are lines.
     pub fn has_lines(&self, line: bool) -> bool {
         let is_line = |w: &FileWaypoint| w.leg.map_or(line, |leg| leg != LegKind::Joint);
         self.waypoints.iter().skip(1).any(is_line)
     }
 
-    /// Returns the indices of the waypoints that are reached by a leg in joint space from one flange pose to another.
+    /// Returns the indices of the waypoints to which a leg in joint space leads, from one flange pose to another.
     pub fn legs_between_flange_poses(&self) -> Vec<usize> {
         let by_flange = |i: usize| matches!(self.waypoints[i].target, Target::Flange(..));
         let is_joint = |i: usize| self.waypoints[i].leg.unwrap_or_default() == LegKind::Joint;
@@ -210,7 +211,7 @@ impl WaypointFile {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file names its units itself.
+    /// Returns an error if the file states its units itself.
     pub fn in_degrees(mut self) -> Result<Self, FileError> {
         if self.units_named {
             return Err(FileError::form(UNITS_KNOWN).in_file(&self.path));
@@ -225,14 +226,14 @@ impl WaypointFile {
         Ok(self)
     }
 
-    /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). For a
-    /// pose of the flange the joint positions nearest to the previous waypoint are used, or nearest to the zero pose
-    /// for the first waypoint.
+    /// Returns the waypoints as positions of an arm, for [`Planner::through`](crate::plan::Planner::through). For a flange
+    /// pose the joint positions nearest to the previous waypoint are used. For the first waypoint they are those nearest to
+    /// the zero pose.
     ///
     /// # Errors
     ///
     /// [`WaypointError::Pose`] if a name is not one of this arm's poses, with the most similar name;
-    /// [`WaypointError::Flange`] if the arm does not reach a pose of the flange.
+    /// [`WaypointError::Flange`] if the arm does not reach a flange pose.
     pub fn positions(&self, arm: &Arm) -> Result<Vec<jtc_plan::Waypoint>, WaypointError> {
         let start = self.waypoints.first().and_then(|w| w.time).unwrap_or(0.0);
         let config = arm.config();
@@ -248,12 +249,12 @@ impl WaypointFile {
         Ok(found)
     }
 
-    /// Returns the waypoints as a route, for [`Planner::on_route`](crate::plan::Planner::on_route), and their times;
-    /// `line`: legs without a specified motion are lines. `blends` are the arguments of [`Route::new`].
+    /// Returns the waypoints as a route for [`Planner::on_route`](crate::plan::Planner::on_route), and their times. If
+    /// `line` is set, legs without a specified motion are lines. `blends` are the arguments of [`Route::new`].
     ///
     /// # Errors
     ///
-    /// As [`positions`](Self::positions); [`WaypointError::Route`] for an impossible line or arc.
+    /// Returns the errors of [`positions`](Self::positions), and [`WaypointError::Route`] for an impossible line or arc.
     pub fn route(
         &self,
         arm: &Arm,
@@ -315,12 +316,12 @@ impl WaypointFile {
                 .at(*position)
                 .and_then(|pose| kinematics.solve(&pose, before))
                 .map_err(|source| WaypointError::Flange { path, place, source: Box::new(source) }),
-            // `kinematics` is present if a waypoint needs it.
+            // This case does not occur, because `kinematics` is present if a waypoint needs it.
             (Target::Flange(..), None) => Ok(*before),
         }
     }
 
-    /// Returns the message of a plan's error, with the location in the file of the waypoint concerned.
+    /// Returns the message of a planning error, with the location of the waypoint in the file.
     pub fn located(&self, error: &PlanError) -> String {
         match error.waypoint().and_then(|waypoint| self.place_of(waypoint)) {
             Some(place) => format!("{place}: {error}"),
@@ -335,7 +336,7 @@ impl WaypointFile {
     }
 }
 
-/// Returns the motion to a waypoint for a word in a file; `None` if the word is empty.
+/// Returns the motion to a waypoint for a word in a file. Returns `None` if the word is empty.
 ///
 /// # Errors
 ///
@@ -360,7 +361,7 @@ fn leg_word(leg: LegKind) -> &'static str {
     }
 }
 
-/// Formats waypoints as CSV, to a millionth of a radian.
+/// Formats waypoints as CSV, with a resolution of a millionth of a radian.
 pub fn to_csv<'a>(positions: impl IntoIterator<Item = &'a [f64; JOINTS]>) -> String {
     let mut text = String::from("q1,q2,q3,q4,q5,q6\n");
     for position in positions {

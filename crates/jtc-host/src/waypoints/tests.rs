@@ -36,7 +36,7 @@ fn the_forms_say_the_same() {
     }
 }
 
-/// The flange pose of a joint position, written as a quaternion or as angles, leads back to that position.
+/// The flange pose of a joint position is written with a quaternion or with angles. It is converted back to that position.
 #[test]
 fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     let arm = arm();
@@ -71,7 +71,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
             assert!((found[j] - q[j]).abs() < 1e-6, "{text}: {found:?}");
         }
     }
-    // Too far away, without an orientation, and incomplete.
+    // The poses are too far away, without an orientation, and incomplete.
     let far =
         WaypointFile::parse("x,y,z,roll,pitch,yaw\n9,0,0,0,0,0\n").unwrap().positions(&arm).unwrap_err();
     assert!(far.to_string().starts_with(", line 2: out of reach"), "{far}");
@@ -81,7 +81,7 @@ fn poses_of_the_flange_are_found_near_the_waypoint_before() {
     assert!(long.to_string().contains("the quaternion has the length 1.414"), "{long}");
 }
 
-/// Times count from the first waypoint, and are optional.
+/// Times begin at the first waypoint, and they are optional.
 #[test]
 fn times_are_from_the_first_waypoint() {
     let times = |text: &str| read(text).iter().map(|w| w.time).collect::<Vec<_>>();
@@ -100,7 +100,8 @@ fn degrees_are_taken_only_where_the_file_names_no_unit() {
     assert!(named.in_degrees().unwrap_err().to_string().contains("are known"));
 }
 
-/// A unit in the name of a column or key is recognised in upper and lower case, and no option converts the numbers again.
+/// A unit in the name of a column or key is recognised in upper and lower case, and an option cannot convert the numbers
+/// again.
 #[test]
 fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     let joint_headers = [
@@ -144,7 +145,7 @@ fn a_unit_in_a_name_counts_in_letters_of_any_case() {
     assert!(plain.in_degrees().is_ok());
 }
 
-/// Returns the keys of an object with 60 for the first and 0 for the others.
+/// Returns an object with these keys. The first value is 60, and the others are 0.
 fn header_keys(names: &str) -> String {
     let value = |i: usize| if i == 0 { 60 } else { 0 };
     names
@@ -155,7 +156,7 @@ fn header_keys(names: &str) -> String {
         .join(", ")
 }
 
-/// If a value is given twice, the reader does not guess.
+/// If a value is given twice, the reader does not guess which one is meant.
 #[test]
 fn two_names_for_one_number_are_refused() {
     let joints = "\"q2\":0,\"q3\":0,\"q4\":0,\"q5\":0,\"q6\":0";
@@ -219,7 +220,7 @@ fn a_broken_file_is_refused_with_its_place() {
 }
 
 proptest! {
-    /// Any file content is read or rejected.
+    /// Any file content is either read or rejected, without a panic.
     #[test]
     fn any_text_is_read_or_refused(text in "(q[1-6](_deg)?,|t,|pose,|[0-9.e-]{1,4},|\n|[{}\\[\\]\":a-z]){0,60}") {
         let _ = WaypointFile::parse(&text).map(|file| file.positions(&arm()));

@@ -1,9 +1,9 @@
-//! Thinning of a recorded motion: few of its positions remain, and every other one is within a tolerance of the legs between them.
+//! Thinning of a recorded motion. Only a few positions remain, and every other one is close to a leg between them.
 
 use jtc_core::JOINTS;
 
-/// Returns the indices of the `positions` (rad) that remain if every other one must be within `tolerance` (rad, of the
-/// joint with the largest distance) of the straight leg between its remaining neighbours (Ramer 1972; Douglas & Peucker
+/// Returns the indices of the `positions` (rad) that remain. Every other position is within `tolerance` of the straight leg
+/// between its remaining neighbours, measured in the joint with the largest distance, rad (Ramer 1972; Douglas & Peucker
 /// 1973). The ends always remain.
 pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     let last = positions.len().saturating_sub(1);
@@ -26,7 +26,8 @@ pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     (0..positions.len()).filter(|i| keep[*i]).collect()
 }
 
-/// Returns the distance of `p` from the leg between `a` and `b`: of the joint with the largest one, at the point nearest to `p`, rad.
+/// Returns the distance of `p` from the leg between `a` and `b`, at the point of the leg nearest to `p`. It is the distance
+/// of the joint with the largest one, rad.
 fn distance(p: &[f64; JOINTS], a: &[f64; JOINTS], b: &[f64; JOINTS]) -> f64 {
     let dot =
         |u: &dyn Fn(usize) -> f64, v: &dyn Fn(usize) -> f64| (0..JOINTS).map(|j| u(j) * v(j)).sum::<f64>();
@@ -43,7 +44,7 @@ mod tests {
     use super::*;
 
     proptest! {
-        /// For any walk, every removed position is near a leg between remaining ones.
+        /// After thinning a random path, every removed position is near a leg between remaining ones.
         #[test]
         fn what_is_left_out_is_within_the_tolerance(
             steps in prop::collection::vec(prop::array::uniform6(-0.1..0.1f64), 2..80),
@@ -62,7 +63,7 @@ mod tests {
             for leg in kept.windows(2) {
                 let (a, b) = (&positions[leg[0]], &positions[leg[1]]);
                 for p in &positions[leg[0]..=leg[1]] {
-                    // Compares with a search over many points of the leg instead of the formula.
+                    // The formula is compared with a search over many points of the leg.
                     let near = (0..=1000)
                         .map(|k| {
                             let u = f64::from(k) / 1000.0;

@@ -1,4 +1,4 @@
-//! Only a trajectory that passed the check and was uploaded is run.
+//! A session runs only a trajectory that passed the check and was uploaded.
 
 use jtc_core::{Config, Payload};
 use jtc_wire::{NodeState, Status, TrajectoryState};
@@ -38,11 +38,11 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     assert!(matches!(&error, CheckError::Refused(verdict) if !verdict.is_ok()), "{error}");
     let diagnosis = error.diagnosis();
     assert_eq!((diagnosis.code, diagnosis.kind), ("check", ErrorKind::Refused));
-    // A value that no frame can carry.
+    // This value does not fit into a frame.
     let mut wild = motion(0.5);
     wild.points[3].velocity[2] = f64::NAN;
     assert!(matches!(check(&wild), Err(CheckError::Refused(_))));
-    // More torque than available, according to the arm model.
+    // According to the arm model, the motion needs more torque than the limit.
     let mut arm = Arm::avena();
     arm.joints[1].torque_max = 1.0;
     let options = CheckOptions { accept_device_limits: true, ..CheckOptions::default() };
@@ -50,7 +50,7 @@ fn what_the_check_refuses_never_becomes_a_checked_trajectory() {
     assert!(error.to_string().contains("torque over its limit: joint 2"), "{error}");
 }
 
-/// J-34: the first point is within 0.02 rad of the arm's position.
+/// J-34: the first point must be within 0.02 rad of the arm's position.
 #[test]
 fn j34_an_arm_that_stands_elsewhere_is_refused_by_the_check() {
     let at = |q: f64| {
@@ -62,7 +62,7 @@ fn j34_an_arm_that_stands_elsewhere_is_refused_by_the_check() {
     assert!(error.contains("joint 2: +0.0210 rad away from the first point"), "{error}");
 }
 
-/// J-55: limits that the controller does not have must be accepted explicitly, and the tighter ones apply.
+/// J-55: if the limits of arm and controller differ, the caller must accept this explicitly. Then the tighter limits apply.
 #[test]
 fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     let mut arm = Arm::avena();
@@ -77,7 +77,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert_eq!((diagnosis.code, diagnosis.kind), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
-    // The controller's gravity applies, independent of the file: otherwise an arm without weight would pass.
+    // The gravity of the controller is used, whatever the file says. Otherwise an arm without weight would pass.
     let weightless = Arm { gravity: Some([0.0; 3]), ..Arm::avena() };
     let mut weak = weightless.clone();
     weak.joints[1].torque_max = 60.0;
@@ -85,7 +85,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert!(check(&weightless, &bend, true).is_ok());
     let error = check(&weak, &bend, true).unwrap_err().to_string();
     assert!(error.contains("torque over its limit: joint 2"), "{error}");
-    // The arm's own limit applies if it is tighter.
+    // The limit of the arm is used if it is tighter.
     arm.joints[0].velocity_max = 0.1;
     let error = check(&arm, &motion(0.5), true).unwrap_err().to_string();
     assert!(error.contains("velocity over its limit: joint 1") && error.contains("(limit 0.1)"), "{error}");
@@ -100,7 +100,7 @@ fn an_arm_that_is_none_checks_nothing() {
     assert!(matches!(error, CheckError::Arm(_)), "{error}");
 }
 
-/// Only the trajectory in the controller can be executed.
+/// Only the trajectory that is in the controller can be executed.
 #[test]
 fn only_what_was_uploaded_is_executed() {
     let mut s = ready();
@@ -113,15 +113,15 @@ fn only_what_was_uploaded_is_executed() {
     };
     refused(&mut s, &first);
     s.upload(&first, |_| Flow::Continue).unwrap();
-    // Equal points but another check, which may have used another arm.
+    // The points are equal, but the check is another one and may have used another arm.
     refused(&mut s, &second);
     s.upload(&second, |_| Flow::Continue).unwrap();
     refused(&mut s, &first);
-    // A cancelled upload leaves no trajectory to execute.
+    // After a cancelled upload there is no trajectory to execute.
     assert!(matches!(s.upload(&first, |_| Flow::Cancel), Err(Error::Cancelled)));
     refused(&mut s, &first);
     refused(&mut s, &second);
-    // Neither does an error, after which the controller deletes its trajectory.
+    // After an error the controller deletes its trajectory, so there is nothing to execute.
     s.upload(&first, |_| Flow::Continue).unwrap();
     fail(&mut s, FaultKind::SafetyInput, 200);
     refused(&mut s, &first);
@@ -141,16 +141,16 @@ fn a_run_has_an_outcome_and_its_figures() {
     let error = summary.joints[0].max_error_mrad.unwrap();
     assert!(error > 0.0 && error < 20.0, "{error} mrad");
     assert_eq!(summary.joints[0].torque_limit_nm, Some(Arm::avena().joints[0].torque_max));
-    // A second run from the end of the first: the controller rejects it (J-34), and the run reports it.
+    // The second run would start at the end of the first one. The controller rejects it (J-34), and the run reports this.
     let run = s.run(&checked, |_| Flow::Continue);
     assert!(matches!(run.outcome, Err(Error::Link(LinkError::Refused { .. }))), "{:?}", run.outcome);
 }
 
-/// J-60: a payload that is set while a motion is paused may be too heavy for the remainder.
+/// J-60: if the payload is changed while a motion is paused, it may be too heavy for the remainder.
 #[test]
 fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     let mut session = ready();
-    // Upright at first, stretched out at the end.
+    // The arm is upright at first, and stretched out at the end.
     let stretched = [0.0, 1.5, 0.1, 0.0, 0.1, 0.0];
     let motion = plan::joint_move(&[0.0; 6], &stretched, &Config::avena(), 30.0).unwrap();
     let checked = check(&motion).unwrap();
@@ -160,7 +160,7 @@ fn j60_what_remains_of_a_paused_motion_is_checked_with_the_payload() {
     session.pause().unwrap();
     let paused = |s: &Status| s.trajectory == TrajectoryState::Pause;
     session.wait_for("pause", Duration::from_secs(5), paused).unwrap();
-    // Too heavy for the remainder, then light enough.
+    // The first payload is too heavy for the remainder, the second is light enough.
     for (mass, goes_on) in [(6.0, false), (0.1, true)] {
         session.set_payload(&Payload { mass, com: [0.0, 0.0, 0.1], ..Payload::NONE }).unwrap();
         match session.resume() {

@@ -1,4 +1,4 @@
-//! A session on a shared line: rejections by the device and by the agent are distinguished.
+//! Session on a shared line. Rejections by the device and denials by the agent must be distinguished.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,11 +11,11 @@ use jtc_host::{
 };
 use jtc_wire::{DataStatus, FrameStatus, Response, Status};
 
-/// Denials that arrive with the next bytes read: for earlier frames, and for the last written frame.
+/// Denial that arrives with the next bytes that are read. It may belong to the last frame or to an earlier one.
 #[derive(Clone, Default)]
 struct Denials(Rc<RefCell<Option<&'static str>>>);
 
-/// A line that rejects every frame.
+/// Shared line on which every frame is rejected.
 struct SharedLine<P> {
     port: P,
     arriving: Denials,
@@ -42,7 +42,8 @@ impl<P: Port> Port for SharedLine<P> {
     }
 }
 
-/// Returns a session on such a line; each frame is denied with `own`.
+/// Returns a session on a shared line. Each frame is denied with the reason `own`, or, if it is `None`, rejected by the
+/// device.
 fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     let arriving = Denials::default();
     let denials = arriving.clone();
@@ -58,7 +59,7 @@ fn session(own: Option<&'static str>) -> (Session<impl Port>, Denials) {
     (Session::new(SharedLine { port: device, arriving: arriving.clone(), denied: None }), arriving)
 }
 
-/// A late denial does not count for the next frame.
+/// A late denial is not used as the answer to the next frame.
 #[test]
 fn a_late_denial_is_not_that_of_the_next_frame() {
     let (mut s, arriving) = session(None);
@@ -74,7 +75,7 @@ fn a_late_denial_is_not_that_of_the_next_frame() {
     assert!(matches!(error, Error::Upload(UploadError::SegmentRefused { segment: 0, .. })), "{error}");
 }
 
-/// A denial that arrives with the rejection counts for it.
+/// A denial that arrives together with the rejection is used as its reason.
 #[test]
 fn a_denial_is_that_of_the_frame_before_it() {
     let (mut s, _) = session(Some("another one commands"));

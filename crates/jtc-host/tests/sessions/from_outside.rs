@@ -1,4 +1,5 @@
-//! An arm without brakes has fallen to an end stop, slightly outside a position limit; moves lead back inside from there (J-36, J-58).
+//! An arm without brakes has fallen to an end stop, slightly outside a position limit. Moves lead back inside from there
+//! (J-36, J-58).
 
 use std::time::Duration;
 
@@ -12,7 +13,7 @@ use jtc_sim::{SimConfig, World};
 
 use super::Sim;
 
-/// Returns a session with an arm that is held with joint 3 at this position.
+/// Returns a session in which the arm is held with joint 3 at this position.
 fn held_at(position: f64) -> Sim {
     let start = [0.0, 0.0, position, 0.0, 0.0, 0.0];
     let world = World::new(SimConfig { baud: None, start, ..SimConfig::default() });
@@ -72,7 +73,7 @@ fn j58_an_arm_outside_a_limit_approaches_a_trajectory() {
     finishes(&mut session, &start.checked);
 }
 
-/// A file that begins at the position of the fallen arm, as made by an existing host.
+/// The file begins at the position of the fallen arm. Existing hosts write such files.
 #[test]
 fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     let arm = Arm::avena();
@@ -88,7 +89,7 @@ fn j36_a_file_that_begins_outside_a_limit_and_goes_inwards_is_run() {
     assert!((inwards.points[0].position[2] - here[2]).abs() < 1e-9);
     let checked = CheckedTrajectory::check(&inwards, &arm, &here, &CheckOptions::default()).unwrap();
     finishes(&mut session, &checked);
-    // The reverse motion out of the limits is rejected.
+    // The reverse motion, which leads out of the limits, is rejected.
     let mut points = inwards.points.clone();
     points.reverse();
     points.iter_mut().for_each(|point| point.velocity = point.velocity.map(|v| -v));

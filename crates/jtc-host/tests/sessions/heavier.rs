@@ -1,4 +1,4 @@
-//! Purpose of the torque margin of plans: an arm that is heavier than its model and has more friction.
+//! Purpose of the torque margin of plans: the arm may be heavier than its model and have more friction.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Session};
 use jtc_sim::{ModelError, SimConfig, World};
 
-/// Returns a position of the arm, a different one for each number.
+/// Returns a position of the arm. It is a different one for each number.
 fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     let config = arm.config();
     std::array::from_fn(|j| {
@@ -18,8 +18,8 @@ fn place(number: u64, arm: &Arm) -> [f64; JOINTS] {
     })
 }
 
-/// Moves the arm of the default parameters, with all masses × 1.1 and all friction × 1.2, by plans with this margin at
-/// full speed. Returns the largest share of a torque limit that the controller commanded, or the reason why a motion
+/// Moves an arm that has the default parameters with all masses × 1.1 and all friction × 1.2. The plans have this margin
+/// and full speed. Returns the largest share of a torque limit that the controller commanded, or the reason why a motion
 /// did not finish.
 fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     let arm = Arm::avena();
@@ -55,7 +55,7 @@ fn moved(margin_pct: f64, seed: u64) -> Result<f64, String> {
     Ok(most)
 }
 
-/// Moves planned with the default margin do not reach a torque limit on this arm; moves without a margin do.
+/// On this arm, moves with the default margin do not reach a torque limit, but moves without a margin do.
 #[test]
 fn a_heavier_arm_follows_plans_with_the_default_margin_below_its_torque_limits() {
     let mut reached = 0;

@@ -1,4 +1,4 @@
-//! An arm imported from a robot description runs in the simulator with its proposed parameters.
+//! An arm that was imported from a robot description runs in the simulator with its proposed parameters.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -9,7 +9,8 @@ use jtc_host::session::{Flow, Outcome};
 use jtc_host::{Arm, CheckOptions, CheckedTrajectory, Diagnose, Session, plan};
 use jtc_sim::{SimConfig, World};
 
-/// Returns a six-axis arm of `scale` times a metre, with axes along y and z. Masses scale with the third power, torques with the fourth.
+/// Returns a six-axis arm with a length of `scale` metres and axes along y and z. Masses scale with the third power, and
+/// torques with the fourth.
 fn description(scale: f64) -> String {
     // Axis, offset to the next joint, mass, torque limit.
     let parts = [
@@ -40,8 +41,8 @@ fn description(scale: f64) -> String {
     text + "</robot>"
 }
 
-/// Sends the parameters of `arm` to a controller whose real arm is `plant`, and moves it. Returns the largest error of
-/// each joint in mrad, after the arm was held for some seconds.
+/// Sends the parameters of `arm` to a controller whose real arm is `plant`, moves it, and then holds it for 5 s. Returns
+/// the largest position error of each joint, mrad.
 fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     let config = SimConfig {
         baud: None,
@@ -72,7 +73,8 @@ fn moved(arm: &Arm, plant: &Arm, percent: f64) -> Result<Vec<f64>, String> {
     Ok(joints.iter().map(|joint| joint.max_error_mrad.unwrap_or_default()).collect())
 }
 
-/// The rotors of the real arm are lighter or heavier than the proposed ones, without notice: the arm is held and moves.
+/// The rotors of the real arm are lighter or heavier than the proposed ones, which the controller does not know. The arm
+/// can still be held and moved.
 #[test]
 fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
     let plain = include_str!("plain.urdf");
@@ -104,7 +106,7 @@ fn j41_j71_the_gains_that_are_proposed_move_an_arm_with_other_rotors() {
     }
 }
 
-/// J-71: gains that the check of the arm rejects are not sent to a controller.
+/// J-71: gains that the check of the arm rejects are not sent to the controller.
 #[test]
 fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
     let mut arm = Arm::avena();
@@ -126,7 +128,7 @@ fn j71_gains_that_are_not_stable_are_given_to_no_controller() {
     assert_eq!(session.device_arm().ok(), before);
 }
 
-/// From a small arm to a large one: held, moved, and with an error of a few mrad.
+/// Small and large imported arms are held and moved with an error of a few mrad.
 #[test]
 fn j41_an_imported_arm_follows_with_the_gains_that_are_proposed() {
     for scale in [0.6, 1.0, 1.2] {

@@ -1,4 +1,4 @@
-//! The client with the complete simulated controller: parameters, uploads on good and bad lines, execution, recovery.
+//! The client with the complete simulated controller: parameters, uploads on good and bad lines, execution and recovery.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -17,7 +17,7 @@ use jtc_sim::{Fault, FaultKind, Trigger};
 
 use super::{Sim, inject, motion, ready, session};
 
-/// Returns a motion between two poses and back, then at rest, with `points` points in total.
+/// Returns a motion to a pose and back, followed by rest, with `points` points in total.
 fn trajectory(points: usize) -> Trajectory {
     let config = Config::avena();
     let there = plan::joint_move(&[0.0; 6], &[0.6, -0.5, 0.4, 0.8, -0.3, 0.9], &config, 60.0).unwrap();
@@ -49,7 +49,7 @@ fn parameters_go_over_and_the_controller_becomes_ready() {
     let arm = Arm::avena();
     let file = ParameterFile { polynomial: arm.polynomial, table: arm.table, ..ParameterFile::default() };
     let table = s.push(&file.parameter_set(FrictionChoice::Table), |_| {}).unwrap();
-    // The long frame is sent twice, and both are confirmed.
+    // The long frame is sent twice, and both transmissions are confirmed.
     assert_eq!((table[0].times, table[0].bytes), (2, 10_566));
     assert_eq!(s.fresh_status().unwrap().friction_type, 1);
     let pushed = s.push(&Arm::avena().parameter_set(), |_| {}).unwrap();
@@ -104,11 +104,11 @@ impl Port for Noisy {
     }
 }
 
-/// J-04: records are one-shot; a record lost on the way to the host must not fail the upload or a command.
+/// J-04: records are one-shot. If a record is lost on the way to the host, an upload or a command must not fail.
 #[test]
 fn j04_lost_confirmations_are_survived() {
     for seed in 1..6 {
-        // Every tenth status arrives damaged.
+        // About one status in ten arrives damaged.
         let mut s =
             Session::new(Noisy { port: ready(Some(921_600)).into_port(), random: seed, every: 1_700 });
         let options = UploadOptions { points_per_segment: Some(60), ..UploadOptions::default() };
@@ -124,7 +124,7 @@ fn j04_lost_confirmations_are_survived() {
     }
 }
 
-/// J-04, J-30: despite any losses on the line the controller finally has every point.
+/// J-04, J-30: whatever the line loses, the controller finally has every point.
 #[test]
 fn uploads_survive_a_bad_line() {
     for (seed, kind) in [
@@ -161,7 +161,7 @@ fn a_trajectory_runs_to_its_end_and_is_followed() {
     let Outcome::Finished(status) = outcome else { panic!("{outcome:?}") };
     assert_eq!(status.point, (t.trajectory().duration_s() * 1e3).round() as u32);
     assert!(seen > 10 && (f64::from(status.joints[0].position) - 0.4).abs() < 0.01);
-    // Execute again from Finish is rejected, because the arm is at the end (J-34).
+    // A second execution from Finish is rejected, because the arm is at the end of the path (J-34).
     let error = s.execute(&t).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::Device);
     assert!(error.hint().contains("--approach"), "{error}");
@@ -201,7 +201,7 @@ fn a_fault_while_running_is_an_error_with_the_point_and_recover_leads_back() {
     s.execute(&t).unwrap();
     let error = s.follow(|_| Flow::Continue).unwrap_err();
     let Error::Motion(MotionError::RunFault { point, .. }) = &error else { panic!("{error}") };
-    // Point of the last status on the path: up to 40 ms before the fault.
+    // This is the point of the last status on the path, up to 40 ms before the fault.
     assert!((459..600).contains(point), "{error}");
     assert_eq!(error.kind(), ErrorKind::Fault);
     assert!(error.to_string().contains("joint 3"), "{error}");
@@ -223,7 +223,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     let diagnosis = error.diagnosis();
     assert_eq!((diagnosis.kind, diagnosis.code), (ErrorKind::NoLink, "no-link"));
     assert_eq!(silent.clear(true, 0).unwrap_err().diagnosis().kind, ErrorKind::NoLink);
-    // A file is not a connected device.
+    // The port is a regular file.
     let error = jtc_host::port::SerialPort::open("Cargo.toml", 115_200).map(drop).unwrap_err();
     assert_eq!(error.to_string(), "Cargo.toml is no serial port");
     let mut s = ready(Some(921_600));
@@ -235,7 +235,7 @@ fn a_silent_device_is_no_link_and_a_wrong_state_is_refused() {
     assert_eq!(s.teach(true).unwrap_err().kind(), ErrorKind::Device);
 }
 
-/// A push ends a run: the arm yields and is held; the motion can be resumed after clearing.
+/// A push ends a run: the arm yields and is then held. After clearing, the motion can be resumed.
 #[test]
 fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     let mut s = ready(None);
@@ -271,7 +271,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
     assert!(!cleared.is_held_stop() && cleared.errors == 0);
 }
 
-/// After an encoder jump the arm is held; until its drive is reset no motion is executed, and the error gives this reason.
+/// After an encoder jump the arm is held. No motion is executed until the drive is reset, and the error says so.
 #[test]
 fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     let mut s = ready(None);
@@ -287,7 +287,7 @@ fn j35_j69_no_run_begins_where_an_encoder_has_jumped() {
     assert!(error.hint().contains("jtc reset --joints JOINT"), "{}", error.hint());
 }
 
-/// The arm must not become compliant when no client waits for teaching any more.
+/// If no client waits for teaching any more, the arm must not become compliant.
 #[test]
 fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     let mut s = ready(None);
@@ -298,7 +298,7 @@ fn j25_teaching_that_is_not_waited_for_is_switched_off() {
     s.wait_ready(Duration::from_secs(15)).unwrap();
 }
 
-/// The controller answers only "incorrect value": the host determines joint, value and bounds.
+/// The controller answers only "incorrect value". The host finds the joint, the value and the bounds.
 #[test]
 fn j06_a_refused_parameter_is_named() {
     let mut s = ready(Some(921_600));
@@ -321,7 +321,7 @@ fn j06_a_refused_parameter_is_named() {
     set.model.as_mut().unwrap().links[0].mass = 51.0;
     let text = refusal(&mut s, &set);
     assert!(text.contains("mass of a link (kg) 51 is outside 0..50"), "{text}");
-    // The arm still uses its earlier parameters.
+    // The arm still has its earlier parameters.
     assert_eq!(s.fresh_status().unwrap().jtc_init, 0);
     s.push(&good, |_| ()).unwrap();
 }

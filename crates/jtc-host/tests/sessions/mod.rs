@@ -1,4 +1,4 @@
-//! Sessions with the complete simulated controller, and with a scripted one.
+//! Tests of sessions with the complete simulated controller, and with a scripted one.
 
 mod checked;
 mod denied;
@@ -33,7 +33,7 @@ fn ready(baud: Option<u32>) -> Sim {
     s
 }
 
-/// Returns a motion from the zero pose to this position of joint 1, at `percent` of the limits.
+/// Returns a motion of joint 1 from the zero pose to `to`, at `percent` % of the limits.
 fn motion(to: f64, percent: f64) -> Trajectory {
     plan::joint_move(&[0.0; 6], &[to, 0.0, 0.0, 0.0, 0.0, 0.0], &Config::avena(), percent).unwrap()
 }

@@ -1,4 +1,5 @@
-//! Host supervision (J-59): the controller detects a session that is alive, and one that is lost; it ignores one that only observes.
+//! Host supervision (J-59). The controller detects whether the session that commands the motion is alive. A session that
+//! only observes has no effect.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -13,7 +14,7 @@ use jtc_wire::{ControllerState, SettingValue, Status, TrajectoryState};
 
 use super::{Sim, motion, session};
 
-/// Returns a session with a held arm and this `host_timeout_ms`, set by another session: the session must read it.
+/// Returns a session in which the arm is held. `host_timeout_ms` was set by another session, so this session must read it.
 fn supervised(ms: u16, baud: Option<u32>) -> Sim {
     let mut first = session(baud);
     let setting = settings::named("host_timeout_ms").unwrap().number;
@@ -24,7 +25,7 @@ fn supervised(ms: u16, baud: Option<u32>) -> Sim {
     s
 }
 
-/// Executes a motion of about 6 s, until the arm moves.
+/// Starts a motion of about 6 s.
 fn begin(s: &mut Sim) {
     let (motion, options) = (motion(1.0, 12.0), CheckOptions::default());
     let checked = CheckedTrajectory::check(&motion, &Arm::avena(), &[0.0; 6], &options).unwrap();
@@ -67,7 +68,7 @@ fn j59_a_session_that_watches_its_teaching_keeps_it_going() {
     }
 }
 
-/// Other requests of a session are answered, too, in addition to its presence requests.
+/// The other requests of a session are answered while it also sends its presence requests.
 #[test]
 fn j50_requests_wait_for_the_answer_that_is_on_its_way() {
     let mut s = supervised(100, Some(115_200));
@@ -85,7 +86,7 @@ fn j59_a_motion_whose_session_has_gone_is_paused() {
         begin(&mut s);
         s.pass(Duration::from_millis(500)).unwrap();
         assert_eq!(s.last().unwrap().trajectory, TrajectoryState::Execute);
-        // Another session at the same port sends nothing.
+        // Another session on the same port sends nothing.
         let mut watching: Session<SimPort> = Session::new(s.into_port());
         watching.pass(Duration::from_millis(u64::from(ms) + 1000)).unwrap();
         let status = watching.last().copied().unwrap();

@@ -1,4 +1,4 @@
-//! Recovery to HoldPos: its reports from each state, and its cancellation by the user.
+//! Recovery to HoldPos: the reports from each state, and cancelling by the user.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -24,7 +24,7 @@ fn move_arm(s: &mut Sim) {
         .unwrap();
 }
 
-/// Steps that the user reads during a recovery, from each state.
+/// The user is shown each step of a recovery, from each state.
 #[test]
 fn recover_says_each_step_of_each_state() {
     fn words(s: &mut Sim, source: ParameterSource<'_>) -> Vec<String> {
@@ -78,7 +78,7 @@ fn recover_says_each_step_of_each_state() {
     assert!(faulty.iter().any(|s| s == "clearing the errors of the controller and of joint 3"), "{faulty:?}");
 }
 
-/// A cancelled recovery first stops a motion, and sends nothing else.
+/// A recovery that is cancelled during a motion stops the motion and sends nothing else.
 #[test]
 fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
     let mut s = session(None);
@@ -91,7 +91,7 @@ fn j33_recover_that_is_ended_stops_what_moves_and_sends_no_more() {
         (status.state, status.trajectory),
         (ControllerState::HoldPos.into(), TrajectoryState::Stop.into())
     );
-    // In teaching the operator guides the arm, so it is left unchanged.
+    // In teaching the operator guides the arm, so teaching is not ended.
     s.teach(true).unwrap();
     s.wait_for("teaching", Duration::from_secs(1), |s| s.state == ControllerState::Teaching).unwrap();
     let sent = s.statistics().frames_sent;
@@ -115,7 +115,8 @@ fn recover_brings_a_fresh_controller_up_and_waits_for_the_emergency_stop() {
     assert!(steps.contains(&RecoverStep::SafetyInput), "{steps:?}");
 }
 
-/// J-55: a controller without parameters gets no parameters of an unnamed arm, and no part of an arm is filled in.
+/// J-55: a controller without parameters does not get the parameters of an arm that the user did not select, and an
+/// incomplete arm is not completed.
 #[test]
 fn j55_recover_gives_no_numbers_that_nobody_named() {
     let mut s = session(Some(921_600));
@@ -135,7 +136,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(error.to_string().contains("half.toml: PID gains missing"), "{error}");
     assert_eq!(s.statistics().frames_sent, sent);
 
-    // A single part of another arm is present: all parameters of the file are sent.
+    // One parameter of another arm is present in the controller. The file's parameters are then all sent.
     s.use_default(jtc_host::session::Parameter::Pid).unwrap();
     let set = Arm::avena().parameter_set();
     let before = s.statistics().frames_sent;
@@ -149,7 +150,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
         "{steps:?}"
     );
     assert!(steps.iter().any(|s| s.contains("those of avena.toml")), "{steps:?}");
-    // Held: no parameters are sent under the weight of the arm, and the step reports it.
+    // The arm is held, so parameters are not sent while they carry its weight. A step reports this.
     let mut steps = Vec::new();
     s.recover(ParameterSource::Arm { name: "avena.toml", set: &set }, |step| steps.push(step.to_string()))
         .unwrap();
@@ -157,7 +158,7 @@ fn j55_recover_gives_no_numbers_that_nobody_named() {
     assert!(steps.iter().any(|s| s.contains("not with those of avena.toml")), "{steps:?}");
 }
 
-/// After an error, the named arm is the one that gets power.
+/// After an error, the parameters of the arm that the user selected are sent before the torque is switched on.
 #[test]
 fn j55_after_an_error_the_named_arm_is_powered() {
     let mut s = ready(Some(921_600));
@@ -169,14 +170,15 @@ fn j55_after_an_error_the_named_arm_is_powered() {
     let give = steps.iter().position(|s| matches!(s, RecoverStep::Give(Some(_)))).expect("given");
     let clear = steps.iter().position(|s| matches!(s, RecoverStep::Clear(_))).expect("cleared");
     assert!(give < clear, "{steps:?}");
-    // Without a named arm the controller keeps its parameters, and the step reports it.
+    // If the user selects no arm, the controller keeps its parameters. A step reports this.
     fail(&mut s, FaultKind::SafetyInput, 500);
     let mut steps = Vec::new();
     s.recover(ParameterSource::None, |step| steps.push(step.clone())).unwrap();
     assert!(steps.contains(&RecoverStep::Keep), "{steps:?}");
 }
 
-/// J-55: gains that do not keep the arm stable, and limits that the controller has otherwise, are refused before anything is sent.
+/// J-55: gains that do not keep the arm stable, and limits that differ from those of the controller, are rejected before
+/// anything is sent.
 #[test]
 fn j55_recover_checks_the_arm_before_anything_is_sent() {
     let mut s = session(Some(921_600));
@@ -192,7 +194,7 @@ fn j55_recover_checks_the_arm_before_anything_is_sent() {
     slow.joints[2].velocity_max *= 0.5;
     let error = refused(slow.clone());
     assert!(matches!(error, Error::Check(CheckError::DeviceLimits { .. })), "{error}");
-    // The controller still needs all parameters.
+    // The controller still lacks all three parameters.
     assert_eq!(s.fresh_status().unwrap().jtc_init.count_ones(), 3);
 
     let parameters = RecoverParameters::Arm { arm: Arc::new(slow), accept_device_limits: true };

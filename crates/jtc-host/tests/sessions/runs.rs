@@ -1,4 +1,4 @@
-//! Runs (J-55): the common procedure of all front ends.
+//! Runs (J-55): the procedure that all front ends share.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -11,19 +11,19 @@ use jtc_wire::Status;
 
 use super::{Sim, motion, ready};
 
-/// A front end that records its calls.
+/// Front end that records its calls.
 #[derive(Default)]
 struct Diary {
     steps: Vec<String>,
     samples: Rc<RefCell<usize>>,
-    /// Number of calls of `is_cancelled` after which the run is cancelled.
+    /// After this number of calls, `is_cancelled` returns `true`.
     cancels_at: Option<usize>,
     asked: usize,
-    /// Point in motion at which a stop is requested, ms.
+    /// Point of the motion at which a stop is requested, ms.
     stops_at: Option<u32>,
-    /// `true`: full speed is requested at each status in motion.
+    /// If `true`, full speed is requested at each status during the motion.
     speeds: bool,
-    /// Number of statuses in motion, and of applied flows.
+    /// Number of statuses during the motion, and number of flows that were applied.
     statuses: usize,
     applied: usize,
 }
@@ -95,7 +95,7 @@ impl Observer<SimPort> for Diary {
     }
 }
 
-/// Runs `trajectory` `runs` times on an arm held in the zero pose, with approaches.
+/// Runs `trajectory` `runs` times, with approaches. At first the arm is held in the zero pose.
 fn runs(diary: &mut Diary, session: &mut Sim, trajectory: &Trajectory, runs: u32) -> Result<Ended, String> {
     let (arm, options) = (Arm::avena(), CheckOptions::default());
     let approach_pct = Some(50.0);
@@ -119,7 +119,7 @@ fn j55_a_run_that_does_not_lead_back_has_an_approach_before_each_motion() {
     assert!((session.fresh_status().expect("a status").positions()[0] - 0.3).abs() < 2e-3);
 }
 
-/// After a cancellation no motion begins, and a current one runs to its end.
+/// After a cancellation no further motion begins. A motion that has begun continues to its end.
 #[test]
 fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     let mut counted = Diary::default();
@@ -145,7 +145,8 @@ fn j55_a_run_that_is_cancelled_begins_no_further_motion() {
     }
 }
 
-/// The last status of a motion shows its end: no flow is applied any more, and a front end must report this to its client.
+/// The last status of a motion shows its end. The flow for this status is not applied, and the front end must tell its
+/// client so.
 #[test]
 fn j57_a_flow_for_the_last_status_of_a_motion_is_not_applied() {
     let mut diary = Diary { speeds: true, ..Diary::default() };

@@ -1,4 +1,4 @@
-//! A session with a scripted controller: the frames that it sends, and its reports when the link is lost.
+//! Session with a scripted controller: the frames that the session sends, and the error when the link is lost.
 
 use jtc_wire::{ControllerState, TrajectoryState};
 use std::time::Duration;
@@ -19,7 +19,8 @@ mod answers {
 
     pub type Written = Rc<RefCell<Vec<u8>>>;
 
-    /// Answers each frame with `status` and its record, and sends statuses every 40 ms; silent from `end` on.
+    /// The controller answers each frame with `status` and the frame's record, and sends a status every 40 ms. From `end`
+    /// on it sends nothing.
     pub fn session(status: Status, end: Duration) -> (Session<impl Port>, Written) {
         let written = Written::default();
         let taken = Rc::clone(&written);
@@ -49,7 +50,7 @@ mod answers {
     }
 }
 
-/// J-34: resume continues a paused motion and starts no other one.
+/// J-34: resume continues a paused motion. It does not start another motion.
 #[test]
 fn j34_resume_only_after_a_pause() {
     use TrajectoryState::{Execute, Finish, Null, Stop};
@@ -68,7 +69,7 @@ fn j34_resume_only_after_a_pause() {
             "{error}"
         );
         assert_eq!((error.kind(), written.borrow().len()), (ErrorKind::Refused, 0), "{error}");
-        // Only a motion that may be decelerating can be resumed by the same command shortly afterwards.
+        // Only if the motion may still be decelerating, the same command can succeed shortly afterwards.
         assert_eq!(error.hint().contains("traj resume"), trajectory == Execute, "{}", error.hint());
     }
     let (mut s, written) = answers::session(
@@ -92,7 +93,8 @@ fn j34_resume_only_after_a_pause() {
     }
 }
 
-/// Link lost in motion: the error states that the arm may be moving, and a Stop is sent, which may still arrive.
+/// The link is lost during a motion. The error states that the arm may be moving. A Stop is sent, because it may still
+/// arrive.
 #[test]
 fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     let moving = jtc_wire::Status {
@@ -126,8 +128,8 @@ fn a_link_lost_in_motion_says_that_the_arm_may_be_moving() {
     assert_eq!(written.borrow().len(), 0);
 }
 
-/// A frame without a record may have arrived, and another line may have stopped the arm since. Therefore a frame that
-/// moves or releases the arm is repeated only if the record reports damage.
+/// A frame without a record may have arrived, and the arm may have been stopped over another line since. So a frame that
+/// moves or releases the arm is sent again only if its record reports damage.
 #[test]
 fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     use jtc_wire::{DataStatus, FrameStatus, Response, Status, fixed};
@@ -136,7 +138,8 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
         trajectory: TrajectoryState::Pause.into(),
         ..Status::default()
     };
-    // Records for this frame in order; after them none. `done` selects if the controller executes the frame.
+    // `records` are the records for this frame, in order; later frames get none. `done` selects whether the controller
+    // executes the frame.
     let session = |of: &'static [u8], records: &'static [FrameStatus], done: bool| {
         let (written, mut count) = (answers::Written::default(), 0);
         let taken = std::rc::Rc::clone(&written);
@@ -190,7 +193,7 @@ fn what_moves_the_arm_is_not_sent_again_for_want_of_a_record() {
     let (mut s, written) = session(&fixed::TEACHING_MODE_ENABLE, &[], false);
     s.teach(true).unwrap_err();
     assert_eq!(count(&written, &fixed::TEACHING_MODE_ENABLE), 1);
-    // A Stop is repeated until it is confirmed.
+    // A Stop is sent again until it is confirmed.
     let (mut s, written) = session(&fixed::STOP, &[], false);
     s.stop().unwrap_err();
     assert_eq!(count(&written, &fixed::STOP), 4);

@@ -1,4 +1,4 @@
-//! The checks of an arm before recover gives its parameters to a controller.
+//! Checks of an arm before a recovery sends its parameters to a controller.
 
 use std::sync::Arc;
 
@@ -10,19 +10,19 @@ use crate::error::{CheckError, Error, ParametersError};
 use crate::port::Port;
 use crate::session::Session;
 
-/// Parameters that recover gives to a controller without torque (J-55).
+/// Parameters that a recovery sends to a controller without torque (J-55).
 #[derive(Clone, Debug, Default)]
 pub enum RecoverParameters {
-    /// None: recover refuses a controller that needs some.
+    /// No parameters. A controller that needs some is rejected.
     #[default]
     None,
-    /// Parameters that are built into the controller, or stored there.
+    /// Parameters that are built into the controller or stored in it.
     ControllerDefaults,
     /// Parameters of an arm.
     Arm {
         /// Arm with friction, gains and model.
         arm: Arc<Arm>,
-        /// Accepts values of the arm that no frame carries and that the controller has otherwise.
+        /// `true` if the controller may have other values for settings that cannot be sent in a frame.
         accept_device_limits: bool,
     },
 }
@@ -41,12 +41,14 @@ impl RecoverParameters {
 }
 
 impl<P: Port> Session<P> {
-    /// Like [`Session::recover_until`], after a check of the parameters and a comparison of the arm's limits with those of the controller.
+    /// Like [`Session::recover_until`]. First checks the parameters, and compares the arm's limits with those of the
+    /// controller.
     ///
     /// # Errors
     ///
-    /// The errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if the controller has other
-    /// limits than the arm and they are not accepted. The controller is unchanged in these cases.
+    /// Returns the errors of [`RecoverParameters::check`] and [`Session::recover_until`]; [`CheckError::DeviceLimits`] if
+    /// controller and arm have different limits, and this is not accepted. After an error of these checks the controller is
+    /// unchanged.
     pub fn recover_with(
         &mut self,
         parameters: &RecoverParameters,
@@ -63,7 +65,7 @@ impl<P: Port> Session<P> {
         };
         let stops = self.port.halts().stops;
         let differences = arm.device_differences(&self.device_config()?);
-        // A Stop that came meanwhile ends the recovery, too.
+        // A Stop that arrived meanwhile also ends the recovery.
         let stopped = self.port.halts().stops != stops;
         if !differences.is_empty() && !accept_device_limits {
             return Err(CheckError::DeviceLimits { arm: arm.name.clone(), differences }.into());

@@ -1,4 +1,4 @@
-//! Source of the parameters that a controller gets during recovery.
+//! Source of the parameters that a recovery sends to a controller.
 
 use jtc_wire::{ControllerState, Status};
 
@@ -7,15 +7,15 @@ use crate::arm::ParameterSet;
 use crate::error::ParametersError;
 use crate::words;
 
-/// Source of friction, gains and arm model for a controller that lacks some (J-55).
+/// Source of friction, gains and arm model for a controller that lacks some of them (J-55).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ParameterSource<'a> {
     /// No source: a controller that lacks parameters is rejected.
     #[default]
     None,
-    /// Defaults of the controller: built into it, or stored there.
+    /// Defaults of the controller, which are built into it or stored in it.
     ControllerDefaults,
-    /// All parameters of an arm: a controller without torque always gets them.
+    /// All parameters of an arm. They are sent to every controller without torque.
     Arm {
         /// Name of the arm or its file.
         name: &'a str,
@@ -39,7 +39,7 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Checks that a controller that lacks parameters has a source.
+    /// If the controller lacks parameters, checks that there is a source.
     pub(super) fn enough_for(&self, status: &Status) -> Result<(), ParametersError> {
         match self {
             ParameterSource::None if status.jtc_init != 0 => {
@@ -49,8 +49,9 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns `true` if parameters must be sent: an arm's parameters once to every controller, the defaults to a
-    /// controller that lacks some. Always all three are sent, so that parameters of two arms are never mixed.
+    /// Returns `true` if parameters must be sent. The parameters of an arm are sent once to every controller, and the
+    /// defaults to a controller that lacks some. All three parameters are always sent, so that those of two arms are never
+    /// mixed.
     pub(super) fn due(&self, status: &Status, given: bool) -> bool {
         match self {
             ParameterSource::None => false,
@@ -59,7 +60,7 @@ impl ParameterSource<'_> {
         }
     }
 
-    /// Returns the step to report if no parameters will be sent.
+    /// Returns the step to report if parameters are not sent.
     pub(super) fn kept(&self, status: &Status) -> Option<RecoverStep> {
         match self {
             _ if status.jtc_init != 0 => None,

@@ -6,7 +6,7 @@ use crate::arm::Difference;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RecoverStep {
-    /// The controller has another value than the arm, which is accepted.
+    /// Controller and arm have different values for a setting, and the user accepts this.
     Differs(Difference),
     /// State of the controller.
     Found(String),
@@ -20,15 +20,15 @@ pub enum RecoverStep {
     Clear(Vec<String>),
     /// Nodes are reset.
     Reset(Vec<String>),
-    /// Friction, gains and arm model are sent: the controller's own defaults, or the parameters of the named arm.
+    /// Friction, gains and arm model are sent: the defaults of the controller, or the parameters of the arm with this name.
     Give(Option<String>),
     /// No parameters are sent: the controller keeps its parameters.
     Keep,
-    /// No parameters are sent although an arm is named: the controller holds an arm with its current parameters.
+    /// The user gave an arm, but its parameters are not sent, because the controller already holds the arm with others.
     KeepHolding(String),
     /// Nodes start up.
     WaitNodes(Vec<String>),
-    /// Done: HoldPos without errors.
+    /// The recovery is complete: HoldPos without errors.
     HoldPos,
 }
 

@@ -28,7 +28,7 @@ const LINES: &str = include_str!("example/lines.csv");
 
 /// Largest deflection of each joint in the examples, rad.
 const BEND: [f64; JOINTS] = [0.8, 0.45, -0.7, 0.9, 0.6, -1.2];
-/// Duration, s, and time between points, ms, of the example motion.
+/// Duration of the example motion (s), and time between its points (ms).
 const DURATION_S: f64 = 6.0;
 const STEP_MS: u16 = 10;
 /// Times of the waypoints, s.

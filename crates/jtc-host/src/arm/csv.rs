@@ -1,4 +1,4 @@
-//! Tables of numbers as existing programs write them: friction tables, friction polynomials, gains, arm model.
+//! Tables of numbers in the formats of existing programs: friction tables, friction polynomials, gains, arm model.
 
 use jtc_core::{JOINTS, PidGains, TableOf};
 use jtc_dynamics::{ArmModel, Link, Origin};

@@ -69,7 +69,7 @@ kinds! {
     FrictionVelocity, "velocity outside the friction table" in "rad/s";
     /// From this place Pause or Stop cannot bring the arm to rest in time with the available torque (J-33).
     NoStop, "no stop in time" in "N·m";
-    /// The positions move faster than the velocity limit, whatever the velocities in the file are.
+    /// The positions move faster than the velocity limit, independent of the velocities in the file.
     PositionSpeed, "positions move faster than the velocity limit" in "rad/s";
     /// The positions move at another speed than the velocities in the file. It is a warning if this happens at few places.
     VelocityMismatch, "positions and velocities disagree" in "rad/s";

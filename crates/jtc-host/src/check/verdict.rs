@@ -158,9 +158,13 @@ impl Verdict {
     }
 
     /// Distinguishes moves that are too fast from pieces that do not meet. Pieces that do not meet cause single jumps
-    /// between two samples. Jumps are moves that are too fast in three cases. At least every fifth step has a jump, because
-    /// the whole path is too fast or not in radians. Or the step is 100 ms or more, so that the points are waypoints. Or
-    /// there are three or more jumps in a row. Such moves become one problem per joint.
+    /// between two samples. Jumps belong to moves that are too fast in three cases:
+    ///
+    /// - At least every fifth step has a jump: the whole path is too fast, or its positions are not in radians.
+    /// - The step is 100 ms or more: the points are waypoints.
+    /// - There are three or more jumps in a row.
+    ///
+    /// The jumps of such moves become one problem per joint.
     fn part_haste_from_seams(&mut self) {
         let is_jump = |p: &Problem| p.kind == ProblemKind::Jump;
         let mut places: Vec<usize> = self.problems.iter().filter(|p| is_jump(p)).map(|p| p.point).collect();

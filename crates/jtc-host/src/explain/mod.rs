@@ -211,7 +211,7 @@ pub fn find(query: &str) -> Vec<&'static Page> {
         _ => query,
     };
     let query = query.strip_suffix(" not given").unwrap_or(query);
-    // The query names a whole family. This has priority over a word on a screen that equals the key.
+    // The query is the key of a whole family. This has priority over a word on a screen that equals the key.
     if query.strip_suffix(':').is_some_and(|key| Family::ALL.into_iter().any(|family| family.key() == key)) {
         return by_name_or_number(query);
     }

@@ -91,7 +91,7 @@ impl Drive {
         })
     }
 
-    /// Adds what the operating system knows about the drive. The label of the device replaces the folder name, which can be
+    /// Adds information of the operating system about the drive. The label of the device replaces the folder name, which can be
     /// misleading. A second drive with the same label is mounted with a digit appended, so that the folder `NODE_H743ZI2`
     /// may belong to a NUCLEO-H743ZI.
     pub fn of_system(self, device: PathBuf, label: Option<String>, usb: Option<UsbDevice>) -> Self {

@@ -7,7 +7,7 @@
 //! success: if the bytes arrive in an unexpected order, parts of the flash stay empty without a report. So the controller
 //! itself must report the content of its flash over its serial line.
 //!
-//! The order of a flash is [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
+//! A flash uses, in this order: [`Image`], [`Drive`], [`Lines::look`] (does the board hold an arm?), [`may_flash`], [`put`],
 //! [`prove`]. If the operator is asked in between, [`Places::still_there`], [`Lines::look`] and [`may_flash`] are repeated
 //! directly before [`put`].
 

@@ -53,7 +53,7 @@ impl Places {
         drives
     }
 
-    /// Returns the drive at a given folder, with what the operating system knows about it.
+    /// Returns the drive at a given folder, with information of the operating system about it.
     ///
     /// # Errors
     ///

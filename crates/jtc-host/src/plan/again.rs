@@ -17,7 +17,7 @@ impl Planner<'_> {
     /// Maximum deviation of the new motion from the path, in the joint with the largest deviation, rad.
     pub const ASIDE: f64 = THINNED + BLEND;
 
-    /// Plans a motion on the path of a trajectory, whatever the times of the trajectory are. The motion is within the
+    /// Plans a motion on the path of a trajectory, independent of the times of the trajectory. The motion is within the
     /// limits, begins and ends at rest, deviates by at most [`Planner::ASIDE`], and is not faster than the original. It is
     /// meant for measured paths: their splines contain encoder noise, and their ends may be in motion.
     ///

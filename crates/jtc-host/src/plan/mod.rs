@@ -59,7 +59,7 @@ const STEP_MS: u16 = 10;
 const JUMP_S: f64 = 2e-3 * STEP_MS as f64;
 /// Share of the velocity and acceleration limits that a plan uses. The rest is reserved for the rounding in frames.
 const SHARE: f64 = 0.98;
-/// Time in which the remainder of a trajectory reaches its speed, s, and longer times that are tried if the check rejects
+/// Time (s) in which the remainder of a trajectory reaches its speed, and longer times that are tried if the check rejects
 /// it.
 const RAMP_S: f64 = 0.5;
 const RAMPS_S: [f64; 3] = [1.0, 2.0, 4.0];

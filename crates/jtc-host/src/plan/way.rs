@@ -46,7 +46,7 @@ impl<'a> Way<'a> {
         corners::within_reason(blend, blend_m)?;
         let course = if file.has_lines(line) {
             let (rounded, times) = file.route(arm, line, (blend, blend_m))?;
-            // A stop keeps to every blend. Near a sharp corner it may be faster than a small blend, so both routes are
+            // A stop is within every blend. Near a sharp corner it may be faster than a small blend, so both routes are
             // planned.
             let sharp = if blend_m > 0.0 { Some(file.route(arm, line, (blend, 0.0))?.0) } else { None };
             Course::Lines([rounded].into_iter().chain(sharp).collect(), times)

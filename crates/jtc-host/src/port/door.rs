@@ -77,7 +77,7 @@ fn file_of(path: &Path) -> Option<(u64, u64)> {
     fs::symlink_metadata(path).ok().map(|found| (found.dev(), found.ino()))
 }
 
-/// Creates the socket. An existing socket that nobody serves was left by a killed program, and is replaced. If a program
+/// Creates the socket. An existing socket that no program serves was left by a killed program, and is replaced. If a program
 /// still serves it, the socket is kept: that program belongs to the superuser, who can open any port.
 fn listen(path: &Path) -> io::Result<UnixListener> {
     if UnixStream::connect(path).is_ok() {

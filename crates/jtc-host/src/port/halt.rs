@@ -73,7 +73,7 @@ pub struct Answer {
     pub baud: u32,
     /// `true` if the controller has received the frame.
     pub confirmed: bool,
-    /// `true` if the controller accepted the frame, so that a motion was stopped.
+    /// `true` if the controller accepted the frame, because there was a motion to stop or pause.
     pub accepted: bool,
     /// `true` if the arm moved when the frame arrived.
     pub moved: bool,

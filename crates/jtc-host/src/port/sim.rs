@@ -81,7 +81,7 @@ impl Port for SimPort {
     }
 }
 
-/// Maximum simulated time to catch up at once. After a longer delay, for example a suspended computer, the rest is skipped.
+/// Maximum simulated time to catch up at once. A longer delay, for example of a suspended computer, is skipped as a whole.
 const CATCH_UP: Duration = Duration::from_secs(2);
 
 /// Simulated world as a port in real time, like a real controller.

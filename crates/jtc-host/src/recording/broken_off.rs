@@ -258,7 +258,7 @@ mod tests {
         assert_eq!(of(&paused, "stopped"), at(4_300));
         assert_eq!(of(&[&way[..], &[(10_000, Finish)]].concat(), "finished"), Err(NothingLeft::Finished));
         assert_eq!(of(&[(0, Stop)], "stopped"), Err(NothingLeft::NoExecution));
-        // The points are those of another path.
+        // The points belong to another path.
         let mut approach = recording(&way, "fault");
         approach.samples[2].joints[1].set_position += 0.1;
         assert_eq!(approach.broken_off(&demo_motion()), Err(NothingLeft::Other));

@@ -232,7 +232,7 @@ fn counted(path: &Path) -> std::collections::BTreeMap<String, usize> {
 }
 
 /// The file contains everything that is needed to understand its values: the arm, its gains and limits, and the identity of
-/// the controller. Poses of the links are written at most 50 times a second, whatever the sample rate is, and only if a
+/// the controller. Poses of the links are written at most 50 times a second, at any sample rate, and only if a
 /// position is known.
 #[test]
 fn a_recording_of_an_arm_stands_alone() {

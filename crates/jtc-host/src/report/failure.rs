@@ -52,7 +52,7 @@ pub struct RunFailure {
     pub joint: Option<Joint>,
     /// Time since the start of the run, ms. In motion it comes from the point index of the controller.
     pub at_ms: f64,
-    /// Time of the first sample that shows the failure, s, on the clock of the samples.
+    /// Time of the first sample that shows the failure (s), on the clock of the samples.
     pub time_s: f64,
     /// Time since the last sample without an error, ms. The failure occurred within this time.
     pub within_ms: f64,

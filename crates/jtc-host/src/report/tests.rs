@@ -177,7 +177,7 @@ fn drives_name_their_own_faults() {
     assert_eq!(failure.causes[0], "joint 5: under-voltage");
 }
 
-/// The status does not show which joint failed. The report names the joint with an impossible step, and shows the rows
+/// The status does not show which joint failed. The report finds the joint with an impossible step, and shows the rows
 /// before it.
 #[test]
 fn an_encoder_that_jumps_is_named_by_its_step() {

@@ -9,7 +9,7 @@ use super::failure::{Around, BEFORE, began_s, is_bad, why_it_ended};
 use crate::recording::{Ending, RecordingInfo};
 use crate::sample::Sample;
 
-/// Searches for the first error in streamed samples. The result is the same as that of [`RunFailure::of_recording`].
+/// Searches for the first error in streamed samples. The result is equal to the result of [`RunFailure::of_recording`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Most recent samples.

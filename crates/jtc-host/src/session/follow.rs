@@ -18,7 +18,7 @@ pub enum Flow {
     Pause,
     /// Resume after a pause.
     Resume,
-    /// Set the speed on the path, %, if the device supports it.
+    /// Set the speed on the path (%), if the device supports it.
     Speed(u8),
     /// Stop the motion and follow it until the arm is at rest.
     Stop,
@@ -157,8 +157,8 @@ fn errors_occurred(status: &Status) -> [u16; 6] {
     status.joints.map(|joint| joint.internal_occurred)
 }
 
-/// Changes two errors to success, because they are not failures: a pause or stop is rejected because the motion has just
-/// ended, or a pause crosses the Stop of another program.
+/// Ignores two errors that are not failures: a pause or stop was rejected because the motion has just ended, or a pause
+/// crossed the Stop of another program.
 fn unless_ended(done: Result<(), Error>) -> Result<(), Error> {
     match done {
         Err(Error::Link(LinkError::Port(PortError::Halted { .. }))) => Ok(()),

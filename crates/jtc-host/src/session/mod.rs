@@ -1,4 +1,4 @@
-//! Session with the controller. It is the only writer, receives the stream of statuses, and confirms each request.
+//! Session with the controller. It is the only writer, receives the stream of statuses, and gets each request confirmed.
 //!
 //! Records of the controller are one-shot (J-04): for each received frame, exactly one status contains its record, in the
 //! order of the frames. The session queues the records and passes each one to the request that waits for it.
@@ -62,7 +62,7 @@ type Observer = Box<dyn FnMut(Duration, &Status)>;
 /// Timeouts of a session, and number of transmissions of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeouts {
-    /// Time without data from the controller after which the link is considered lost.
+    /// Time without a status after which the link is considered lost.
     pub status: Duration,
     /// Time for a confirmation, in addition to the transmission time.
     pub confirmation: Duration,

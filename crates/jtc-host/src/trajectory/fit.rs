@@ -7,7 +7,6 @@
 //! - **Positions only**: a cubic spline through the positions (continuous position, velocity and acceleration) gives
 //!   velocities and accelerations. The velocity at the first and at the last sample is 0. The acceleration there is not 0,
 //!   so the motion begins and ends with a step in acceleration.
-//!   not, so the motion begins and ends with a step in acceleration.
 //! - **Positions and velocities**: for each joint, a cubic spline through the velocities gives the accelerations. So the
 //!   rounding of positions has no effect on them. It is a natural spline: the jerk is 0 at the ends. The velocities are
 //!   used unchanged, at the ends too.
@@ -18,8 +17,8 @@
 //! If the times of the samples are on a grid of whole milliseconds (within 50 µs, steps of 1 to 1000 ms), the samples
 //! become the points unchanged. All others are resampled to 10 ms, or to a longer step if 10 ms would give more points than
 //! the controller can store. Between samples the trajectory follows a quintic with the position, velocity and acceleration
-//! of both samples. The last point is the last sample. If the duration is not a whole number of steps, the remainder
-//! of the motion is stretched to a whole step.
+//! of both samples. The last point is the last sample. If the duration is not a whole number of steps, the remainder of the
+//! motion is stretched to a whole step.
 //!
 //! # Overshoot
 //!
@@ -40,7 +39,7 @@
 //! assert_eq!((fitted.trajectory.step_ms, fitted.trajectory.points.len()), (10, 201));
 //! assert!(fitted.trajectory.points[200].velocity[0].abs() < 1e-9);
 //! for note in &fitted.notes {
-//!     println!("{note}"); // what was derived and resampled, in words
+//!     println!("{note}"); // description of the derived and resampled values
 //! }
 //! # Ok::<(), jtc_host::trajectory::fit::FitError>(())
 //! ```
@@ -58,11 +57,11 @@ use super::{Point, Trajectory};
 pub struct Samples {
     /// Times, s. They strictly increase. The first one need not be 0.
     pub times: Vec<f64>,
-    /// Positions, rad, one row for each time.
+    /// Positions in rad, one row for each time.
     pub position: Vec<[f64; JOINTS]>,
-    /// Velocities, rad/s, one row for each time. `None`: they are derived.
+    /// Velocities in rad/s, one row for each time. `None`: they are derived.
     pub velocity: Option<Vec<[f64; JOINTS]>>,
-    /// Accelerations, rad/s², one row for each time. `None`: they are derived. Accelerations without velocities are
+    /// Accelerations in rad/s², one row for each time. `None`: they are derived. Accelerations without velocities are
     /// ignored.
     pub acceleration: Option<Vec<[f64; JOINTS]>>,
 }

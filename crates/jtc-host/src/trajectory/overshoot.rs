@@ -44,7 +44,7 @@ fn outside(x: f64, low: f64, high: f64) -> f64 {
     (x - high).max(low - x)
 }
 
-/// Returns the extrema of a cubic in the unit interval. It goes from 0 to `d`, with the slopes `v0` and `v1` at the ends.
+/// Returns the extrema of a cubic in the unit interval. The cubic runs from 0 to `d`, with the slopes `v0` and `v1` at the ends.
 fn extrema(d: f64, v0: f64, v1: f64) -> [Option<f64>; 2] {
     let (c2, c3) = (3.0 * d - 2.0 * v0 - v1, v0 + v1 - 2.0 * d);
     // v0 + 2·c2·u + 3·c3·u² = 0, solved in a form without cancellation.

@@ -46,7 +46,7 @@ pub enum Target {
     Joints([f64; JOINTS]),
     /// Name of a pose of the arm.
     Pose(String),
-    /// Pose of the flange in the base frame: position, m, and orientation.
+    /// Pose of the flange in the base frame: position (m) and orientation.
     Flange([f64; 3], Orientation),
 }
 

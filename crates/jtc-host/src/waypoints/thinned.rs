@@ -2,9 +2,9 @@
 
 use jtc_core::JOINTS;
 
-/// Returns the indices of the `positions` (rad) that remain. Every other position is within `tolerance` of the straight leg
-/// between its remaining neighbours, measured in the joint with the largest distance, rad (Ramer 1972; Douglas & Peucker
-/// 1973). The ends always remain.
+/// Returns the indices of the `positions` (rad) that remain. Every other position is within `tolerance` (rad) of the straight
+/// leg between its remaining neighbours, in the joint with the largest distance. The ends always remain (Ramer 1972; Douglas
+/// & Peucker 1973).
 pub fn thinned(positions: &[[f64; JOINTS]], tolerance: f64) -> Vec<usize> {
     let last = positions.len().saturating_sub(1);
     let mut keep = vec![false; positions.len()];

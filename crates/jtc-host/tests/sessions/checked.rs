@@ -77,7 +77,7 @@ fn j55_an_arm_that_differs_from_the_controller_must_be_accepted() {
     assert_eq!((diagnosis.code, diagnosis.kind), ("device-limits", ErrorKind::Refused));
     assert!(error.to_string().contains("joint 1, acceleration_max_rad_s2: "), "{error}");
     assert!(check(&arm, &motion(0.5), true).is_ok());
-    // The gravity of the controller is used, whatever the file says. Otherwise an arm without weight would pass.
+    // The gravity of the controller is used instead of the gravity in the file. Otherwise an arm without weight would pass.
     let weightless = Arm { gravity: Some([0.0; 3]), ..Arm::avena() };
     let mut weak = weightless.clone();
     weak.joints[1].torque_max = 60.0;

@@ -124,7 +124,7 @@ fn j04_lost_confirmations_are_survived() {
     }
 }
 
-/// J-04, J-30: whatever the line loses, the controller finally has every point.
+/// J-04, J-30: despite any losses on the line, the controller finally has every point.
 #[test]
 fn uploads_survive_a_bad_line() {
     for (seed, kind) in [
@@ -261,7 +261,7 @@ fn j66_j69_a_motion_that_the_controller_stopped_is_no_success_and_can_go_on() {
         jtc_host::words::errors_line(&held)
     );
     assert!(jtc_host::words::next_step(&held).to_string().contains("jtc clear"));
-    // No frame that moves the arm is sent, and the error names the cause.
+    // A frame that moves the arm is not sent, and the error contains the cause.
     assert_eq!(s.resume().unwrap_err().code(), "held-stop");
     let error = s.ready_to_move(|_| (), || false).unwrap_err();
     assert!(error.code() == "held-stop" && error.to_string().contains("joint 5"), "{error}");

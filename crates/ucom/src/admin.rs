@@ -38,7 +38,7 @@ impl Admin {
     }
 }
 
-/// `run active`, or `-`.
+/// Prints the names of the flags that are set, such as `run active`; `-` if none is set.
 impl fmt::Display for Admin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let flags = [

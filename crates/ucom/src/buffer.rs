@@ -6,7 +6,7 @@ use crate::profile::Endian;
 /// Package of up to three words, beginning at an offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct BufferPackage {
-    /// Index of the first word, counted in words.
+    /// Index of the first word in the buffer.
     pub offset: u16,
     /// Number of valid `words`, 1..3.
     pub count: u8,
@@ -31,13 +31,13 @@ impl core::fmt::Display for BeyondBuffer {
 
 impl core::error::Error for BeyondBuffer {}
 
-/// Packages of a complete transfer: `ceil(dimension / 3)`.
+/// Returns the number of packages of a complete transfer: `ceil(dimension / 3)`.
 pub const fn package_count(dimension: u16) -> u16 {
     dimension.div_ceil(3)
 }
 
 impl BufferPackage {
-    /// Returns the package of a buffer that begins at a word; `None` at or beyond the buffer's end, or beyond word 65 535.
+    /// Returns the package that begins at word `offset` of a buffer; `None` if the buffer has no such word.
     pub fn at(buffer: &[u16], offset: u16) -> Option<Self> {
         let rest = buffer.get(usize::from(offset)..)?;
         let mut package = Self { offset, count: rest.len().min(3) as u8, words: [0; 3] };
@@ -47,7 +47,7 @@ impl BufferPackage {
         (package.count > 0).then_some(package)
     }
 
-    /// Returns the bytes: DLC 8 with zeros for the surplus words, or with `short_last` only the valid words (key `pd.short_last`).
+    /// Returns the payload. Unused words are sent as 0. With `short_last` (key `pd.short_last`) only the valid words are sent.
     pub fn payload(&self, endian: Endian, short_last: bool) -> Payload {
         let mut data = [0; 8];
         let words = self.words.iter().take(usize::from(self.count));
@@ -69,8 +69,8 @@ impl BufferPackage {
         Some(Self { offset: endian.word([o0, o1]), count: (len - 2) / 2, words })
     }
 
-    /// Puts the words into a buffer. Words at or beyond its end are ignored; a package that starts there is
-    /// refused. Returns how many words were taken.
+    /// Copies the words into a buffer and returns how many were copied. Words at or beyond the buffer's end are ignored. A package that
+    /// starts there is refused.
     pub fn apply(&self, buffer: &mut [u16]) -> Result<usize, BeyondBuffer> {
         let dimension = buffer.len();
         let beyond = BeyondBuffer { offset: self.offset, dimension };
@@ -97,7 +97,7 @@ pub struct Packages<'a> {
 }
 
 impl<'a> Packages<'a> {
-    /// Words beyond the 65 536th have no offset and are left out.
+    /// Creates the packages of a buffer. Words after the 65 536th have no offset and are left out.
     pub const fn new(buffer: &'a [u16]) -> Self {
         Self { buffer, next: Some(0) }
     }
@@ -174,7 +174,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-15: a package that is sent arrives, and no word outside the buffer is ever touched.
+        /// D-15: a package is decoded as it was sent, and no word outside the buffer is ever changed.
         #[test]
         fn d15_round_trip(offset: u16, count in 1..=3u8, mut words: [u16; 3], big: bool, size in 0..9usize) {
             words[usize::from(count)..].fill(0);

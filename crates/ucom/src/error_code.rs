@@ -2,14 +2,14 @@
 
 use core::fmt;
 
-/// Declares the published codes: number and name, then meaning and reaction, a sentence each.
+/// Declares the published codes. Each has a number, a name, and one sentence each for meaning and reaction.
 macro_rules! error_codes {
     ($($(#[$doc:meta])* $code:ident = $number:literal, $name:literal: $meaning:literal, $reaction:literal;)+) => {
         /// Code in DSP_ERROR.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ErrorCode {
             $($(#[$doc])* $code,)+
-            /// A code that the published list does not have; shown as a number, never dropped.
+            /// A code that is not in the published list. It is shown as a number and never dropped.
             Unknown(u8),
         }
 
@@ -41,7 +41,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the meaning, one sentence.
+            /// Returns the meaning as one sentence.
             pub const fn meaning(self) -> &'static str {
                 match self {
                     $(Self::$code => $meaning,)+
@@ -49,7 +49,7 @@ macro_rules! error_codes {
                 }
             }
 
-            /// Returns the advised reaction, one sentence.
+            /// Returns the recommended reaction as one sentence.
             pub const fn reaction(self) -> &'static str {
                 match self {
                     $(Self::$code => $reaction,)+

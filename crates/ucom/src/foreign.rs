@@ -11,9 +11,9 @@ pub enum Foreign {
     Remote,
     /// CAN FD frame.
     Fd,
-    /// Bit 5 of the identifier is set; no identifier of the formula has it (D-01).
+    /// Bit 5 of the identifier is set. It is 0 in every identifier of this protocol (D-01).
     Bit5,
-    /// Function 28..31: these fit into the identifier, but have no meaning.
+    /// Function number 28 to 31: it fits into the identifier, but the protocol does not define it.
     NoFunction(u8),
     /// More than 11 bits of identifier or more than 8 bytes of data.
     Malformed,

@@ -31,7 +31,7 @@ impl Payload {
         Some(payload)
     }
 
-    /// Returns the first `len` bytes of `data`, `len` at most 8; for encoders.
+    /// Returns the first `len` bytes of `data`; `len` is at most 8. For encoders.
     pub(crate) const fn of(data: [u8; 8], len: usize) -> Self {
         let len = if len > 8 { 8 } else { len };
         let mut payload = Self { len: len as u8, data: [0; 8] };
@@ -53,7 +53,7 @@ impl Payload {
         self.data
     }
 
-    /// Returns the number of bytes, 0..8: the DLC.
+    /// Returns the number of bytes, 0..8, which is the DLC.
     pub const fn len(&self) -> u8 {
         self.len
     }
@@ -84,7 +84,7 @@ pub struct Format {
     pub extended: bool,
     /// Remote frame.
     pub remote: bool,
-    /// CAN FD, else classic.
+    /// CAN FD frame; otherwise a classic frame.
     pub fd: bool,
 }
 
@@ -111,7 +111,7 @@ impl Frame {
         Self { id: function.id(sequence), payload }
     }
 
-    /// Returns a frame as received on a bus that may have other members, too (D-02).
+    /// Creates a frame from a received frame. The bus may also carry frames of other protocols (D-02).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, Foreign> {
         match format {
             Format { extended: true, .. } => return Err(Foreign::Extended),
@@ -139,7 +139,7 @@ impl Frame {
         self.payload.bytes()
     }
 
-    /// Returns the data bytes as a value.
+    /// Returns the data bytes as a [`Payload`].
     pub const fn payload(&self) -> Payload {
         self.payload
     }

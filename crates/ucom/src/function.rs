@@ -1,11 +1,11 @@
-//! The 28 functions and the identifier they make with a sequence number (D-01).
+//! The 28 functions, and the identifier of a function and a sequence number (D-01).
 
 use core::fmt;
 
 use crate::foreign::Foreign;
 
-/// Node address of a board, called sequence number in the manual and number for short in this project: the position of the board
-/// in the chain, 0..31. The meaning of 0 depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
+/// Node address of a board: its position in the chain, 0..31. The manual calls it the sequence number; this project also says "number". The
+/// meaning of 0 depends on the sender (D-04): from the PC it is broadcast, from a board "I have no number yet".
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Sequence(u8);
 
@@ -15,7 +15,7 @@ impl Sequence {
     /// The highest number, 31.
     pub const MAX: Self = Self(31);
 
-    /// Creates a number. Returns `None` above 31: nothing is masked silently (D-01).
+    /// Creates a number. Returns `None` above 31; the value is never masked silently (D-01).
     pub const fn new(number: u8) -> Option<Self> {
         if number > 31 { None } else { Some(Self(number)) }
     }
@@ -49,7 +49,7 @@ pub enum Sender {
     Pc,
     /// The boards only.
     Board,
-    /// Both, with the same identifier; D-05 keeps them apart.
+    /// The PC and the boards, with the same identifier. D-05 defines how receivers distinguish them.
     Both,
 }
 
@@ -74,7 +74,7 @@ macro_rules! functions {
                 match self { $(Self::$variant => Sender::$sender),+ }
             }
 
-            /// Returns the purpose, one sentence.
+            /// Returns the purpose as one sentence.
             pub const fn doc(self) -> &'static str {
                 match self { $(Self::$variant => concat!($($doc),+).trim_ascii()),+ }
             }
@@ -177,17 +177,17 @@ impl Function {
         }
     }
 
-    /// Returns `true` if the PC may send it: a board acts on these only.
+    /// Returns `true` if the PC may send this function. Boards react only to such functions.
     pub const fn from_pc(self) -> bool {
         !matches!(self.sender(), Sender::Board)
     }
 
-    /// Returns `true` if a board may send it: the PC acts on these only.
+    /// Returns `true` if a board may send this function. The PC reacts only to such functions.
     pub const fn from_board(self) -> bool {
         !matches!(self.sender(), Sender::Pc)
     }
 
-    /// Returns `true` if a board takes it when it is broadcast (D-04).
+    /// Returns `true` if boards accept this function as a broadcast (D-04).
     pub const fn broadcast(self) -> bool {
         use Function::*;
         matches!(
@@ -207,7 +207,7 @@ impl fmt::Display for Function {
 mod tests {
     use super::*;
 
-    /// C-1: all 28 functions and 32 numbers give the published formula, and back.
+    /// C-1: the identifiers of all 28 functions with 32 numbers follow the published formula, and are split back into function and number.
     #[test]
     fn d01_c1_identifiers_follow_the_formula() {
         for (number, function) in Function::ALL.into_iter().enumerate() {
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(Function::split(0x800), Err(Foreign::Malformed));
     }
 
-    /// D-00: names and numbers are equal to the published list.
+    /// D-00: names and numbers are those of the published list.
     #[test]
     fn d00_names_are_those_of_the_list() {
         assert_eq!(Function::from_number(22).unwrap().name(), "MCA_DUMP_IO_DESCRIPTION");

@@ -2,7 +2,7 @@
 
 use crate::{Frame, FromBoard, Profile, ToBoard};
 
-/// Reads two bytes of identifier and the payload as either side, sends the message again and compares.
+/// Decodes a frame both as the PC and as a board. If it is a message, encodes the message again and compares the identifiers.
 pub fn frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let Some(frame) = Frame::new(u16::from_be_bytes(*id) & 0x7FF, payload) else { return };

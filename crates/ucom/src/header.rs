@@ -45,7 +45,7 @@ impl Memory {
 /// The contents of the header block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// 1 or 2; others are possible on the wire and refused by boards.
+    /// Number of the cycle, 1 or 2. Boards refuse other values.
     pub cycle: u16,
     /// Number of the memory, see [`Memory::from_number`].
     pub memory: u16,
@@ -64,11 +64,11 @@ pub struct Header {
 /// Reasons why a block is not a valid header (DSP_ERROR 5).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
-    /// Word 0 is not 0x5543 but this.
+    /// Word 0 has this value instead of 0x5543.
     Magic(u16),
-    /// Word 1 is not 1 but this.
+    /// Word 1 has this value instead of 1.
     Version(u16),
-    /// The 32 words do not add up to 0 but to this.
+    /// The sum of the 32 words is this value instead of 0.
     Sum(u16),
 }
 
@@ -88,7 +88,7 @@ impl Header {
     /// Target of an image that any board may take.
     pub const ANY_BOARD: u16 = 0xFFFF;
 
-    /// Returns the block, in program word order.
+    /// Returns the block with words in this byte order.
     pub fn build(&self, endian: Endian) -> [u8; BLOCK_LEN] {
         let mut words = [0xFFFFu16; 32];
         let fields = [
@@ -118,7 +118,7 @@ impl Header {
         block
     }
 
-    /// Reads the header in a block.
+    /// Reads the header from a block.
     pub fn parse(block: &[u8; BLOCK_LEN], endian: Endian) -> Result<Self, HeaderError> {
         let mut words = [0u16; 32];
         for (word, bytes) in words.iter_mut().zip(block.chunks_exact(2)) {
@@ -167,7 +167,7 @@ mod tests {
         block[62..].copy_from_slice(&[0xDC, 0x22]);
         assert_eq!(header.build(Endian::Little), block);
         assert_eq!(Header::parse(&block, Endian::Little), Ok(header));
-        // Cycle 2 is the same but for the cycle and the sum.
+        // The header of cycle 2 differs only in the cycle and the sum.
         header.cycle = 2;
         (block[4], block[62]) = (0x02, 0xDB);
         assert_eq!(header.build(Endian::Little), block);
@@ -178,7 +178,7 @@ mod tests {
     fn d41_another_version_is_refused() {
         let header = Header { cycle: 1, memory: 0, address: 0, length: 1, program_id: 0, date: 0, target: 0 };
         let mut block = header.build(Endian::Little);
-        // Version 2 with a sum that is right.
+        // Version 2 with a correct sum.
         (block[2], block[62]) = (2, block[62].wrapping_sub(1));
         assert_ne!(block[62], 0xFF, "no borrow");
         assert_eq!(Header::parse(&block, Endian::Little), Err(HeaderError::Version(2)));
@@ -203,7 +203,7 @@ mod tests {
             let endian = if big { Endian::Big } else { Endian::Little };
             let mut block = header.build(endian);
             prop_assert_eq!(Header::parse(&block, endian), Ok(header));
-            // A change of a single byte is always detected by a sum of words.
+            // A sum of words always detects a change of a single byte.
             block[at] ^= flip;
             prop_assert!(Header::parse(&block, endian).is_err());
         }

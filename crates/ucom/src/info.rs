@@ -9,7 +9,7 @@ use crate::status::Status;
 pub struct BoardInfo {
     /// Number chosen when the bootloader was flashed; its low byte is the UCoM id (D-07).
     pub flash_number: u16,
-    /// Sequence number as the board reports it.
+    /// Sequence number that the board reports.
     pub sequence: u8,
     /// Status byte.
     pub status: Status,
@@ -46,7 +46,7 @@ impl BoardInfo {
     }
 }
 
-/// First frame of the IO description: how many of each (D-36).
+/// First frame of the IO description: the numbers of inputs, outputs and parameters (D-36).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Dimensions {
     /// Controller inputs.
@@ -72,7 +72,7 @@ impl Dimensions {
         Some(Self { ci: endian.word([c0, c1]), so: endian.word([s0, s1]), par: endian.word([p0, p1]) })
     }
 
-    /// Strings in a complete description: the board's and one for each signal.
+    /// Returns the number of strings in a complete description: one for the application and one for each signal.
     pub const fn strings(&self) -> u32 {
         1 + self.ci as u32 + self.so as u32 + self.par as u32
     }

@@ -10,11 +10,11 @@ words! {
     pub enum Checksum {
         /// CRC-16/CCITT-FALSE over the bytes in wire order: polynomial 0x1021, start value 0xFFFF.
         Crc16 = "crc16",
-        /// Sum of the 16-bit words modulo 65 536; blind to swapped frames.
+        /// Sum of the 16-bit words modulo 65 536. Does not detect swapped frames.
         Sum16 = "sum16",
         /// Exclusive-or of the 16-bit words.
         Xor16 = "xor16",
-        /// Not computed: the number in the header is taken as it is.
+        /// No computation: the number in the header is accepted without a check.
         None = "none",
     }
 }
@@ -26,9 +26,9 @@ words! {
         Fat = "fat",
         /// Days since 2000-01-01, up to 2179.
         Days2000 = "days2000",
-        /// Four decimal digits, YYMM, 2000 to 2099; the day is lost and reads as the first.
+        /// Four decimal digits, YYMM, 2000 to 2099. The day is lost; a date is read as the first day of the month.
         Bcd = "bcd",
-        /// A number without a meaning to this tool.
+        /// A number whose meaning this tool does not know.
         Raw = "raw",
     }
 }
@@ -36,14 +36,14 @@ words! {
 const CCITT_FALSE: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 static CCITT_FALSE_TABLE: Crc<u16> = CCITT_FALSE;
 
-/// Computation of a Program ID in progress: takes the image in any pieces.
+/// Computation of a Program ID in progress. The image can be passed in pieces of any size.
 #[derive(Clone)]
 pub struct Digest {
     checksum: Checksum,
     endian: Endian,
     crc: crc::Digest<'static, u16, Table<1>>,
     word: u16,
-    /// First byte of a word whose second has not come.
+    /// First byte of a word whose second byte has not arrived yet.
     odd: Option<u8>,
 }
 
@@ -59,7 +59,7 @@ impl Digest {
         Self { checksum, endian, crc: CCITT_FALSE_TABLE.digest(), word: 0, odd: None }
     }
 
-    /// Takes the next bytes of the image, in wire order.
+    /// Adds the next bytes of the image, in wire order.
     pub fn update(&mut self, bytes: &[u8]) {
         match self.checksum {
             Checksum::Crc16 => self.crc.update(bytes),
@@ -80,8 +80,8 @@ impl Digest {
         if self.checksum == Checksum::Xor16 { self.word ^ word } else { self.word.wrapping_add(word) }
     }
 
-    /// Returns the Program ID of the data so far; 0 for [`Checksum::None`]. An odd last byte counts with 0xFF, the
-    /// padding of the last block.
+    /// Returns the Program ID of the data so far; 0 for [`Checksum::None`]. For an odd number of bytes, the sum includes 0xFF as the
+    /// missing byte, like the padding of the last block.
     pub fn finish(&self) -> u16 {
         match self.checksum {
             Checksum::Crc16 => self.crc.clone().finalize(),
@@ -133,7 +133,7 @@ const fn month_days(year: u16, month: u8) -> u8 {
 }
 
 impl DateForm {
-    /// Returns the 16 bits of a date; `None` if the day does not exist, or the form cannot hold it. `raw` holds no date.
+    /// Returns the 16 bits of a date; `None` if the day does not exist or the form cannot hold it. The form `raw` never holds a date.
     pub fn encode(self, year: u16, month: u8, day: u8) -> Option<u16> {
         if day == 0 || day > month_days(year, month) {
             return None;
@@ -179,7 +179,7 @@ impl DateForm {
                 (year, month, days as u8 + 1)
             }
             Self::Bcd => {
-                // Digits above 9 do not encode to the same 16 bits below.
+                // Digits above 9 are refused below: their date is not encoded to the same 16 bits.
                 let number = |byte: u16| 10 * (byte >> 4) + (byte & 15);
                 (2000 + number(date >> 8), number(date & 0xFF) as u8, 1)
             }
@@ -199,7 +199,7 @@ mod tests {
         (0..1000).map(|i| (37 * i + 11) as u8).collect()
     }
 
-    /// The golden checks of the protocol page.
+    /// The Program IDs and the block count on the protocol page.
     #[test]
     fn d44_program_id_golden() {
         assert_eq!(checksum(Checksum::Crc16, Endian::Little, b"123456789"), 0x29B1);
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(block_count(1000), 16);
     }
 
-    /// Reason for crc16 as the default: two frames of a block swapped.
+    /// A sum does not detect two swapped frames of a block. This is why crc16 is the default.
     #[test]
     fn d44_sum_is_blind_to_swapped_frames() {
         let image = image();
@@ -263,7 +263,7 @@ mod tests {
         assert_eq!(DateForm::Days2000.encode(1999, 12, 31), None);
     }
 
-    /// All four digits are decimal, and the last two a month.
+    /// All four digits must be decimal, and the last two must be a month.
     #[test]
     fn d45_bcd_takes_decimal_digits_only() {
         for date in 0..=u16::MAX {
@@ -276,7 +276,8 @@ mod tests {
         }
     }
 
-    /// A calendar that counts day by day: each of the 16 bits is the day after the one before, and the last is 2179-06-05.
+    /// Compares with a calendar that counts day by day. Each 16-bit value is one day later than the value before; the last one is
+    /// 2179-06-05.
     #[test]
     fn d45_days_in_a_row() {
         let (mut year, mut month, mut day) = (2000, 1, 1);
@@ -313,7 +314,7 @@ mod tests {
             prop_assert_eq!(date.and_then(|date| DateForm::Bcd.decode(date)), Some((year, month, 1)));
         }
 
-        /// Pieces of any size give the same number as the whole.
+        /// An image in pieces of any size gives the same Program ID as the whole image.
         #[test]
         fn d44_pieces(bytes in proptest::collection::vec(any::<u8>(), 0..200), at in 0..200usize, i in 0..3usize) {
             let kind = [Checksum::Crc16, Checksum::Sum16, Checksum::Xor16][i];

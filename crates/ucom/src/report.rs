@@ -26,7 +26,7 @@ impl Report {
 
     /// Returns the `i`-th frame, from 0, that a board sends for one request in a mode; `None` after the last.
     ///
-    /// `sequence` is the board's number, or the number that it uses without one.
+    /// `sequence` is the board's number. For a board without a number it is the number that the board uses instead.
     pub const fn nth(mode: ReportMode, i: u8, flash_number: u16, sequence: Sequence) -> Option<Self> {
         let report = Self::flash7(flash_number);
         match mode {
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// D-07: all boards can answer one broadcast without a collision.
+    /// D-07: all boards can answer one broadcast without collisions.
     #[test]
     fn d07_each_flash_id_has_an_identifier_of_its_own() {
         let id = |flash: u16| {

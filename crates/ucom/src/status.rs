@@ -12,9 +12,9 @@ impl Status {
     pub const MSTART: Self = Self(0x80);
     /// Autostart is enabled; kept over power loss.
     pub const ASTART: Self = Self(0x40);
-    /// The control loop is running. Mirrors reality: cannot be written.
+    /// The control loop is running. Shows the actual state; cannot be written.
     pub const MCARUN: Self = Self(0x20);
-    /// The exloader is running, always the opposite of MSTART. Mirrors reality: cannot be written.
+    /// The exloader is running; always the opposite of MSTART. Shows the actual state; cannot be written.
     pub const EXLRUN: Self = Self(0x10);
     /// The board has a sequence number.
     pub const INIT: Self = Self(0x08);
@@ -22,9 +22,9 @@ impl Status {
     pub const PROG: Self = Self(0x04);
     /// Level of the outgoing init pin.
     pub const OPINIT: Self = Self(0x02);
-    /// Level of the incoming init pin. Mirrors reality: cannot be written.
+    /// Level of the incoming init pin. Shows the actual state; cannot be written.
     pub const IPINIT: Self = Self(0x01);
-    /// Bits that cannot be written.
+    /// Bits that show the actual state and cannot be written.
     pub const MIRRORS: Self = Self(0x31);
 
     /// Names of the bits, bit 7 first.
@@ -39,7 +39,7 @@ impl Status {
         ("IPINIT", Self::IPINIT),
     ];
 
-    /// Returns the bit of a name, in either letter case.
+    /// Returns the bit with this name, in upper or lower case.
     pub fn bit(name: &str) -> Option<Self> {
         Self::NAMES.iter().find(|(known, _)| known.eq_ignore_ascii_case(name)).map(|(_, bit)| *bit)
     }
@@ -61,7 +61,7 @@ impl Status {
         Self((self.0 & !mask) | value)
     }
 
-    /// Returns the contradiction in this status, if any: no board can be in such a state.
+    /// Returns the contradiction in this status, if any. No board can be in such a state.
     pub const fn contradiction(self) -> Option<&'static str> {
         if self.has(Self::EXLRUN) == self.has(Self::MSTART) {
             Some("EXLRUN must be the opposite of MSTART")
@@ -105,7 +105,7 @@ impl fmt::Display for Status {
     }
 }
 
-/// Prints the names that are set, separated by blanks; `-` if no name is set.
+/// Prints the names that are marked `true`, separated by blanks; `-` if there is none.
 pub(crate) fn words<const N: usize>(f: &mut fmt::Formatter<'_>, names: [(bool, &str); N]) -> fmt::Result {
     let mut gap = "";
     for (_, name) in names.iter().filter(|(on, _)| *on) {

@@ -23,7 +23,7 @@ impl fmt::Display for Latin1<'_> {
     }
 }
 
-/// Returns the `i`-th package of a string: 0 is the header, the data follow; `None` after the last package.
+/// Returns the `i`-th package of a string; `None` after the last package. Package 0 is the header, the others are data.
 ///
 /// Texts longer than `string.max` are cut there.
 pub fn string_package(text: &[u8], i: u16, profile: &Profile) -> Option<Payload> {
@@ -67,17 +67,17 @@ impl Iterator for StringPackages<'_> {
 pub enum Assembled<'a> {
     /// More packages follow.
     Partial,
-    /// The whole string, trailing NULs stripped.
+    /// The string is complete. Trailing NULs are removed.
     Complete(Latin1<'a>),
-    /// A first package that is not a header (not 2 bytes), a header that counts more than `string.max` characters can
-    /// fill, or a data package without bytes. The string is dropped.
+    /// The package is invalid and the string is dropped. Reasons: a header that does not have 2 bytes, a header with more packages than
+    /// `string.max` characters need, or a data package that is empty or exceeds the buffer.
     Refused,
 }
 
-/// Puts one string together: one assembler for each function and board (D-14).
+/// Assembles one string at a time. Each function of each board needs its own assembler (D-14).
 ///
-/// A loss inside a string cannot be detected: after a lost package the assembler waits for more. [`StringAssembler::expired`] shows that
-/// 100 ms (`string.gap`) passed in silence; the next package then starts a new string.
+/// A loss inside a string cannot be detected: after a lost package the assembler waits for more. [`StringAssembler::expired`] shows that no
+/// package arrived for 100 ms (`string.gap`); the next package then starts a new string.
 #[derive(Clone, Debug)]
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
@@ -94,12 +94,12 @@ impl<const N: usize> Default for StringAssembler<N> {
 }
 
 impl<const N: usize> StringAssembler<N> {
-    /// Waits for a header.
+    /// Creates an assembler that waits for a header.
     pub const fn new() -> Self {
         Self { text: [0; N], len: 0, open: None, last_us: 0 }
     }
 
-    /// Forgets the packages so far.
+    /// Drops the packages received so far.
     pub const fn reset(&mut self) {
         self.open = None;
         self.len = 0;
@@ -123,7 +123,7 @@ impl<const N: usize> StringAssembler<N> {
         }
     }
 
-    /// Takes a package. A string that is [`expired`](Self::expired) is forgotten first.
+    /// Handles a package. A string that has [expired](Self::expired) is dropped first.
     pub fn push(&mut self, now_us: u64, payload: &Payload, profile: &Profile) -> Assembled<'_> {
         if self.expired(now_us, profile) {
             self.reset();
@@ -245,12 +245,12 @@ mod tests {
         assert_eq!(assembler.missing(), 1);
         assert!(!assembler.expired(199_998, &profile));
         assert!(assembler.expired(199_999, &profile));
-        // The header of the repeated answer is not taken for the missing package.
+        // After the gap, the header of the repeated answer starts a new string. It is not used as the missing package.
         assert_eq!(assembler.push(199_999, &header, &profile), Assembled::Partial);
         assert_eq!(assembler.missing(), 2);
     }
 
-    /// A data package without bytes, and one beyond the buffer: the string is dropped.
+    /// A data package that is empty or exceeds the buffer drops the string.
     #[test]
     fn d13_data_that_cannot_be_are_refused() {
         let [profile, ..] = profiles();
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(assembler.push(0, &payload(b"9"), &profile), Assembled::Complete(Latin1(b"123456789")));
     }
 
-    /// `string.max` cuts a text in the middle of a package, too.
+    /// `string.max` also cuts a text in the middle of a package.
     #[test]
     fn d13_longest_string() {
         let profile = Profile { string_max: 12, ..Profile::default() };
@@ -289,7 +289,7 @@ mod tests {
     }
 
     proptest! {
-        /// D-13: any text without trailing NUL arrives.
+        /// D-13: any text without trailing NULs is assembled unchanged.
         #[test]
         fn d13_round_trip(mut text in proptest::collection::vec(any::<u8>(), 0..=512), i in 0..4usize) {
             while text.last() == Some(&0) {
@@ -298,7 +298,7 @@ mod tests {
             prop_assert_eq!(through(&text, &profiles()[i]), text);
         }
 
-        /// D-14: for any packages, the assembler stays within its buffer and its counts.
+        /// D-14: for any packages, the assembler stays within its buffer and its package count.
         #[test]
         fn d14_any_packages(packages in proptest::collection::vec((any::<[u8; 8]>(), 0..9usize), 0..200)) {
             let [profile, ..] = profiles();

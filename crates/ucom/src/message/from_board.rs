@@ -20,11 +20,11 @@ use crate::report::Report;
 pub enum FromBoard {
     /// DSP_ERROR.
     Error(ErrorCode),
-    /// DSP_INITACK with the number that the board took; it must be the one in the identifier (D-24).
+    /// DSP_INITACK with the number that the board took. It must equal the number in the identifier (D-24).
     InitAck(u8),
     /// DSP_PROGFINISHED.
     ProgFinished,
-    /// A part of DSP_INFO: 8 bytes of numbers, then a string.
+    /// A part of DSP_INFO: 8 bytes with the values of [`BoardInfo`](crate::BoardInfo), then a string.
     Info(Payload),
     /// DSP_READY: the block is taken.
     Ready,
@@ -66,7 +66,7 @@ impl FromBoard {
         }
     }
 
-    /// Returns the frame of a board. A report has its own sequence field, so `from` is not used there.
+    /// Returns the frame that board `from` sends. A report has its own sequence field, so `from` is not used for it.
     pub fn encode(&self, from: Sequence, profile: &Profile) -> Frame {
         let byte = |byte| Payload::of([byte, 0, 0, 0, 0, 0, 0, 0], 1);
         let (sequence, payload) = match *self {
@@ -83,7 +83,7 @@ impl FromBoard {
         Frame::of(self.function(), sequence, payload)
     }
 
-    /// Returns the message in a frame and the sequence field of its identifier.
+    /// Decodes a frame. Returns the sequence field of its identifier and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, from) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -105,7 +105,7 @@ impl FromBoard {
                 Self::Report(Report { k, id_field: from, ucom_id: byte()? })
             }
             Function::McaReady => empty(Self::McaReady)?,
-            // Without data the frame is the PC's request, always (D-12).
+            // A frame without data is always the PC's request (D-12).
             Function::DumpIo if frame.dlc() > 0 => Self::IoDescription(some()?),
             Function::Admin => Self::Admin(admin(frame, profile)?),
             Function::Debug => Self::Debug(some()?),

@@ -1,4 +1,4 @@
-//! The messages of both directions, made from and into frames.
+//! The messages of both directions, and their conversion to and from frames.
 //!
 //! Both sides send functions 22, 24 and 26 with the same identifier (D-05). The caller tells the sender by choosing [`ToBoard`] or
 //! [`FromBoard`].
@@ -16,28 +16,28 @@ use crate::frame::{Frame, Payload};
 use crate::function::Function;
 use crate::profile::Profile;
 
-/// Reasons why a frame is not a message of the wanted direction.
+/// Reasons why a frame is not a message of the expected direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DecodeError {
-    /// Not of this protocol at all (D-02).
+    /// The frame is not of this protocol (D-02).
     Foreign(Foreign),
-    /// A message that only the other side sends (D-04).
+    /// The frame is a message that only the other side sends (D-04).
     Direction(Function),
-    /// Fewer bytes than the message needs (D-12).
+    /// The frame has fewer bytes than the message needs (D-12).
     TooShort {
         /// Function of the frame.
         function: Function,
-        /// Bytes that came.
+        /// Bytes received.
         len: u8,
         /// Bytes that the message needs.
         need: u8,
     },
-    /// A length that is not valid for the message, if its length has a meaning (D-12), or any other length than the exact
-    /// one with `dlc.strict`.
+    /// The length is not valid for a message whose length has a meaning (D-12). With `dlc.strict`, every length except the exact one is
+    /// invalid.
     Length {
         /// Function of the frame.
         function: Function,
-        /// Bytes that came.
+        /// Bytes received.
         len: u8,
     },
     /// A flag that is neither 0 nor 1 (D-37).
@@ -45,7 +45,7 @@ pub enum DecodeError {
 }
 
 impl DecodeError {
-    /// Returns `true` if the length is at fault: a board sends DSP_ERROR 7.
+    /// Returns `true` if the length is wrong. A board then sends DSP_ERROR 7.
     pub const fn is_length(&self) -> bool {
         matches!(self, Self::TooShort { .. } | Self::Length { .. })
     }
@@ -67,7 +67,7 @@ impl fmt::Display for DecodeError {
 
 impl core::error::Error for DecodeError {}
 
-/// Returns the payload if it is long enough; with `dlc.strict` it must have exactly `need` bytes.
+/// Returns the payload if it has at least `need` bytes. With `dlc.strict` it must have exactly `need` bytes.
 fn need(frame: &Frame, function: Function, need: u8, profile: &Profile) -> Result<Payload, DecodeError> {
     let len = frame.dlc();
     if len < need {

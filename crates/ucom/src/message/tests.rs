@@ -20,7 +20,7 @@ fn from(text: &str) -> Result<FromBoard, DecodeError> {
     FromBoard::decode(&frame(text), &Profile::default()).map(|(_, message)| message)
 }
 
-/// C-6: surplus bytes are ignored, missing ones refused with the cause.
+/// C-6: surplus bytes are ignored. If bytes are missing, the message is refused with that reason.
 #[test]
 fn d12_c6_lengths() {
     assert_eq!(to("201#0000000000000000"), Ok(ToBoard::Info));
@@ -46,7 +46,7 @@ fn d12_c6_lengths() {
     assert!(ToBoard::decode(&frame("341#00000100"), &strict).is_ok());
 }
 
-/// D-05: functions that both sides send are distinguished by side, and by length if possible.
+/// D-05: functions that both sides send are distinguished by the side, and by their length if possible.
 #[test]
 fn d05_shared_functions() {
     assert_eq!(to("581#"), Ok(ToBoard::DumpIo));
@@ -59,11 +59,11 @@ fn d05_shared_functions() {
     assert_eq!(from("681#"), Ok(FromBoard::Alive));
 }
 
-/// D-04: each side acts only on messages of the other.
+/// D-04: each side reacts only to messages of the other side.
 #[test]
 fn d04_direction() {
     for function in Function::ALL {
-        // Zeros of full length suit every message, but for the two halves of function 22.
+        // Eight zero bytes are a valid payload of every message except the PC's request of function 22, which has no data.
         let len = if function == Function::DumpIo { 0 } else { 8 };
         let frame = Frame::new(function.id(Sequence::MAX), &[0; 8][..len]).unwrap();
         let profile = Profile::default();
@@ -78,7 +78,7 @@ fn d37_flags_other_than_0_and_1() {
     assert_eq!(to("601#02000000"), Err(DecodeError::Value(Function::Admin)));
 }
 
-/// The frames of the golden vectors as messages.
+/// The frames of the golden vectors decode to these messages.
 #[test]
 fn d15_d24_golden_frames() {
     let profile = Profile::default();
@@ -213,7 +213,7 @@ fn profiles() -> impl Strategy<Value = Profile> {
 }
 
 proptest! {
-    /// D-12: a sent message is decoded to itself, in every profile.
+    /// D-12: in every profile, an encoded message decodes to the same message.
     #[test]
     fn d12_round_trip(pc in pc_messages(), board in board_messages(), number in 0..32u8, profile in profiles()) {
         let number = Sequence::new(number).unwrap();
@@ -224,7 +224,7 @@ proptest! {
         prop_assert_eq!(FromBoard::decode(&frame, &profile), Ok((seen, board)));
     }
 
-    /// D-12: any frame is a message or an error, never a panic; and a message sends the same function again.
+    /// D-12: any frame gives a message or an error, never a panic. A decoded message is encoded with the same function.
     #[test]
     fn d12_any_frame(id in 0..0x800u16, data in prop::collection::vec(any::<u8>(), 0..=8), profile in profiles()) {
         let frame = Frame::new(id, &data).unwrap();

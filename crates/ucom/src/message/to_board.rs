@@ -7,7 +7,7 @@ use crate::frame::{Frame, Payload};
 use crate::function::{Function, Sequence};
 use crate::profile::Profile;
 
-/// A message from the PC to one board, or a broadcast.
+/// A message from the PC to one board, or to all boards by broadcast.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ToBoard {
     /// PC_RESET.
@@ -18,7 +18,7 @@ pub enum ToBoard {
     SetStatus {
         /// Bits that are cleared first.
         mask: u8,
-        /// Bits that are set then, for any mask.
+        /// Bits that are set afterwards, even bits outside the mask.
         value: u8,
     },
     /// PC_INFO.
@@ -37,11 +37,11 @@ pub enum ToBoard {
     Par(BufferPackage),
     /// MCA_PC_START.
     McaStart,
-    /// MCA_DUMP_IO_DESCRIPTION, the request.
+    /// MCA_DUMP_IO_DESCRIPTION: the request.
     DumpIo,
     /// MCA_DUMP_CI.
     DumpCi,
-    /// MCA_ADMIN_DATA, the request.
+    /// MCA_ADMIN_DATA: the request.
     Admin(Admin),
     /// MCA_ALIVE of the PC.
     Alive,
@@ -81,7 +81,7 @@ impl ToBoard {
         Frame::of(self.function(), to, payload)
     }
 
-    /// Returns the message in a frame and its destination.
+    /// Decodes a frame. Returns its destination and the message.
     pub fn decode(frame: &Frame, profile: &Profile) -> Result<(Sequence, Self), DecodeError> {
         let (function, to) = frame.address().map_err(DecodeError::Foreign)?;
         let empty = |message| need(frame, function, 0, profile).map(|_| message);
@@ -100,7 +100,7 @@ impl ToBoard {
             Function::Ci => Self::Ci(package(frame, function, profile)?),
             Function::Par => Self::Par(package(frame, function, profile)?),
             Function::McaStart => empty(Self::McaStart)?,
-            // With data the frame is a board's answer, always (D-12).
+            // A frame with data is always a board's answer (D-12).
             Function::DumpIo if frame.dlc() == 0 => Self::DumpIo,
             Function::DumpCi => empty(Self::DumpCi)?,
             Function::Admin => Self::Admin(admin(frame, profile)?),

@@ -1,4 +1,4 @@
-//! Answers of several frames, made one frame at a time: DSP_INFO, dumps, outputs, texts.
+//! Answers of several frames: DSP_INFO, dumps, outputs, texts. Their frames are created one at a time.
 
 use super::jobs::{Place, package};
 use super::{App, Application, Flash, Node, Pins, Store, Text};
@@ -39,13 +39,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         };
         match made {
             Some((_, next @ Place::String { string: 0, .. })) => self.jobs.info = Some(next),
-            // The answer has ended; or the description has become shorter since, and the PC requests it again.
+            // The answer has ended, or the description became shorter meanwhile. In the second case the PC requests it again.
             _ => self.jobs.info_done(),
         }
         made.map(|(payload, _)| FromBoard::Info(payload))
     }
 
-    /// Returns the text of the `string`-th string of the IO description (D-36).
+    /// Returns the `string`-th text of the IO description (D-36).
     fn io_text(&self, string: u32) -> &[u8] {
         let dimensions = self.application.dimensions();
         let Some(mut index) = string.checked_sub(1) else { return self.application.text(Text::Application) };
@@ -78,7 +78,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Some((_, next @ Place::String { string, .. })) if string < dimensions.strings() => {
                 self.jobs.dump_io = Some(next);
             }
-            // The answer has ended; or a text has become shorter since, and the PC requests it again.
+            // The answer has ended, or a text became shorter meanwhile. In the second case the PC requests it again.
             _ => self.jobs.dump_io_done(),
         }
         made.map(|(payload, _)| FromBoard::IoDescription(payload))
@@ -108,14 +108,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         (package.count > 0).then_some(FromBoard::Ci(package))
     }
 
-    /// Returns `true` if a text waits whose transmission has not begun.
+    /// Returns `true` if a debug text is waiting and its transmission has not begun.
     pub(super) fn wants_text(&self) -> bool {
         let up = matches!(self.app, App::Up | App::Running);
         up && self.jobs.text.is_none()
             && (self.jobs.own_text.is_some() || self.application.debug_text().is_some())
     }
 
-    /// Returns the next package of a debug text: only when requested, and limited in rate (D-38).
+    /// Returns the next package of a debug text. Texts are sent only if the PC requests them, and at a limited rate (D-38).
     fn next_of_text(&mut self) -> Option<FromBoard> {
         if self.wants_text() {
             let own = self.jobs.own_text.is_some();

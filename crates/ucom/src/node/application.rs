@@ -10,7 +10,7 @@ use crate::profile::CiLatch;
 pub(super) const PC_LOST: &[u8] = b"PC alive lost";
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns to the exloader and makes everything safe.
+    /// Stops the application, makes its outputs safe and returns to the exloader.
     pub(super) fn stop_application(&mut self) {
         self.stop_loop();
         if self.app != App::Stopped {
@@ -23,7 +23,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.jobs.forget_application();
     }
 
-    /// Handles the end of the start: READY, the first heartbeat, the flags (D-30, D-37).
+    /// Handles the end of the application's start: queues MCA_DSP_READY, the first heartbeat and the flags (D-30, D-37).
     pub(super) fn application_up(&mut self) {
         self.app = App::Up;
         self.outbox.mca_ready = true;
@@ -31,7 +31,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.send_admin_unasked();
     }
 
-    /// Starts the control loop. The PC's heartbeat is due from now on (D-50).
+    /// Starts the control loop. From now on the PC must send heartbeats (D-50).
     pub(super) fn run_loop(&mut self) {
         if self.app != App::Up {
             return;
@@ -119,7 +119,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
     }
 }
 
-/// Stores the words of a package; returns `true` if the package starts inside the buffer.
+/// Copies the words of a package. Returns `true` if the package starts inside the buffer.
 fn put(package: &BufferPackage, buffer: &mut [u16], dimension: usize) -> bool {
     let len = buffer.len().min(dimension);
     buffer.get_mut(..len).is_some_and(|buffer| package.apply(buffer).is_ok())

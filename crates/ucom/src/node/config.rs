@@ -9,15 +9,15 @@ pub struct NodeConfig {
     pub flash_number: u16,
     /// Profile of this board.
     pub profile: Profile,
-    /// Start of its random numbers (back-off of D-05).
+    /// Seed of the board's random numbers, which are used for the back-off of D-05.
     pub seed: u32,
-    /// Time from a reset until the board listens, µs; at most 200 000 (D-07).
+    /// Time from a reset until the board listens, µs. At most 200 000 (D-07).
     pub boot_us: u64,
-    /// Time from the last frame of a block until its answer at the earliest, µs.
+    /// Shortest time from the last frame of a block to the board's answer, µs.
     pub block_us: u64,
     /// Time between control cycles, µs.
     pub control_period_us: u64,
-    /// Length of an image when `prog.header` is `none`, words; 0 for the whole area.
+    /// Length of an image in words if `prog.header` is `none`; 0 for the whole area.
     pub headerless_words: u32,
 }
 
@@ -36,12 +36,12 @@ impl NodeConfig {
     }
 }
 
-/// Counters of a board; they are not sent on the bus.
+/// Counters of a board. They are not sent on the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames that are not of this protocol (D-02).
     pub foreign: u32,
-    /// Messages for this board that its state does not allow, answered with silence.
+    /// Messages for this board that it did not answer, because its state does not allow them.
     pub ignored: u32,
     /// Messages that were too short or had a wrong length (D-12).
     pub wrong_length: u32,
@@ -49,8 +49,8 @@ pub struct Counters {
     pub errors_dropped: u32,
     /// Debug texts that were not sent (D-38).
     pub texts_dropped: u32,
-    /// Transfers of the outputs that were left out because the previous transfer was not finished (D-33).
+    /// Output transfers that were left out because the previous transfer was not finished (D-33).
     pub so_skipped: u32,
-    /// Frames that the controller gave up.
+    /// Frames that the CAN controller gave up sending.
     pub not_sent: u32,
 }

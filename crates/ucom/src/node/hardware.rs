@@ -1,4 +1,4 @@
-//! Hardware of a board: flash, init pins, a little lasting memory, and the application.
+//! Hardware of a board: flash, init pins, a little non-volatile memory, and the application.
 
 use crate::header::Memory;
 use crate::info::Dimensions;
@@ -13,7 +13,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// Returns `true` if `other` lies inside, and has at least one word.
+    /// Returns `true` if `other` lies inside this area and has at least one word.
     pub const fn holds(&self, other: Self) -> bool {
         let end = self.start as u64 + self.words as u64;
         other.words > 0 && other.start >= self.start && other.start as u64 + other.words as u64 <= end
@@ -31,7 +31,7 @@ pub enum FlashState {
     Failed,
 }
 
-/// An operation could not be started or done.
+/// The flash could not start or complete an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashError;
 
@@ -47,19 +47,19 @@ pub trait Flash {
     /// Returns the area for applications in a memory; `None` if the board has no such memory.
     fn area(&self, memory: Memory) -> Option<Area>;
 
-    /// Progress of the last operation.
+    /// Returns the state of the last operation.
     fn state(&mut self, now_us: u64) -> FlashState;
 
-    /// Starts to erase `area`; may erase whole sectors, but never beyond the application area.
+    /// Starts to erase `area`. Whole sectors may be erased, but nothing beyond the application area.
     fn erase(&mut self, now_us: u64, memory: Memory, area: Area) -> Result<(), FlashError>;
 
-    /// Starts to write up to 64 bytes, an even number, in wire order from a word address on.
+    /// Starts to write up to 64 bytes in wire order, beginning at a word address. The number of bytes is even.
     fn write(&mut self, now_us: u64, memory: Memory, address: u32, data: &[u8]) -> Result<(), FlashError>;
 
-    /// Reads bytes back in the order they were written, from a word address on.
+    /// Reads bytes from a word address on, in the order in which they were written.
     fn read(&self, memory: Memory, address: u32, data: &mut [u8]) -> Result<(), FlashError>;
 
-    /// Returns the present validity record; any bytes if none was written.
+    /// Returns the stored validity record. If none was written, the bytes are arbitrary.
     fn record(&self) -> [u8; RECORD_LEN];
 
     /// Starts to make the record invalid.
@@ -78,12 +78,12 @@ pub trait Pins {
     fn set_init_out(&mut self, active: bool);
 }
 
-/// Data that survive a power loss, and fixed data.
+/// Data that survive a power loss, and data that never change.
 pub trait Store {
-    /// Returns ASTART.
+    /// Returns the stored ASTART.
     fn autostart(&self) -> bool;
 
-    /// Keeps ASTART; called only if the value changes.
+    /// Stores ASTART. Called only if the value changes.
     fn set_autostart(&mut self, on: bool);
 
     /// Returns the description of the board for DSP_INFO, Latin-1.
@@ -112,25 +112,25 @@ pub trait Application {
     /// Ends the program; its outputs MUST be safe when this returns.
     fn stop(&mut self);
 
-    /// Returns `true` if the start is over and requests can be served.
+    /// Returns `true` if the program has started and can serve requests.
     fn is_up(&mut self, now_us: u64) -> bool;
 
     /// Returns the number of inputs, outputs and parameters. MUST NOT change while the program runs.
     fn dimensions(&self) -> Dimensions;
 
-    /// Returns a description, Latin-1; empty if it does not exist.
+    /// Returns a description in Latin-1. The text is empty if there is none.
     fn text(&self, text: Text) -> &[u8];
 
-    /// Returns the initial value of an input, which holds until the input is set.
+    /// Returns the initial value of an input. It applies until the input is set.
     fn initial_ci(&self, index: u16) -> u16;
 
-    /// Returns the buffer for received inputs, one word for each input. Its words take effect at [`Application::latch_ci`].
+    /// Returns the buffer for received inputs, one word for each input. The words take effect at [`Application::latch_ci`].
     fn ci(&mut self) -> &mut [u16];
 
     /// Makes the inputs in [`Application::ci`] take effect together.
     fn latch_ci(&mut self);
 
-    /// Returns the buffer for received parameters. Its words take effect with the next control cycle (D-35).
+    /// Returns the buffer for received parameters. The words take effect with the next control cycle (D-35).
     fn par(&mut self) -> &mut [u16];
 
     /// Takes a snapshot of the outputs for [`Application::so`].
@@ -139,21 +139,21 @@ pub trait Application {
     /// Returns the outputs of the last snapshot, one word for each output.
     fn so(&self) -> &[u16];
 
-    /// Reports that the control loop starts or ends.
+    /// Informs the application that the control loop starts or ends.
     fn run(&mut self, now_us: u64, running: bool);
 
-    /// Runs a control cycle; called only while the loop runs.
+    /// Runs a control cycle. Called only while the loop runs.
     fn step(&mut self, now_us: u64);
 
     /// Enables the outputs of the board, or makes them safe.
     fn outputs(&mut self, active: bool);
 
-    /// Returns the oldest waiting debug text, Latin-1. MUST stay the same until [`Application::debug_done`].
+    /// Returns the oldest waiting debug text in Latin-1. MUST stay the same until [`Application::debug_done`].
     fn debug_text(&self) -> Option<&[u8]> {
         None
     }
 
-    /// Removes that text: it was sent, or nobody requests texts.
+    /// Removes the oldest debug text. Called after it was sent, or if it is dropped because it may not be sent.
     fn debug_done(&mut self) {}
 }
 

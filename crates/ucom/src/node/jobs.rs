@@ -4,7 +4,7 @@ use crate::frame::Payload;
 use crate::profile::Profile;
 use crate::string::string_package;
 
-/// Progress of an answer: nothing sent, or the next package of the string `string`.
+/// Progress of an answer: nothing sent yet, or the next package to send of the string `string`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     First,
@@ -17,18 +17,18 @@ pub(super) struct Jobs {
     pub info: Option<Place>,
     pub info_again: bool,
     pub dump_io: Option<Place>,
-    /// Time from which the dump may begin or continue.
+    /// Earliest time for the next frame of the dump.
     pub dump_io_at: u64,
-    /// Time from which the next dump may begin, if it was requested during this one.
+    /// Earliest time of another dump, if the PC requested it during the current one.
     pub dump_io_again: Option<u64>,
     /// Offset of the next package.
     pub dump_ci: Option<u16>,
     pub dump_ci_again: bool,
     /// Offset of the next package of the outputs.
     pub so: Option<u16>,
-    /// Next package of the text in progress; `true` if the text is the node's own.
+    /// Next package of the text in progress. The second value is `true` if the node itself wrote the text.
     pub text: Option<(u16, bool)>,
-    /// A text of the node itself.
+    /// Text that the node itself sends.
     pub own_text: Option<&'static [u8]>,
 }
 
@@ -48,13 +48,14 @@ impl Jobs {
         }
     }
 
-    /// Requests DSP_INFO. A request during its own answer is served after that, so strings are never mixed (D-14).
+    /// Requests DSP_INFO. A request that arrives during such an answer is served afterwards, so strings are never mixed (D-14).
     pub fn ask_info(&mut self) {
         self.info_again = self.info.is_some();
         self.info = self.info.or(Some(Place::First));
     }
 
-    /// Like `ask_info`, and no answer leaves before `due_us`: by then the request with the same identifier has left the bus (D-05).
+    /// Like `ask_info`, but sends no frame of the answer before `due_us`. By then the request with the same identifier has left the bus
+    /// (D-05).
     pub fn ask_dump_io(&mut self, due_us: u64) {
         if let Some(Place::String { .. }) = self.dump_io {
             self.dump_io_again = Some(due_us);
@@ -94,7 +95,7 @@ impl Jobs {
     }
 }
 
-/// Returns a package of the `string`-th text, and the place of the next package; `None` if the package does not exist.
+/// Returns a package of the `string`-th text and the position of the next package; `None` if the package does not exist.
 pub(super) fn package(text: &[u8], string: u32, package: u16, profile: &Profile) -> Option<(Payload, Place)> {
     let payload = string_package(text, package, profile)?;
     let last = string_package(text, package + 1, profile).is_none();

@@ -1,13 +1,13 @@
-//! The board side: a UCoM board as a state machine without clock, heap or I/O, usable in a board's firmware as it is;
-//! every simulated board runs it.
+//! The board side: a UCoM board as a state machine without clock, heap or I/O. A board's firmware can use it unchanged, and every simulated
+//! board runs it.
 //!
-//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when a
-//! frame has left the controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`] returns
-//! the time until which the node does nothing by itself. Flash, pins, lasting memory and the application are traits
-//! ([`Flash`], [`Pins`], [`Store`], [`Application`]); the crate `ucom-sim` has all four in memory.
+//! The caller passes received frames ([`Node::receive`]), polls for frames to send ([`Node::poll`]) and reports when a frame has left the
+//! controller ([`Node::sent`]), each with the time in microseconds. [`Node::next_deadline`] returns the time until which the node does
+//! nothing by itself. Flash, pins, non-volatile memory and the application are traits ([`Flash`], [`Pins`], [`Store`], [`Application`]);
+//! the crate `ucom-sim` implements all four in memory.
 //!
-//! The node offers one frame at a time: the next comes after `sent`. Strings and dumps are made frame by frame
-//! when the bus takes them, so a node needs no queue for them.
+//! The node offers one frame at a time. It offers the next one after [`Node::sent`]. Frames of strings and dumps are created only when the
+//! bus can take them, so a node needs no queue for them.
 
 mod answers;
 mod application;
@@ -47,9 +47,9 @@ pub enum Phase {
     Uninitialised,
     /// S2: exloader, has a number.
     Idle,
-    /// S3: exloader, program data are taken.
+    /// S3: exloader, program data are accepted.
     Programming,
-    /// S3x: as S3, but after an error: program data are discarded until PC_XRESET or PROG 0→1.
+    /// S3x: like S3, but after an error. Program data are discarded until PC_XRESET or PROG 0→1.
     Aborted,
     /// S4: the application is starting.
     Starting,
@@ -75,7 +75,7 @@ pub struct Node<F, P, S, A> {
     pub flash: F,
     /// Init pins.
     pub pins: P,
-    /// Lasting memory.
+    /// Non-volatile memory.
     pub store: S,
     /// The program.
     pub application: A,
@@ -83,21 +83,21 @@ pub struct Node<F, P, S, A> {
     counters: Counters,
     random: u32,
     now_us: u64,
-    /// Until when the board does not listen; `None` after that.
+    /// Time at which the board begins to listen after a reset; `None` while it listens.
     boot_until: Option<u64>,
     number: Option<Sequence>,
-    /// A number whose INITACK has not left yet: INIT follows when it has (D-24).
+    /// Number that the board is taking. Its INITACK has not left yet; INIT is set when it has (D-24).
     taking: Option<Sequence>,
     /// Level of the outgoing init pin.
     opinit: bool,
     prog: bool,
     app: App,
-    /// The flags but for `run`, which is `app == Running`.
+    /// Flags of MCA_ADMIN_DATA. The flag `run` is `app == Running`.
     active: bool,
     debug: bool,
     global_debug: bool,
     autostart_at: Option<u64>,
-    /// Time at which the PC counts as lost; while the loop runs.
+    /// Time at which the PC is considered lost; set while the loop runs.
     pc_lost_at: Option<u64>,
     step_at: Option<u64>,
     so_at: Option<u64>,
@@ -120,7 +120,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             application,
             config,
             counters: Counters::default(),
-            // Boards with one seed must still differ, or their back-offs collide.
+            // Boards with the same seed must draw different numbers, or their back-offs collide.
             random: (config.seed ^ u32::from(config.flash_number).wrapping_mul(0x9E37_79B9)).max(1),
             now_us,
             boot_until: None,
@@ -154,14 +154,14 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.reboot(self.now_us, true);
     }
 
-    /// Starts the board after a power loss: everything but flash and [`Store`] is lost. Sends no report.
+    /// Starts the board after a power loss. Everything except flash and [`Store`] is lost. Sends no report.
     pub fn power_up(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, false);
     }
 
-    /// Returns the next frame for the bus; `None` while no frame is due or the previous frame has not left. A frame that is not confirmed
-    /// by [`Node::sent`] or [`Node::not_sent`] blocks the frames after it, as in a controller.
+    /// Returns the next frame for the bus; `None` while no frame is due or the previous frame has not left. As in a controller, a frame
+    /// blocks the frames after it until [`Node::sent`] or [`Node::not_sent`] is called for it.
     pub fn poll(&mut self, now_us: u64) -> Option<Frame> {
         self.advance(now_us);
         if self.outbox.in_flight.is_some() || self.boot_until.is_some() {
@@ -183,7 +183,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             self.error(ErrorCode::CanTransmit);
         }
         match FromBoard::decode(frame, &self.config.profile) {
-            // An acknowledgement sent before the number was forgotten does not concern the number that is being taken.
+            // Ignores the INITACK of a number that the board has forgotten since: it does not confirm the number that the board is taking.
             Ok((_, FromBoard::InitAck(number))) if self.taking.is_some_and(|n| n.number() == number) => {
                 self.numbered();
             }
@@ -217,7 +217,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Returns the time until which the node does nothing by itself: call [`Node::poll`] then. A time in the past means "at once".
+    /// Returns the time until which the node does nothing by itself. Call [`Node::poll`] then. A time in the past means "at once".
     pub fn next_deadline(&self) -> u64 {
         self.deadline()
     }
@@ -227,7 +227,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         &self.config
     }
 
-    /// Returns the counters since [`Node::new`].
+    /// Returns the counters, which begin at [`Node::new`].
     pub const fn counters(&self) -> &Counters {
         &self.counters
     }
@@ -237,7 +237,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.number
     }
 
-    /// Returns the record of the application in the flash.
+    /// Returns the record of the application in flash.
     pub const fn record(&self) -> Option<Record> {
         self.record
     }

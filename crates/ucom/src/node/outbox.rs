@@ -1,18 +1,18 @@
-//! Single frames that wait.
+//! Single frames that wait for the bus.
 
 use crate::error_code::ErrorCode;
 use crate::frame::Frame;
 use crate::function::Sequence;
 
-/// Errors that may wait for the bus.
+/// Largest number of waiting errors.
 const ERRORS: usize = 8;
-/// Reports that may wait for their time.
+/// Largest number of waiting reports.
 const REPORTS: usize = 4;
 
-/// Frames that wait.
+/// Single frames that wait for the bus.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outbox {
-    /// Frame that is with the controller and has not left yet.
+    /// Frame that the CAN controller has not sent yet.
     pub in_flight: Option<Frame>,
     /// `true` if the controller gave up a frame; DSP_ERROR 6 follows the next frame that leaves.
     pub trouble: bool,
@@ -23,9 +23,9 @@ pub(super) struct Outbox {
     pub block_taken: bool,
     /// DSP_PROGFINISHED.
     pub finished: bool,
-    /// Due time of each report, and its next frame.
+    /// Due time of each report, and the index of its next frame.
     pub reports: [Option<(u64, u8)>; REPORTS],
-    /// A report is due after the boot.
+    /// `true` if a report is due after the boot.
     pub report_after_boot: bool,
     /// MCA_DSP_READY.
     pub mca_ready: bool,
@@ -65,7 +65,7 @@ impl Outbox {
         self.admin_at = None;
     }
 
-    /// Returns `false` if the queue is full.
+    /// Queues an error. Returns `false` if the queue is full.
     pub fn push_error(&mut self, code: ErrorCode, from: Sequence) -> bool {
         let place = self.errors.iter_mut().find(|place| place.is_none());
         place.map(|place| *place = Some((code, from))).is_some()
@@ -86,7 +86,7 @@ impl Outbox {
         }
     }
 
-    /// Returns the due time of the next of these frames.
+    /// Returns the earliest due time of the waiting frames.
     pub fn deadline(&self) -> u64 {
         let first_error = self.errors.first().is_some_and(Option::is_some);
         if self.ack || first_error || self.block_taken || self.finished || self.mca_ready || self.alive {

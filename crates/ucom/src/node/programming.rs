@@ -1,4 +1,4 @@
-//! Taking a new application: blocks, cycles, checks, flash (D-40 to D-46).
+//! Programming of a new application: blocks, cycles, checks, flash (D-40 to D-46).
 
 use super::transfer::{Cycle, Work};
 use super::{Application, Area, Flash, FlashError, FlashState, Node, Pins, RECORD_LEN, Record, Store};
@@ -7,7 +7,7 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::{HeaderForm, Plan};
 use crate::program::{Checksum, Digest};
 
-/// Bytes of flash read back in one step, so that a step stays short.
+/// Bytes of flash read back in one step. The limit keeps a step short.
 const VERIFY_STEP: usize = 1024;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
@@ -24,13 +24,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.error(code);
     }
 
-    /// Takes an eighth of a block.
+    /// Handles PC_PROG, which carries an eighth of a block.
     pub(super) fn program(&mut self, data: [u8; 8], is_broadcast: bool) {
         if self.programming.discard {
             return;
         }
         if !self.prog {
-            // A group update passes boards that are not in it (D-46).
+            // Broadcast program data are for a group of boards (D-46). A board outside the group ignores them.
             if !is_broadcast {
                 self.abort(ErrorCode::MemProtected);
             }
@@ -53,7 +53,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Checks the pauses, and performs one step of the work in progress.
+    /// Checks for a pause that is too long, and performs one step of the work in progress.
     pub(super) fn program_timers(&mut self) {
         let programming = &self.programming;
         let pause = u64::from(self.config.profile.prog_frame_timeout) * 1000;
@@ -73,7 +73,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Work::Block(_) => return self.take_block(),
             _ => {}
         }
-        // No operation starts while the flash is busy, for any reason.
+        // No operation starts while the flash is busy for any reason.
         let state = self.flash.state(now);
         if state == FlashState::Busy {
             return Ok(());
@@ -124,7 +124,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Takes a header (D-41); refuses headers that this board cannot accept.
+    /// Reads a header (D-41). Refuses headers that this board cannot accept.
     fn take_header(&mut self) -> Result<(), ErrorCode> {
         let endian = self.config.profile.prog_endian;
         let header = Header::parse(&self.programming.block, endian).map_err(|_| ErrorCode::Data)?;
@@ -141,7 +141,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if self.programming.work == Work::ClearRecord { Ok(()) } else { self.block_taken() }
     }
 
-    /// Returns the header of a board whose images have no header: its length is the configured one, at most that of the area.
+    /// Returns the header for a board whose images have none. The length is the configured length, but at most the length of the area.
     fn header_by_itself(&self) -> Option<Header> {
         let cycle = self.programming.number;
         let memory = match (self.config.profile.prog_plan, cycle) {
@@ -154,7 +154,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             0 => area.words,
             words => words.min(area.words),
         };
-        // If the second image is another one, its own Program ID replaces this one.
+        // If the second cycle has another image, its own Program ID replaces this one.
         let program_id = self.programming.first.map_or(0, |first| first.program_id);
         let (address, target) = (area.start, Header::ANY_BOARD);
         Some(Header { cycle, memory: memory.number(), address, length, program_id, date: 0, target })
@@ -184,7 +184,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
         let digest = Digest::new(profile.prog_checksum, profile.prog_endian);
         self.programming.cycle = Some(Cycle { header, area, memory, writes, done: 0, digest });
-        // RAM needs no erasing, and the application in the flash stays valid.
+        // RAM is not erased, and the application in flash stays valid.
         if writes && memory != Memory::Ram {
             self.programming.work = Work::ClearRecord;
         }
@@ -201,13 +201,13 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         if !cycle.writes {
             return self.after_data();
         }
-        // In wire order, as the checksum is.
+        // The bytes are written in wire order. The checksum uses the same order.
         self.flash.write(self.now_us, cycle.memory, address, data).map_err(|_| ErrorCode::Flash)?;
         self.programming.work = Work::AwaitWrite;
         Ok(())
     }
 
-    /// Continues after a block was stored; ends the cycle if it was the last one.
+    /// Continues after a block was stored. Ends the cycle after the last block.
     fn after_data(&mut self) -> Result<(), ErrorCode> {
         let profile = self.config.profile;
         let headerless = profile.prog_header == HeaderForm::None;
@@ -273,7 +273,8 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         Ok(())
     }
 
-    /// Returns the new record. Program memory gives the board its Program ID, even if data memory came last.
+    /// Returns the new record. With images for program and data memory, it describes the program memory, although data memory is written
+    /// last.
     fn new_record(&self) -> Option<Record> {
         let header = match self.config.profile.prog_plan {
             Plan::PmemXmem => self.programming.first?,

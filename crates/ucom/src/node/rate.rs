@@ -1,11 +1,11 @@
-//! A limit on events in any second.
+//! A limit on the number of events in any second.
 
 const SECOND_US: u64 = 1_000_000;
 
 /// Times of the last events, at most `N` in any second.
 #[derive(Clone, Copy, Debug)]
 pub struct RateLimit<const N: usize> {
-    /// The times, the oldest at `next`; 0 before the first event.
+    /// The times; the oldest is at `next`. `None`: no event yet.
     times: [Option<u64>; N],
     next: usize,
 }
@@ -15,7 +15,7 @@ impl<const N: usize> RateLimit<N> {
         Self { times: [None; N], next: 0 }
     }
 
-    /// Returns `true` and records the event if an event may happen now: at most `limit` (and `N`) in any second.
+    /// Records an event and returns `true` if it may happen now. At most `limit` events (and at most `N`) are allowed in any second.
     pub fn allow(&mut self, now_us: u64, limit: u32) -> bool {
         let recent = |time: &&Option<u64>| time.is_some_and(|time| now_us.saturating_sub(time) < SECOND_US);
         if self.times.iter().filter(recent).count() >= (limit as usize).min(N) {
@@ -50,7 +50,7 @@ mod tests {
         assert!(!RateLimit::<10>::new().allow(0, 0));
     }
 
-    /// Section 9: an event 1 s ago does not count, an event 999 999 µs ago does; events beyond the memory do not count.
+    /// Section 9: an event 1 s ago is outside the second, an event 999 999 µs ago is inside. More than `N` events are never allowed.
     #[test]
     fn a_second_is_a_second() {
         let mut limit = RateLimit::<2>::new();

@@ -9,7 +9,7 @@ use crate::message::{DecodeError, ToBoard};
 use crate::profile::AliveMode;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Takes a frame from the bus.
+    /// Handles a frame from the bus.
     pub fn receive(&mut self, now_us: u64, frame: &Frame) {
         self.advance(now_us);
         if self.boot_until.is_some() {
@@ -23,12 +23,12 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             Ok((_, message)) => self.act(to, message),
             Err(error) if error.is_length() => self.wrong_length(function, to),
             Err(DecodeError::Foreign(_)) => self.count_foreign(),
-            // A board's own answer, or a flag that is neither 0 nor 1.
+            // The frame is a board's own answer, or a flag is neither 0 nor 1.
             Err(_) => self.ignore(),
         }
     }
 
-    /// Takes a frame of any format, as a driver receives it (D-02).
+    /// Handles a frame of any format, as a CAN driver receives it (D-02).
     pub fn receive_any(&mut self, now_us: u64, id: u32, format: Format, data: &[u8]) -> Result<(), Foreign> {
         match Frame::received(id, format, data) {
             Ok(frame) => {
@@ -54,7 +54,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.config.profile.broadcast_number() == Some(to)
     }
 
-    /// Returns `true` if a message concerns this board (D-04).
+    /// Returns `true` if a message is addressed to this board (D-04).
     fn is_meant(&self, function: Function, to: Sequence) -> bool {
         match (function, self.number) {
             (Function::Init, _) => self.config.profile.is_board(to),
@@ -64,7 +64,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board would ignore anyway. A board without a number does not send it: all
+    /// Sends DSP_ERROR 7 (D-12), but not for messages that the board ignores anyway. A board without a number does not send it, because all
     /// such boards would send it at once with the same identifier (D-06).
     fn wrong_length(&mut self, function: Function, to: Sequence) {
         self.counters.wrong_length = self.counters.wrong_length.saturating_add(1);
@@ -98,7 +98,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             ToBoard::Prog(data) => self.program(data, self.is_broadcast(to)),
             ToBoard::Start => self.start(),
             ToBoard::Alive => self.pc_is_alive(to),
-            // The application level exists only while the application is up.
+            // These functions exist only while the application is up.
             _ if !served => self.ignore(),
             ToBoard::Ci(package) => self.receive_ci(&package),
             ToBoard::Par(package) => self.receive_par(&package),

@@ -1,26 +1,26 @@
-//! The validity record: written last and cleared first (D-45).
+//! The validity record. It is written last and cleared first (D-45).
 
 use super::hardware::RECORD_LEN;
 use crate::profile::Endian;
 use crate::program::{Checksum, checksum};
 
-/// Record of the board about its application. Without a whole record the board has no application.
+/// Record of the application in flash. Without a complete record the board has no application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Program ID (D-44).
     pub program_id: u16,
     /// Flash date (D-45).
     pub date: u16,
-    /// Address of the image, words.
+    /// Address of the image in words.
     pub address: u32,
-    /// Length of the image, words.
+    /// Length of the image in words.
     pub words: u32,
 }
 
 const MAGIC: [u8; 2] = *b"UR";
 
 impl Record {
-    /// Returns the bytes for the flash, with a check of their own: a record that was cut off by power loss is invalid.
+    /// Returns the bytes for the flash, including a checksum. It makes a record invalid that a power loss has cut off.
     pub fn build(&self) -> [u8; RECORD_LEN] {
         let [p0, p1] = self.program_id.to_le_bytes();
         let [d0, d1] = self.date.to_le_bytes();
@@ -35,7 +35,7 @@ impl Record {
         bytes
     }
 
-    /// Returns the record; `None` unless every byte is present.
+    /// Reads a record; `None` unless every byte is valid.
     pub fn parse(bytes: &[u8; RECORD_LEN]) -> Option<Self> {
         let [_, _, p0, p1, d0, d1, a0, a1, a2, a3, w0, w1, w2, w3, ..] = *bytes;
         let record = Self {
@@ -52,7 +52,7 @@ impl Record {
 mod tests {
     use super::*;
 
-    /// D-45: erased flash is not a valid record, and neither is a record with a byte that was not written.
+    /// D-45: erased flash is not a valid record. A record in which a byte was not written is not valid either.
     #[test]
     fn d45_half_a_record_is_none() {
         let record = Record { program_id: 0x4B3F, date: 0x3AC1, address: 0x1000, words: 500 };

@@ -1,4 +1,4 @@
-//! The order in which frames go out.
+//! The order in which frames are sent.
 
 use super::{Application, Flash, Node, Pins, Store};
 use crate::frame::Frame;
@@ -7,25 +7,26 @@ use crate::message::FromBoard;
 use crate::report::Report;
 
 impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
-    /// Returns the number for the board's identifiers: its own; without one, the number that the profile requires (D-06).
+    /// Returns the number in the identifiers of this board's frames. A board without a number uses the number that the profile requires
+    /// (D-06).
     pub(super) fn own_number(&self) -> Sequence {
         self.number.unwrap_or(self.config.profile.unnumbered())
     }
 
-    /// Queues DSP_REPORT, due after as many milliseconds as the UCoM id (D-07).
+    /// Queues DSP_REPORT. Its delay in milliseconds is the UCoM id (D-07).
     pub(super) fn report(&mut self) {
         let wait = u32::from(self.config.flash_number & 0xFF);
         self.outbox.push_report(self.after_ms(wait));
     }
 
-    /// Queues MCA_ADMIN_DATA as an answer. The answer is not due at once, because the PC's frame with this identifier must have left the
-    /// bus (D-05). A due unasked report needs no frame of its own: this answer replaces it.
+    /// Queues MCA_ADMIN_DATA as an answer. The answer waits until the PC's frame with the same identifier has left the bus (D-05). It
+    /// replaces a waiting unasked report.
     pub(super) fn answer_admin(&mut self) {
         self.outbox.admin_at = Some(self.after_ms(self.config.profile.shared_delay));
     }
 
-    /// Queues MCA_ADMIN_DATA unasked. This frame is due after a random time, because the PC may be about to send the same identifier
-    /// (D-05). A pending answer replaces it.
+    /// Queues MCA_ADMIN_DATA without a request. The frame waits a random time, because the PC may be about to send the same identifier
+    /// (D-05). If an answer is already waiting, no second frame is queued.
     pub(super) fn send_admin_unasked(&mut self) {
         let wait = self.random(self.config.profile.shared_backoff);
         let due = self.after_ms(wait);

@@ -19,7 +19,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
             .with(Status::IPINIT, self.pins.init_in())
     }
 
-    /// Handles PC_RESET and similar resets: makes outputs safe, forgets everything, returns to the exloader.
+    /// Handles PC_RESET and similar resets: makes the outputs safe, clears the state and returns to the exloader.
     pub(super) fn reboot(&mut self, now_us: u64, report: bool) {
         self.stop_application();
         self.forget_number();
@@ -33,7 +33,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.boot_until = Some(now_us.saturating_add(self.config.boot_us));
     }
 
-    /// Begins to listen in the exloader. The state of the flash counts from now on.
+    /// Begins to listen in the exloader. Reads the record of the application that is in flash now.
     pub(super) fn booted(&mut self) {
         self.boot_until = None;
         self.record = Record::parse(&self.flash.record());
@@ -42,7 +42,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Forgets the number, and all that depends on it.
+    /// Forgets the number and everything that depends on it.
     pub(super) fn forget_number(&mut self) {
         self.number = None;
         self.taking = None;
@@ -57,7 +57,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         self.pins.set_init_out(active);
     }
 
-    /// Takes the number, because INITACK has left the controller (D-24).
+    /// Takes the number. Called when INITACK has left the controller (D-24).
     pub(super) fn numbered(&mut self) {
         let Some(number) = self.taking.take() else { return };
         self.number = Some(number);
@@ -69,7 +69,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Handles PC_XRESET: exloader, programming enabled, a new transfer (D-23).
+    /// Handles PC_XRESET: enters the exloader, enables programming and begins a new transfer (D-23).
     pub(super) fn xreset(&mut self) {
         self.stop_application();
         self.autostart_at = None;
@@ -81,7 +81,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         }
     }
 
-    /// Handles PC_SETSTATUS: applies the formula literally, then the limits of the board (D-22).
+    /// Handles PC_SETSTATUS: applies the formula literally, then the restrictions of the board (D-22).
     pub(super) fn set_status(&mut self, mask: u8, value: u8) {
         let old = self.status();
         let new = old.set(mask, value);

@@ -6,23 +6,23 @@ use crate::header::{BLOCK_LEN, Header, Memory};
 use crate::profile::Profile;
 use crate::program::Digest;
 
-/// Work on the last block, or after it.
+/// Work that follows a received block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Work {
     /// Waits for frames.
     None,
-    /// A whole block came; it is processed at this time.
+    /// A complete block was received. It is processed at this time.
     Block(u64),
-    /// The validity record goes first.
+    /// The validity record will be cleared before the flash is erased.
     ClearRecord,
     Erase,
     AwaitErase,
     AwaitWrite,
-    /// The image is read back, bytes done so far.
+    /// The image is being read back. The number is the bytes read so far.
     Verify(u32),
     WriteRecord,
     AwaitRecord,
-    /// DSP_READY is being sent; until it has left, the block buffer is in use.
+    /// DSP_READY is being sent. The block buffer is in use until it has left.
     Answer,
 }
 
@@ -32,9 +32,9 @@ pub(super) struct Cycle {
     pub header: Header,
     pub area: Area,
     pub memory: Memory,
-    /// `true` if its data go to memory; `false` if they are only checked.
+    /// `true` if its data are written to memory; `false` if they are only checked.
     pub writes: bool,
-    /// Bytes of the image that came.
+    /// Bytes of the image received so far.
     pub done: u32,
     /// Digest of the received data, later of the data read back.
     pub digest: Digest,
@@ -53,12 +53,12 @@ pub(super) struct Programming {
     pub filled: usize,
     pub last_frame_us: u64,
     pub work: Work,
-    /// 1 or 2.
+    /// Number of the cycle, 1 or 2.
     pub number: u16,
     pub cycle: Option<Cycle>,
     /// Header of the first cycle, once that cycle has ended.
     pub first: Option<Header>,
-    /// After an error frames are dropped silently (D-43).
+    /// `true` after an error: program data are dropped silently (D-43).
     pub discard: bool,
 }
 
@@ -81,7 +81,7 @@ impl Programming {
         *self = Self::new(profile);
     }
 
-    /// Drops the transfer. After an error the board stays silent nevertheless.
+    /// Drops the transfer. If an error occurred before, the board stays silent.
     pub fn cancel(&mut self, profile: &Profile) {
         *self = Self { discard: self.discard, ..Self::new(profile) };
     }
@@ -90,7 +90,7 @@ impl Programming {
         self.discard
     }
 
-    /// Allows the next block, because DSP_READY has left.
+    /// Allows the next block. Called when DSP_READY has left.
     pub fn answered(&mut self) {
         if self.work == Work::Answer {
             self.work = Work::None;
@@ -104,7 +104,7 @@ impl Programming {
             Work::None | Work::Answer => u64::MAX,
             Work::Block(at) => at,
             Work::Verify(_) => 0,
-            // The flash state is read again soon.
+            // The state of the flash is read again soon.
             _ => now_us.saturating_add(500),
         }
     }

@@ -1,11 +1,11 @@
-//! Every key: one line of the table is field, default, range, rule and meaning.
+//! The keys. Each line of the table has field, default, range, rule and meaning.
 
 use core::fmt;
 
 use super::values::{AliveMode, Broadcast, CiLatch, Endian, HeaderForm, OnLost, Plan, ReportMode, Value};
 use crate::program::{Checksum, DateForm};
 
-/// Kind of a key's value, for files with types.
+/// Kind of a key's value, for file formats with typed values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A whole number.
@@ -62,7 +62,7 @@ impl Eq for Key {}
 macro_rules! keys {
     ($($field:ident: $type:ty = $value:expr, $kind:ident, $name:literal, $default:literal, $range:literal,
        $allowed:pat, $doc:literal;)+) => {
-        /// The values of all keys; [`Profile::default`] is this project's reading.
+        /// The values of all keys. [`Profile::default`] is this project's interpretation of the protocol.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub struct Profile { $(#[doc = concat!("`", $name, "`: ", $doc, " Allowed: ", $range, ".")] pub $field: $type),+ }
 

@@ -1,7 +1,7 @@
 //! The compatibility profile: the board's interpretation of points that the published description leaves open.
 //!
-//! Each decision of this project has a key here, so that the same code can work with a board that was built with another
-//! interpretation. [`KEYS`] lists them with default, range and meaning; [`Profile`] is the values.
+//! Each decision of this project has a key here, so that the same code can work with a board that was built with another interpretation.
+//! [`KEYS`] lists the keys with default, range and meaning; [`Profile`] holds the values.
 
 mod keys;
 mod values;
@@ -17,7 +17,7 @@ use crate::function::Sequence;
 pub enum ProfileError {
     /// The key does not exist.
     UnknownKey,
-    /// The key's range does not have the value.
+    /// The value is outside the key's range.
     Value(&'static Key),
     /// Two values contradict each other: the keys and why.
     Contradiction(&'static str),
@@ -42,7 +42,7 @@ impl Profile {
         if (key.set)(self, value) { Ok(()) } else { Err(ProfileError::Value(key)) }
     }
 
-    /// Values that fit their ranges and yet cannot be used together.
+    /// Checks that the values can be used together. Values can contradict each other although each is in its range.
     pub const fn check(&self) -> Result<(), ProfileError> {
         let contradiction = if self.addr_first == 0 && matches!(self.addr_broadcast, Broadcast::Zero) {
             "addr.first and addr.broadcast cannot both be 0: the first board would receive all broadcasts"
@@ -56,7 +56,7 @@ impl Profile {
         Err(ProfileError::Contradiction(contradiction))
     }
 
-    /// Returns the broadcast number of the PC; `None` if the profile has none (D-04).
+    /// Returns the number that the PC uses for broadcasts; `None` if the profile has none (D-04).
     pub const fn broadcast_number(&self) -> Option<Sequence> {
         match self.addr_broadcast {
             Broadcast::Zero => Some(Sequence::ZERO),
@@ -65,7 +65,8 @@ impl Profile {
         }
     }
 
-    /// Returns the number that reaches boards without a number, and that these use themselves: the broadcast number, else 0 (D-04, D-06).
+    /// Returns the number that boards without a number listen to and use in their own frames: the broadcast number, or 0 if there is none
+    /// (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
         match self.broadcast_number() {
             Some(number) => number,
@@ -88,12 +89,12 @@ impl Profile {
         Sequence::all().filter(move |number| profile.is_board(*number))
     }
 
-    /// Returns the number of a process word without a type of its own (D-11).
+    /// Returns the value of a process word that has no type of its own (D-11).
     pub const fn process_value(&self, word: u16) -> i32 {
         if self.pd_signed { word as i16 as i32 } else { word as i32 }
     }
 
-    /// Returns `string.max`, never above the 512 that the table allows.
+    /// Returns `string.max`, but at most 512, the upper limit of the key.
     pub const fn string_limit(&self) -> usize {
         if self.string_max > 512 { 512 } else { self.string_max as usize }
     }
@@ -111,7 +112,7 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
-    /// Every key's default is the one in the table, fits its own range, and is read back as it is written.
+    /// Every key's default equals the default in the table, is within its range, and can be read back.
     #[test]
     fn keys_and_defaults_agree() {
         let mut profile = Profile::default();
@@ -135,7 +136,7 @@ mod tests {
         assert_eq!(profile.check(), Ok(()));
     }
 
-    /// The published set of parameters, word for word.
+    /// The keys include the published parameters, with their published names.
     #[test]
     fn d03_the_listed_parameters_are_all_there() {
         let listed = "bitrate 1000000 · endian little · prog.endian little · addr.first 1 · addr.broadcast 0 · \
@@ -175,7 +176,7 @@ mod tests {
         assert_eq!(unsigned.process_value(0xFFEC), 65516);
     }
 
-    /// Every key has its place on the protocol page.
+    /// The protocol page mentions every key.
     #[test]
     fn d00_the_protocol_page_names_every_key() {
         let page = include_str!("../../../../docs/protocol-ucom.md");

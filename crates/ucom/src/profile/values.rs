@@ -1,16 +1,16 @@
-//! Values of keys other than numbers.
+//! Types of keys whose values are not numbers.
 
 use core::fmt;
 
-/// A value of a key as text, both ways.
+/// Conversion of a key's value to and from text.
 pub trait Value: Sized {
-    /// Reads the value of a text.
+    /// Reads a value from a text.
     fn read(text: &str) -> Option<Self>;
-    /// Writes the text of a value.
+    /// Writes a value as text.
     fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result;
 }
 
-/// Declares an enum whose variants are words in files.
+/// Declares an enum with a word for each variant. Profile files use the words.
 macro_rules! words {
     ($(#[$about:meta])* pub enum $name:ident { $($(#[doc = $doc:literal])+ $variant:ident = $word:literal,)+ }) => {
         $(#[$about])*
@@ -21,7 +21,7 @@ macro_rules! words {
             /// All values.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// Returns the word that files use.
+            /// Returns the word in files.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }
@@ -80,7 +80,7 @@ words! {
         Zero = "0",
         /// 31.
         ThirtyOne = "31",
-        /// No number reaches numbered boards together; 0 reaches those without a number.
+        /// No number addresses all numbered boards; 0 addresses the boards without a number.
         None = "none",
     }
 }
@@ -92,7 +92,7 @@ words! {
         Flash7 = "flash7",
         /// A single DSP_REPORT0 with the board's sequence number.
         Seq = "seq",
-        /// All four functions, one frame each.
+        /// Four frames, one with each function.
         All4 = "all4",
     }
 }
@@ -100,13 +100,13 @@ words! {
 words! {
     /// Content of the two cycles of an update (D-40).
     pub enum Plan {
-        /// Twice the same image: checked, then written.
+        /// The same image twice: it is checked first, then written.
         VerifyWrite = "verify-write",
         /// An exloader into RAM, then the application.
         ExloaderApp = "exloader-app",
         /// Program memory, then data memory.
         PmemXmem = "pmem-xmem",
-        /// Two files as they are.
+        /// Two files, sent unchanged.
         Raw = "raw",
     }
 }
@@ -116,7 +116,7 @@ words! {
     pub enum HeaderForm {
         /// The header block of this project.
         V1 = "v1",
-        /// No header: the first block is data, and the board knows the length by itself.
+        /// No header. The first block is data, and the board knows the length.
         None = "none",
     }
 }
@@ -124,9 +124,9 @@ words! {
 words! {
     /// Time at which controller inputs take effect (D-34).
     pub enum CiLatch {
-        /// Each package by itself.
+        /// Each package takes effect when it arrives.
         Frame = "frame",
-        /// All together with the package that holds the last word.
+        /// All inputs take effect together with the package that holds the last word.
         Last = "last",
     }
 }
@@ -136,7 +136,7 @@ words! {
     pub enum AliveMode {
         /// A single broadcast frame.
         Broadcast = "broadcast",
-        /// A frame to each board; boards do not count broadcast heartbeats.
+        /// A frame to each board; boards ignore broadcast heartbeats.
         Unicast = "unicast",
         /// Both.
         Both = "both",
@@ -146,11 +146,11 @@ words! {
 words! {
     /// Reaction of the PC if a board's heartbeat is missing (D-51).
     pub enum OnLost {
-        /// An event, nothing else.
+        /// Only reports an event.
         Report = "report",
         /// Stops that board.
         StopBoard = "stop-board",
-        /// Stops every board: for coupled joints.
+        /// Stops every board. For coupled joints.
         StopAll = "stop-all",
     }
 }

@@ -7,7 +7,7 @@ use ucom::node::{Application, Text};
 
 /// Time from the start of the program until it serves requests, µs.
 const UP_US: u64 = 60_000;
-/// Longest time for which axes are moved at once, s.
+/// Longest time by which the axes are moved in one step, s.
 const MOST_S: f64 = 5.0;
 
 /// Program of a board: its model, connected to the words of the protocol.
@@ -48,7 +48,7 @@ impl SimApplication {
 
     /// Moves the axes up to `now_us`, even if no program runs.
     pub fn pass(&mut self, now_us: u64) {
-        // By then an axis without drive has come to rest.
+        // After that time an axis without drive is at rest.
         let seconds = (now_us.saturating_sub(self.moved_us) as f64 * 1e-6).min(MOST_S);
         self.moved_us = self.moved_us.max(now_us);
         let driven = self.running && self.active;

@@ -60,7 +60,7 @@ pub(super) struct Command {
     pub kp: f64,
     /// Derivative gain, mA·s/°.
     pub kd: f64,
-    /// Limits of the set point, degrees.
+    /// Limits of the set position, degrees.
     pub limits: (f64, f64),
     /// Largest current, mA.
     pub current_max: f64,
@@ -78,7 +78,7 @@ pub(super) struct Axis {
     pub current: f64,
     /// Temperature, °C.
     pub temperature: f64,
-    /// Moving set point, degrees.
+    /// Set point that moves to the set position within the speed limit, degrees.
     pub reference: f64,
 }
 

@@ -11,7 +11,7 @@ use ucom::node::{Node, NodeConfig, Phase, Pins, Record};
 use ucom::profile::{Endian, HeaderForm};
 use ucom::{Checksum, Format, Frame, Function, Payload, Sequence, Status, ToBoard, checksum};
 
-/// Step in which time passes inside the board while a frame waits for the bus, µs.
+/// Time step inside the board while one of its frames waits for the bus, µs.
 const WAIT_US: u64 = 500;
 /// Delay of a board relative to another board with the same number, µs. Two boards that answer in the same bit time would destroy each
 /// other's frames.
@@ -21,7 +21,7 @@ pub(super) struct Board {
     node: Node<MemoryFlash, WirePins, MemoryStore, SimApplication>,
     /// `true` for the first board of the chain, whose incoming pin is strapped active.
     strapped: bool,
-    /// Faults that are active.
+    /// This field and the next three are `true` while their fault is active.
     pub unpowered: bool,
     pub silent: bool,
     pub deaf: bool,
@@ -32,10 +32,10 @@ pub(super) struct Board {
     coming: VecDeque<(u64, u32, Format, Payload)>,
     /// Frame that waits for the bus.
     waiting: Option<Frame>,
-    /// Acknowledgement that does not leave the board.
+    /// INITACK that a fault keeps inside the board.
     held: Option<Frame>,
     next_us: u64,
-    /// State that no board can have, if it occurred.
+    /// Status that no board can have, if it occurred.
     pub violation: Option<&'static str>,
 }
 
@@ -75,7 +75,7 @@ impl Board {
         }
     }
 
-    /// Returns the time of its next action, µs.
+    /// Returns the time of the board's next action, µs.
     pub fn next_us(&self) -> u64 {
         if self.unpowered { u64::MAX } else { self.next_us }
     }
@@ -104,7 +104,7 @@ impl Board {
     /// Applies the faults to a frame that the board sends.
     fn through(&mut self, now_us: u64, frame: Frame) -> Option<Frame> {
         if self.silent {
-            // The board's controller counts the frame as acknowledged.
+            // For the board's controller, another member has acknowledged the frame.
             self.node.sent(now_us, &frame);
             return None;
         }
@@ -130,7 +130,7 @@ impl Board {
         }
     }
 
-    /// Reports that its frame was on the bus.
+    /// Reports that the board's frame was on the bus.
     pub fn sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -141,7 +141,7 @@ impl Board {
         }
     }
 
-    /// Reports that its controller gave the frame up.
+    /// Reports that the board's controller gave up the frame.
     pub fn not_sent(&mut self, now_us: u64, frame: &Frame) {
         if self.waiting == Some(*frame) {
             self.waiting = None;
@@ -171,7 +171,7 @@ impl Board {
         !self.unpowered && self.node.pins.output.load(Ordering::SeqCst)
     }
 
-    /// Sets the level of the wire from the previous board. A broken wire, or one from an unpowered board, is inactive.
+    /// Sets the level of the wire from the previous board. The level is inactive if the wire is broken or the previous board has no power.
     pub fn set_incoming(&mut self, now_us: u64, level: bool) {
         let level = self.strapped || level;
         if self.node.pins.input.swap(level, Ordering::SeqCst) != level {
@@ -196,7 +196,7 @@ impl Board {
         }
     }
 
-    /// Crashes its application; the watchdog reboots the board (D-26).
+    /// Lets the application crash. The watchdog then reboots the board (D-26).
     pub fn crash(&mut self, now_us: u64) {
         if !self.unpowered {
             self.waiting = None;
@@ -206,7 +206,7 @@ impl Board {
         }
     }
 
-    /// Gives the board this number, as a PC_INIT would that another board has already taken.
+    /// Gives the board a number that another board has already taken, as if both had received the same PC_INIT.
     pub fn take_number(&mut self, now_us: u64, number: Sequence) {
         if self.unpowered {
             return;
@@ -245,7 +245,7 @@ impl Board {
 pub struct BoardState {
     /// `true` if the board has power.
     pub powered: bool,
-    /// S1 to S6.
+    /// Phase of the board: S1 to S6.
     pub phase: Phase,
     /// Status byte.
     pub status: Status,
@@ -257,7 +257,8 @@ pub struct BoardState {
     pub driven: bool,
 }
 
-/// Returns an application as the factory programs it. The image is made from the description, so that boards have different applications.
+/// Returns an application as the factory programs it. The image is derived from the description, so that boards have different
+/// applications.
 fn image(config: &BoardConfig) -> Vec<u8> {
     let seed = config.description.bytes().fold(7_u32, |sum, b| sum.wrapping_mul(31).wrapping_add(b.into()));
     let mut image: Vec<u8> = (0..254_u32).map(|i| (seed.wrapping_mul(i + 1) >> 7) as u8).collect();

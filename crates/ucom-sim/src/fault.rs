@@ -60,7 +60,7 @@ pub struct Fault {
     pub board: usize,
     /// Trigger.
     pub trigger: Trigger,
-    /// Duration, µs; `None`: without end.
+    /// Duration, µs. `None`: the fault does not end.
     pub duration_us: Option<u64>,
 }
 
@@ -126,7 +126,7 @@ const OF_A_BOARD: [(&str, FaultKind); 8] = [
 const OF_THE_BUS: [(&str, FaultKind); 2] =
     [("foreign-master", FaultKind::CompetingMaster), ("foreign-frames", FaultKind::ForeignFrames)];
 
-/// Creates a kind from its share, 0 to 1.
+/// Function that creates a kind from its share, 0 to 1.
 type OfAShare = fn(f64) -> FaultKind;
 
 /// Kinds that concern a share of the frames.

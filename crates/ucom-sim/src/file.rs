@@ -10,19 +10,19 @@ use ucom::profile::{Profile, ProfileError};
 pub const HEAD: &str = include_str!("head.toml");
 /// Text of `ucom help sim` before the built-in chain.
 const FORM: &str = include_str!("file.txt");
-/// Number of boards that a bus can number.
+/// Largest number of boards: a bus has numbers for 31 boards.
 const MOST_BOARDS: usize = 31;
-/// Number of axes for which a DSP of that time could serve the words.
+/// Largest number of axes of a board. A DSP of that time could not serve more words.
 const MOST_AXES: usize = 8;
 
 /// Board of a chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardConfig {
-    /// Number of its bootloader; DSP_REPORT carries the low byte.
+    /// Flash number of the board; DSP_REPORT carries its low byte.
     pub flash_id: u16,
     /// The description in DSP_INFO.
     pub description: String,
-    /// Program ID of its application; `None` makes one from the description.
+    /// Program ID of its application; `None`: it is computed from the image, which is derived from the description.
     pub program_id: Option<u16>,
     /// Flash date as a number.
     pub date: u16,
@@ -57,13 +57,13 @@ pub enum ChainFileError {
     /// The text is not TOML of this form; the message shows the place and the reason.
     #[error("{0}")]
     Form(String),
-    /// More boards than numbers.
+    /// The chain has more boards than a bus has numbers.
     #[error("{count} boards; a bus numbers at most {MOST_BOARDS}")]
     Boards {
         /// Number of boards.
         count: usize,
     },
-    /// More axes than a board has words for.
+    /// A board has no axis, or more axes than it has words for.
     #[error("board {board}: {count} axes; a board has 1 to {MOST_AXES}")]
     Axes {
         /// Position in the file, from 1.
@@ -71,17 +71,17 @@ pub enum ChainFileError {
         /// Number of axes.
         count: usize,
     },
-    /// The values of an axis are not possible.
+    /// The values of an axis cannot be simulated.
     #[error("board {board}: axis {axis}: {what}")]
     Axis {
         /// Position in the file, from 1.
         board: usize,
         /// Position among the board's axes, from 1.
         axis: usize,
-        /// Error.
+        /// Reason.
         what: &'static str,
     },
-    /// A text that the wire cannot carry.
+    /// A description that the protocol cannot carry.
     #[error(
         "board {board}: the description has {count} characters of at most 512, or some that Latin-1 does not have"
     )]
@@ -152,7 +152,7 @@ pub fn help() -> String {
 }
 
 impl ChainConfig {
-    /// Reads a chain from a text. Boards have `profile` unless they have their own.
+    /// Reads a chain from a text. `profile` applies to boards without a profile of their own.
     pub fn from_toml(text: &str, profile: &Profile) -> Result<Self, ChainFileError> {
         let file: File = toml::from_str(text).map_err(|e| ChainFileError::Form(e.to_string()))?;
         let count = file.board.len();
@@ -180,7 +180,7 @@ impl ChainConfig {
         Self::from_toml(HEAD, profile).unwrap_or_default()
     }
 
-    /// Returns the chain with `count` boards: the last ones are left out, or boards with one axis each are added.
+    /// Returns the chain with `count` boards. Surplus boards at the end are removed; additional boards have one axis each.
     #[must_use]
     pub fn with_boards(mut self, count: usize, profile: &Profile) -> Self {
         self.boards.truncate(count);
@@ -201,7 +201,7 @@ impl ChainConfig {
         self
     }
 
-    /// Returns the chain with these flash ids along the wire. Boards beyond the list keep their flash ids.
+    /// Returns the chain with these flash ids, in the order of the wire. Boards beyond the end of the list keep their flash ids.
     #[must_use]
     pub fn with_flash_ids(mut self, ids: &[u16]) -> Self {
         for (board, id) in self.boards.iter_mut().zip(ids) {
@@ -263,7 +263,7 @@ fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, String)>) {
     }
 }
 
-/// Checks that an axis can be simulated.
+/// Checks that the values of an axis can be simulated.
 fn sound(axis: &AxisConfig) -> Result<(), &'static str> {
     let figures = [
         axis.min_deg,

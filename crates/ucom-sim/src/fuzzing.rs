@@ -3,9 +3,9 @@
 use ucom::node::{Application, Flash, Node, NodeConfig, Phase, Pins, Store};
 use ucom::{Frame, FromBoard, Profile};
 
-/// Runs a board through a history. Each step has a byte that defines the time that passes, whether the board is polled in that time, and
-/// the length of the frame. Two bytes of identifier and up to eight of data follow. The board never contradicts itself and sends only
-/// allowed frames.
+/// Runs a board through a sequence of steps. The first byte of a step defines the time that passes, whether the board is polled in that
+/// time, and the length of a frame. Two bytes of identifier and up to eight bytes of data follow. The status of the board must never
+/// contradict itself, and the board must send only allowed frames.
 pub fn node(data: &[u8]) {
     use crate::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
@@ -26,7 +26,7 @@ pub fn node(data: &[u8]) {
             0 => pass(&mut board, &mut now, until),
             _ => now = until,
         }
-        // The low five bits choose a number that the board may have.
+        // Only numbers 0 and 1 remain, so that many frames are addressed to the board.
         let id = u16::from_be_bytes([high, low]) & 0x7E1;
         let Some(frame) = Frame::new(id, payload) else { continue };
         board.receive(now, &frame);

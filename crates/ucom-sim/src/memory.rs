@@ -1,5 +1,5 @@
-//! A board in memory: flash with times and faults, a pin on a wire, a store, and an application that records its calls. For tests,
-//! examples and simulations.
+//! A board in memory, for tests, examples and simulations: flash with times and faults, a pin on a wire, a store, and an application that
+//! records its calls.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,8 +11,8 @@ use crate::texts::Texts;
 
 /// Flash, data flash and exloader RAM in memory.
 ///
-/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power inside one operation:
-/// half of it is done, and no further operation until [`MemoryFlash::power_up`].
+/// Writing can only clear bits, as in a real flash. `fail_after` makes operations fail. `cut_after` cuts the power during one operation:
+/// half of that operation is done, and no other operation succeeds until [`MemoryFlash::power_up`].
 #[derive(Clone, Debug)]
 pub struct MemoryFlash {
     /// Application area of the program flash.
@@ -25,11 +25,11 @@ pub struct MemoryFlash {
     pub erase_us: u64,
     /// Duration of a write of one block, µs.
     pub write_us: u64,
-    /// First operation, counted from 0, that fails; later ones fail, too.
+    /// First operation, counted from 0, that fails. All later operations also fail.
     pub fail_after: Option<u64>,
     /// The operation, counted from 0, during which the power is lost.
     pub cut_after: Option<u64>,
-    /// A byte of the program flash that stays erased after every write, which only reading back detects.
+    /// A byte of the program flash that stays erased after every write. Only reading back detects it.
     pub stuck_byte: Option<usize>,
     /// Operations started so far.
     pub operations: u64,
@@ -70,7 +70,7 @@ impl MemoryFlash {
         }
     }
 
-    /// Returns `true` if the power was lost in an operation.
+    /// Returns `true` if the power was lost during an operation.
     pub const fn is_dark(&self) -> bool {
         self.dark
     }
@@ -97,7 +97,7 @@ impl MemoryFlash {
         }
     }
 
-    /// Starts an operation. Returns 2 if all of it is done, 1 for half, 0 for nothing.
+    /// Starts an operation. Returns how much of it is done: 2 for all, 1 for half, 0 for nothing.
     fn begin(&mut self, now_us: u64, duration: u64) -> Result<usize, FlashError> {
         if self.dark {
             return Err(FlashError);
@@ -225,7 +225,7 @@ impl Pins for WirePins {
     }
 }
 
-/// ASTART and the description.
+/// Stored ASTART and description.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryStore {
     /// ASTART.
@@ -248,7 +248,7 @@ impl Store for MemoryStore {
     }
 }
 
-/// Application without a process: buffers, texts, and a record of the calls.
+/// Application without a controlled process: buffers, texts, and a record of the calls.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryApplication {
     /// Time from the start until the application is up, µs.
@@ -257,9 +257,9 @@ pub struct MemoryApplication {
     pub texts: Texts,
     /// Initial inputs.
     pub initial_ci: Vec<u16>,
-    /// Inputs as received.
+    /// Received inputs.
     pub ci: Vec<u16>,
-    /// Inputs in effect.
+    /// Inputs that have taken effect.
     pub latched_ci: Vec<u16>,
     /// Outputs; the caller changes them.
     pub so: Vec<u16>,
@@ -275,12 +275,12 @@ pub struct MemoryApplication {
     pub active: bool,
     /// Control cycles so far.
     pub steps: u64,
-    /// Time at which the program was started; `None`: not started.
+    /// Time at which the program was started; `None`: the program does not run.
     pub started_us: Option<u64>,
 }
 
 impl MemoryApplication {
-    /// Creates an application with one input, output or parameter for each text; all 0.
+    /// Creates an application with one input, output or parameter for each text. All values are 0.
     pub fn new(text: &str, ci: &[&str], so: &[&str], par: &[&str]) -> Self {
         Self {
             start_us: 10_000,
@@ -341,7 +341,7 @@ impl Application for MemoryApplication {
         self.sampled_so.clone_from(&self.so);
     }
 
-    // The snapshot is named `so` in the trait.
+    // The trait calls the snapshot `so`.
     #[allow(clippy::misnamed_getters)]
     fn so(&self) -> &[u16] {
         &self.sampled_so

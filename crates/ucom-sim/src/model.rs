@@ -12,7 +12,7 @@ const OUTPUTS: [(&str, &str); 5] = [
     ("temperature", "0.1 C"),
     ("reference", "0.01 deg"),
 ];
-/// Words of an axis among the parameters: name, unit, default. The limits' defaults are the axis's own.
+/// Words of an axis among the parameters: name, unit, default. For the position limits, the defaults are the stops of the axis.
 const PARAMETERS: [(&str, &str, i16); 5] = [
     ("kp", "mA/deg", 120),
     ("kd", "0.1 mA s/deg", 80),
@@ -30,7 +30,7 @@ pub(super) struct Model {
     par_names: Vec<String>,
     initial_ci: Vec<u16>,
     initial_par: Vec<u16>,
-    /// `true` for set points beyond their limits, which are reported once.
+    /// `true` for each set point that is beyond its limits. Such a set point is reported once.
     limited: Vec<bool>,
 }
 
@@ -82,7 +82,7 @@ impl Model {
         &self.initial_par
     }
 
-    /// Advances by `seconds`, with outputs enabled if `active`. Returns a text to report, if any.
+    /// Advances by `seconds`; the outputs are enabled if `active`. Returns a text to report, if any.
     pub fn advance(&mut self, seconds: f64, active: bool, ci: &[u16], par: &[u16]) -> Option<String> {
         let mut reported = None;
         for (i, axis) in self.axes.iter_mut().enumerate() {
@@ -114,7 +114,7 @@ impl Model {
     }
 }
 
-/// Returns a value as a word of 16 bits in two's complement. A value out of range gives the nearest word.
+/// Returns a value as a 16-bit word in two's complement. A value out of range gives the nearest word.
 fn word(value: f64) -> u16 {
     value.round() as i16 as u16
 }

@@ -13,22 +13,22 @@ use crate::{ChainSim, Fault};
 
 /// Name of the bus.
 const CHANNEL: &str = "can0";
-/// If the computer was busy for longer than this, virtual time stands still. Otherwise boards would lose their PC.
+/// If the computer was busy for longer than this, virtual time pauses. Otherwise the boards would lose their PC.
 const CATCH_UP_US: u64 = 200_000;
 
-/// Server with clients of the socketcand protocol outside, boards inside, and a bus between them, in real time.
+/// Real-time server. It connects clients of the socketcand protocol with the boards of the chain over a simulated bus.
 pub struct ChainServer<'a> {
     gateway: SocketcandGateway,
     bus: TimedBus,
     chain: ChainSim,
-    /// Members of the chain on the bus, in its order.
+    /// Bus members of the chain, in the order of the chain.
     inside: Vec<MemberId>,
     clients: BTreeMap<ClientId, MemberId>,
     /// Disconnected clients whose frames still wait for the bus.
     leaving: Vec<MemberId>,
     started: Instant,
     start_us: u64,
-    /// Frames for clients, made from the last frame on the wire, and the time when that ended, ns.
+    /// The last frame on the wire: the time when it ended in ns, the frame, and the frames that clients receive for it.
     carried: Option<(u64, CanFrame, Vec<CanFrame>)>,
     /// Clients that were told about the bus-off of their controllers.
     off: BTreeSet<ClientId>,
@@ -95,7 +95,7 @@ impl<'a> ChainServer<'a> {
         let due_us = self.due_us().saturating_sub(self.now_us());
         let mut patience = Duration::from_micros(due_us).min(patience);
         while let Some(event) = self.gateway.next(patience) {
-            // A frame that arrives now is on the bus now, not at the time of the last clock reading.
+            // A frame that arrives now is on the bus now, not at the time when the clock was last read.
             let now_us = self.now_us();
             self.advance(now_us);
             self.received(event.client, event.event);
@@ -114,7 +114,7 @@ impl<'a> ChainServer<'a> {
         now
     }
 
-    /// Returns the time of the next event apart from clients, µs.
+    /// Returns the time of the next event that no client causes, µs.
     fn due_us(&self) -> u64 {
         let bus = self.bus.next_ns().map_or(u64::MAX, |ns| ns.div_ceil(1000));
         bus.min(self.chain.next_due_us())
@@ -202,7 +202,7 @@ impl<'a> ChainServer<'a> {
         self.clients.iter().find(|(_, m)| **m == member).map(|(client, _)| *client)
     }
 
-    /// Handles a change of a controller's state. A client receives reports that its own controller has left the bus, and that it is back.
+    /// Handles a change of a controller's state. A client is told when its own controller leaves the bus and when it is back.
     fn is_in_state(&mut self, member: MemberId, state: ErrorState, at_ns: u64) {
         let off = state == ErrorState::BusOff;
         if let Some(client) = self.client_of(member)
@@ -215,8 +215,8 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Reports that a controller has left the bus; it recovers by itself. There is at most one report per second, because a bad wire
-    /// causes bus-off again and again.
+    /// Reports that a controller has left the bus. The controller recovers by itself. At most one report per second is made, because a bad
+    /// wire causes bus-off again and again.
     fn report_off(&mut self, member: MemberId, at_ns: u64) {
         if self.off_reported_ns.is_some_and(|at| at_ns.saturating_sub(at) < 1_000_000_000) {
             return;
@@ -252,7 +252,7 @@ impl<'a> ChainServer<'a> {
         }
     }
 
-    /// Injects the fault in a line, such as `kill 3`. Notes the fault, or the error in the line.
+    /// Injects the fault of a line such as `kill 3`. Reports the fault, or the error in the line, to the operator.
     pub fn fault(&mut self, line: &str) {
         if line.is_empty() {
             return;

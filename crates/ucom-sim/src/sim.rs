@@ -12,11 +12,11 @@ const MASTER_US: u64 = 250_000;
 /// Period of frames of another protocol, µs.
 const FOREIGN_US: u64 = 40_000;
 
-/// Boards of a chain and the other senders on their bus, as members of a bus that the caller runs.
+/// Boards of a chain and the other senders on their bus. They are members of a bus that the caller runs.
 ///
-/// Member 0 is the first board; the last member is not a board but the source of all frames that faults bring onto the bus.
-/// Call [`advance`](Self::advance), then [`poll`](Self::poll) each member, put its frame on the bus, and report the result with
-/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent) and to the others with [`receive`](Self::receive).
+/// Member 0 is the first board. The last member is not a board: it sends all frames that faults bring onto the bus. Call
+/// [`advance`](Self::advance), then [`poll`](Self::poll) each member and put its frame on the bus. Report the result to the member with
+/// [`sent`](Self::sent) or [`not_sent`](Self::not_sent), and pass the frame to the other members with [`receive`](Self::receive).
 pub struct ChainSim {
     boards: Vec<Board>,
     profile: Profile,
@@ -26,11 +26,11 @@ pub struct ChainSim {
     waiting: Vec<Fault>,
     /// Active faults, and the times when they end.
     holding: Vec<(u64, Fault)>,
-    /// Number of times that each identifier was on the bus, for faults triggered by a frame.
+    /// Number of times that each identifier was on the bus, for faults that a frame triggers.
     seen: BTreeMap<u16, u64>,
     /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
-    /// Members whose frames in transmission are void, because their controllers were reset.
+    /// Members whose frames in transmission are no longer valid, because their controllers were reset.
     void: Vec<usize>,
     lost: f64,
     corrupted: f64,
@@ -41,7 +41,7 @@ pub struct ChainSim {
 }
 
 impl ChainSim {
-    /// Creates a chain at power-up. `profile` defines how the fault `foreign-master` sends.
+    /// Creates a chain at power-up. `profile` defines the frames of the fault `foreign-master`.
     pub fn new(config: &ChainConfig, faults: Vec<Fault>, seed: u64, profile: &Profile) -> Self {
         let board = |(i, board)| Board::new(board, i == 0, seed.wrapping_mul(31).wrapping_add(i as u64));
         let boards: Vec<Board> = config.boards.iter().enumerate().map(board).collect();
@@ -67,7 +67,7 @@ impl ChainSim {
         sim
     }
 
-    /// Returns the number of boards, plus one.
+    /// Returns the number of members: the boards and one more.
     pub fn members(&self) -> usize {
         self.boards.len() + 1
     }
@@ -77,7 +77,7 @@ impl ChainSim {
         self.boards.iter().map(Board::state)
     }
 
-    /// Returns a status that no board can have, with the board's position. Such a status shows an error in the node (section 4.1).
+    /// Returns a status that no board can have, with the board's position. Such a status shows an error in the node's code (section 4.1).
     pub fn violation(&self) -> Option<(usize, &'static str)> {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
@@ -102,7 +102,7 @@ impl ChainSim {
         std::mem::take(&mut self.void)
     }
 
-    /// Returns the next frame of a member, if it has one now.
+    /// Returns the next frame of a member, if it has one to send now.
     pub fn poll(&mut self, member: usize) -> Option<Frame> {
         match self.boards.get_mut(member) {
             Some(board) if board.next_us() > self.now_us => None,
@@ -133,17 +133,17 @@ impl ChainSim {
         } else if let (Ok(id), true) = (u16::try_from(id), format == Format::BUS)
             && let Some(frame) = Frame::new(id, data)
         {
-            // The last member receives each frame except its own once, so frames are counted there for triggers.
+            // The last member receives every frame except its own, each once. Therefore frames are counted here for triggers.
             self.count(&frame);
         }
     }
 
-    /// Returns `true` if a member takes part in the bus. Without power it does not even acknowledge.
+    /// Returns `true` if a member takes part in the bus. A board without power does not even acknowledge frames.
     pub fn is_powered(&self, member: usize) -> bool {
         self.boards.get(member).is_none_or(|board| !board.unpowered)
     }
 
-    /// Begins a fault now or when it is due. The time of its trigger counts from now.
+    /// Begins a fault now or when it is due. A trigger time is measured from now.
     pub fn inject(&mut self, mut fault: Fault) {
         match &mut fault.trigger {
             Trigger::At(at) => *at += self.now_us,
@@ -152,10 +152,9 @@ impl ChainSim {
         self.waiting.push(fault);
     }
 
-    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients. Returns the data not at all, once or
-    /// twice.
+    /// Applies the faults `lost`, `corrupted` and `doubled` to data between chain and clients. Returns zero, one or two copies of the data.
     pub fn through(&mut self, data: &[u8]) -> Vec<Vec<u8>> {
-        // Always draws the same number of random values, so that one setting does not change the effect of others.
+        // Always draws the same number of random values, so that the setting of one fault does not change the effect of the others.
         let [lost, corrupted, doubled, place] = [self.chance(), self.chance(), self.chance(), self.chance()];
         if lost < self.lost {
             return Vec::new();
@@ -191,7 +190,7 @@ impl ChainSim {
         }
     }
 
-    /// Gives a board the number of the previous board, if that has one.
+    /// Gives a board the number of the previous board, if the previous board has one.
     fn share_number(&mut self, i: usize) {
         let number = self.boards.get(i.wrapping_sub(1)).and_then(|before| before.state().number);
         if let (Some(number), Some(board)) = (number.and_then(Sequence::new), self.boards.get_mut(i)) {
@@ -208,7 +207,7 @@ impl ChainSim {
         (self.random >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Returns the next frame of other senders on the bus.
+    /// Returns the next frame of the other senders on the bus.
     fn others(&mut self) -> Option<Frame> {
         if self.master_at.is_some_and(|at| at <= self.now_us) {
             self.master_at = Some(self.now_us + MASTER_US);

@@ -1,4 +1,4 @@
-//! Chains in virtual time on a bus of these tests: one frame per 100 µs, the lowest identifier first.
+//! Chains in virtual time on a simple test bus: one frame per 100 µs, the lowest identifier first.
 use super::*;
 use ucom::node::Phase;
 use ucom::{Format, Frame, Profile};
@@ -18,7 +18,7 @@ impl Bench {
         Self { sim: ChainSim::new(&chain, faults, seed, &profile), now_us: 0, received: Vec::new() }
     }
 
-    /// Lets time pass; one frame at a time is on the bus.
+    /// Lets time pass. Only one frame at a time is on the bus.
     fn pass(&mut self, ms: u64) {
         let end = self.now_us + ms * 1000;
         let mut waiting: Vec<Option<Frame>> = vec![None; self.sim.members()];
@@ -51,7 +51,7 @@ impl Bench {
         }
     }
 
-    /// Sends a frame of the PC; returns the frames of the boards within a time.
+    /// Sends a frame of the PC. Returns the frames that boards send within a time.
     fn ask(&mut self, text: &str, ms: u64) -> Vec<String> {
         let frame: Frame = text.parse().unwrap();
         self.sim.advance(self.now_us);
@@ -69,7 +69,7 @@ impl Bench {
     }
 }
 
-/// Equal seeds and equal frames at equal times give the same bus, fault by fault.
+/// Equal seeds, and equal frames at equal times, give the same frames and faults on the bus.
 #[test]
 fn the_same_seed_gives_the_same_frames() {
     let run = |seed| {
@@ -89,7 +89,7 @@ fn the_same_seed_gives_the_same_frames() {
     assert_ne!(first, run(2));
 }
 
-/// D-26: a board that crashes reports unasked and has no number; the wire after it becomes inactive.
+/// D-26: a board that crashes sends a report without a request and loses its number. The wire after it becomes inactive.
 #[test]
 fn d26_a_crash_is_one_report_and_a_lost_number() {
     let mut bench = Bench::new(3, "", 1);
@@ -110,7 +110,7 @@ fn d26_a_crash_is_one_report_and_a_lost_number() {
     );
 }
 
-/// Power loss: silence, then a board in its initial state with its flash unchanged.
+/// After a power loss, a board is silent. When power returns, it is in its initial state and its flash is unchanged.
 #[test]
 fn power_loss_leaves_the_flash() {
     let mut bench = Bench::new(1, "[[fault]]\nkind = 'power-loss'\nboard = 1\nat_s = 0.4\nfor_s = 0.3", 1);
@@ -127,7 +127,7 @@ fn power_loss_leaves_the_flash() {
     assert_eq!(state.status.to_string(), "ASTART EXLRUN IPINIT", "ASTART is in lasting memory");
 }
 
-/// Section 8: nothing drives the axes without a PC.
+/// Section 8: the axes are not driven if the PC is lost.
 #[test]
 fn d50_outputs_are_safe_when_the_pc_is_lost() {
     let mut bench = Bench::new(1, "", 1);

@@ -1,4 +1,5 @@
-//! Frames in words. The decoder follows answers of several frames, to distinguish a package of a string from a head.
+//! Descriptions of frames in words. The decoder keeps track of answers of several frames, to distinguish packages of strings from first
+//! frames.
 
 use std::collections::BTreeMap;
 
@@ -8,28 +9,28 @@ use ucom::{
     StringAssembler, ToBoard,
 };
 
-/// A frame in words.
+/// Description of a frame.
 pub struct Described {
     /// Function, or the reason why the frame is foreign.
     pub name: String,
-    /// `PC`, `board 3`, or both if the identifier does not show it.
+    /// Sender: `PC`, `board 3`, or both if the identifier does not show it.
     pub who: String,
-    /// Contents.
+    /// Contents as text.
     pub text: String,
-    /// Contents for programs.
+    /// Contents as JSON.
     pub value: Value,
 }
 
-/// Reads a bus frame by frame.
+/// Decoder of the frames on a bus, in their order.
 pub struct Decoder {
     profile: Profile,
     answers: BTreeMap<(Function, Sequence), Answer>,
 }
 
-/// An answer of several frames, as far as received.
+/// The received part of an answer of several frames.
 struct Answer {
     strings: Box<StringAssembler>,
-    /// Strings that are still to come; `None` before the head.
+    /// Number of strings that are still missing; `None` before the first frame.
     left: Option<u32>,
     last_us: u64,
 }
@@ -40,7 +41,7 @@ impl Decoder {
         Self { profile, answers: BTreeMap::new() }
     }
 
-    /// Returns a frame in words.
+    /// Returns the description of a frame.
     pub fn describe(&mut self, now_us: u64, frame: &Result<Frame, Foreign>) -> Described {
         let frame = match frame {
             Ok(frame) => frame,
@@ -53,7 +54,7 @@ impl Decoder {
         let from_pc = match function.sender() {
             Sender::Pc => Some(true),
             Sender::Board => Some(false),
-            // With data it is always the answer of a board (D-12); only the PC sends broadcasts (D-05).
+            // A frame of this function with data is always the answer of a board (D-12). Only the PC sends broadcasts (D-05).
             Sender::Both if function == Function::DumpIo => Some(frame.dlc() == 0),
             Sender::Both if Some(sequence) == self.profile.broadcast_number() => Some(true),
             Sender::Both => None,
@@ -220,13 +221,13 @@ fn admin_value(admin: ucom::Admin) -> Value {
     json!({ "run": admin.run, "active": admin.active, "debug": admin.debug, "global_debug": admin.global_debug })
 }
 
-/// Bytes as `11 22`.
+/// Returns bytes in the form `11 22`.
 pub fn hex(bytes: &[u8]) -> String {
     let all: Vec<String> = bytes.iter().map(|b| format!("{b:02X}")).collect();
     all.join(" ")
 }
 
-/// Returns a flash date as text, `2026-05-04`; the bare number if it does not fit the profile's form.
+/// Returns a flash date as text such as `2026-05-04`. If the number is not a date in the profile's form, returns the number.
 pub fn date_text(profile: &Profile, date: u16) -> String {
     match profile.prog_date.decode(date) {
         Some((year, month, day)) => format!("{year:04}-{month:02}-{day:02}"),

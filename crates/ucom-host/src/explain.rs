@@ -1,13 +1,13 @@
-//! Meaning of displayed words, and the next step: status bits, states, heartbeats, events, outcomes, errors.
+//! Explanations of the words that the tools display: meaning and next step of status bits, states, heartbeats, events, outcomes and errors.
 
 use ucom::ErrorCode;
 
-/// A word of a screen.
+/// A displayed word.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Word {
     /// Family of the word.
     pub family: &'static str,
-    /// Displayed forms; the first one is the name.
+    /// Displayed forms. The first one is the name.
     pub shown: Vec<String>,
     /// Meaning.
     pub meaning: String,
@@ -15,7 +15,7 @@ pub struct Word {
     pub next: String,
 }
 
-/// Family, displayed words, meaning, next step.
+/// Family, displayed forms, meaning, next step.
 type Fixed = (&'static str, &'static [&'static str], &'static str, &'static str);
 
 const BIT: &str = "status bit";
@@ -24,7 +24,7 @@ const HEARTBEAT: &str = "heartbeat of a board";
 const EVENT: &str = "event of ucom run";
 const OUTCOME: &str = "outcome of ucom update";
 
-/// Status bits come first, with bit 7 at the top.
+/// The status bits come first, beginning with bit 7.
 const WORDS: [Fixed; 38] = [
     (BIT, &["MSTART", "M"], "The application has been started by the exloader.", "ucom stop N ends it"),
     (
@@ -181,7 +181,8 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// Returns the matching words: exactly as shown (single letters by their case), in any case, or as a part.
+/// Returns the words that match exactly. If there are none, returns the words that match without regard to letter case and punctuation. If
+/// there are none of these either, returns the words that contain the query, which needs at least 3 letters for this.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()
@@ -211,7 +212,7 @@ mod tests {
         assert!(find(all, word).iter().any(|w| w.family == family), "{word}");
     }
 
-    /// Status bits, states, heartbeats and errors, as the screens show them.
+    /// The displayed status bits, states, heartbeats and errors are all explained.
     #[test]
     fn every_word_on_a_screen_is_explained() {
         let all = words();

@@ -19,7 +19,7 @@ pub enum ProfileFileError {
         /// The most similar key.
         nearest: Option<&'static str>,
     },
-    /// A value outside the key's range.
+    /// A value is outside the key's range.
     #[error("profile: {key} = {value}, but it must be {range}; see `ucom help profile`")]
     Value {
         /// The key.
@@ -64,13 +64,13 @@ fn flatten(prefix: &str, table: toml::Table, out: &mut Vec<(String, toml::Value)
     }
 }
 
-/// Profile in a file.
+/// Reading and writing of a profile as a file.
 pub trait ProfileFile: Sized {
     /// Reads a profile from TOML. Missing keys keep their defaults.
     ///
     /// # Errors
     ///
-    /// Text that is not TOML, unknown keys, and values out of range: each error names the allowed values.
+    /// The text is not TOML, a key is unknown, or a value is out of range. Each error lists the allowed values.
     fn from_toml(text: &str) -> Result<Self, ProfileFileError>;
 
     /// Returns all keys as TOML, each with its meaning in a comment.

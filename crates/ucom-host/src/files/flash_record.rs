@@ -1,7 +1,6 @@
-//! Flash records in the inventory: the image that this tool wrote to a board and read back.
+//! Flash records in the inventory. A record describes the image that this tool wrote to a board and read back.
 //!
-//! A board answers with Program ID and flash date only. The record adds what that answer does not cover: the hash of the
-//! image and its load address.
+//! A board answers only with Program ID and flash date. The record adds the hash of the image and its load address.
 
 use core::fmt::Write as _;
 use serde::{Deserialize, Deserializer, de};
@@ -12,32 +11,32 @@ use ucom::BoardInfo;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FlashRecord {
-    /// Flash number of the board that got the image. A record that was copied to another board proves nothing.
+    /// Flash number of the board that received the image. A record that was copied to another board is not valid.
     pub flash_number: u16,
     /// SHA-256 of the bytes in wire order.
     #[serde(deserialize_with = "hash")]
     pub sha256: [u8; 32],
-    /// Load address, words.
+    /// Load address in words.
     pub address: u32,
-    /// Program ID that the board showed afterwards.
+    /// Program ID that the board reported afterwards.
     pub program_id: u16,
-    /// Flash date that the board showed afterwards, 16 bits in the profile's form.
+    /// Flash date that the board reported afterwards: 16 bits in the profile's form.
     pub date: u16,
 }
 
 impl FlashRecord {
-    /// Creates the record of an image, with the answer of the board after the write.
+    /// Creates the record of an image; `shown` is the answer of the board after the write.
     pub fn new(bytes: &[u8], address_words: u32, shown: &BoardInfo) -> Self {
         let BoardInfo { flash_number, program_id, date, .. } = *shown;
         Self { flash_number, sha256: hash_of(bytes), address: address_words, program_id, date }
     }
 
-    /// Returns `true` if the image has the recorded bytes and the recorded address.
+    /// Returns `true` if the image has the recorded hash and load address.
     pub fn is_of(&self, bytes: &[u8], address_words: u32) -> bool {
         self.sha256 == hash_of(bytes) && self.address == address_words
     }
 
-    /// Returns the record as an inline table of TOML.
+    /// Returns the record as an inline TOML table.
     pub(super) fn to_toml(self) -> String {
         let hash = self.sha256.iter().fold(String::new(), |mut text, byte| {
             // Writing to a string never fails.

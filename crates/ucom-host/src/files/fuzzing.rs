@@ -1,4 +1,4 @@
-//! Body of the fuzz targets: every file reader on any bytes. A panic or a violated property is a finding.
+//! Bodies of the fuzz targets: every file reader reads arbitrary bytes. A panic or a violated property is an error.
 
 use std::io::Cursor;
 use ucom::Profile;
@@ -32,7 +32,7 @@ pub fn image(data: &[u8]) {
 
 /// Reads recordings in every format. A recording that was read and written again in the same format is unchanged.
 pub fn recording(data: &[u8]) {
-    // Text formats count microseconds, and a written recording is complete.
+    // Text formats have times in whole microseconds, and a written recording is complete.
     let as_written = |recording: &mut Recording| {
         recording.records.iter_mut().for_each(|r| r.time_ns -= r.time_ns % 1000);
         recording.broken_off = None;
@@ -70,7 +70,7 @@ pub fn inventory(data: &[u8]) {
     }
 }
 
-/// Reads signal tables. For every signal, the displayed text of a word gives that word again, unless a limit forbids it.
+/// Reads signal tables. For every signal, the displayed text of a word must be read as the same word, unless a limit forbids it.
 pub fn edges(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(table) = SignalTable::parse(text) else { return };
@@ -84,9 +84,9 @@ pub fn edges(data: &[u8]) {
                         signal.text_with_unit(word).parse().expect("what is shown can be given");
                     let (again, text) = (signal.word(&given), signal.text(word));
                     let limited = signal.min.is_some() || signal.max.is_some();
-                    // An offset far larger than the scale leaves no digits for the scale.
+                    // If the offset is far larger than the scale, a displayed value has too few digits to distinguish words.
                     let coarse = signal.offset.abs() > signal.scale.abs() * 1e9;
-                    // A scaled signal without a unit accepts only the word itself.
+                    // A scaled signal without a unit accepts only raw words.
                     let no_unit = signal.unit.is_empty() && (signal.scale != 1.0 || signal.offset != 0.0);
                     if no_unit && matches!(again, Err(super::signals::ValueError::NoUnit { .. })) {
                         continue;
@@ -102,8 +102,8 @@ pub fn edges(data: &[u8]) {
     }
 }
 
-/// Reads parameter files. A file that was read is checked against a board. The valid values are written as a text that gives the same
-/// words.
+/// Reads parameter files and checks them against a board. The valid values are then written as a text, which must give the same words
+/// again.
 pub fn params(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(file) = ParamsFile::parse(text) else { return };

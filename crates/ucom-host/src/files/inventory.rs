@@ -1,4 +1,5 @@
-//! Inventory files: positions of the boards. An inventory is written after an init and read before updates of several boards.
+//! Inventory files, which list the boards and their positions in the chain. An inventory is written after an init and read before an update
+//! of several boards.
 //!
 //! ```toml
 //! [[board]]
@@ -9,8 +10,8 @@
 //! program = { flash_number = 0x0021, sha256 = "…", address = 0x0, program_id = 0x4B3F, date = 0x3AC1 }
 //! ```
 //!
-//! `program` is the [`FlashRecord`] of the last update that was read back. Updates change this key only. Everything else in the file
-//! stays as it is, comments included.
+//! `program` is the [`FlashRecord`] of the last update that was read back. An update changes only this key. Everything else in the file
+//! stays unchanged, including comments.
 
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts, write_whole};
 use serde::Deserialize;
@@ -21,7 +22,7 @@ use toml_edit::{DocumentMut, Item, TableLike, Value};
 use super::FlashRecord;
 use crate::master::InitReport;
 
-/// Longest file that is read, bytes.
+/// Size limit of a file in bytes.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// Board of an inventory.
@@ -32,7 +33,7 @@ pub struct InventoryBoard {
     pub number: u8,
     /// Flash number.
     pub flash_number: u16,
-    /// Description that the board reports.
+    /// Description reported by the board.
     #[serde(default)]
     pub description: String,
     /// Name given by the user.
@@ -83,40 +84,40 @@ pub enum InventoryError {
         /// Its size.
         bytes: u64,
     },
-    /// The text is not TOML of this form; the message names the line.
+    /// The text is not TOML of this form. The message contains the line.
     #[error("{0}")]
     Form(String),
-    /// Number that no board can have.
+    /// A number is higher than any board can have.
     #[error("board number {number} is above 31")]
     Number {
         /// The number.
         number: u8,
     },
-    /// Two boards at one position.
+    /// Two boards have the same position.
     #[error("board {number} is given twice")]
     Twice {
         /// Board number.
         number: u8,
     },
-    /// Two positions for one board.
+    /// A board has two positions.
     #[error("flash number 0x{flash_number:04X} is given to boards {first} and {second}; it must be unique")]
     FlashTwice {
         /// The flash number.
         flash_number: u16,
-        /// Number of one board.
+        /// Number of the first board.
         first: u8,
-        /// Number of the other.
+        /// Number of the second board.
         second: u8,
     },
 }
 
-/// Reasons why the board at a number is not known.
+/// Reasons why the flash number of a board is not known.
 #[derive(Debug, thiserror::Error)]
 pub enum IdentifyError {
     /// The inventory does not exist.
     #[error("which board stands at number {board}? there is no inventory {}", path.display())]
     NoInventory {
-        /// The number.
+        /// The board number.
         board: u8,
         /// The file.
         path: PathBuf,
@@ -124,7 +125,7 @@ pub enum IdentifyError {
     /// The inventory does not list the board.
     #[error("board {board} is not in the inventory {}", path.display())]
     NotListed {
-        /// The number.
+        /// The board number.
         board: u8,
         /// The file.
         path: PathBuf,
@@ -205,7 +206,7 @@ impl Inventory {
         write_whole(path, self.to_toml().as_bytes()).map_err(io)
     }
 
-    /// Adds a board. Refuses numbers above 31, a position that is taken, and a flash number that is already known.
+    /// Adds a board. Refuses a number above 31, a position that is already used, and a flash number that is already listed.
     pub fn insert(&mut self, board: InventoryBoard) -> Result<(), InventoryError> {
         let number = board.number;
         if number > 31 {
@@ -232,10 +233,10 @@ impl Inventory {
         self.boards.values()
     }
 
-    /// Returns the boards of an init, with the names and flash records of an older inventory.
+    /// Returns the boards of an init. Names and flash records come from an older inventory.
     ///
     /// # Errors
-    /// Two boards have one flash number.
+    /// Two boards have the same flash number.
     pub fn of_init(report: &InitReport, older: Option<&Self>) -> Result<Self, InventoryError> {
         let mut inventory = Self::default();
         for board in &report.boards {
@@ -252,7 +253,7 @@ impl Inventory {
         Ok(inventory)
     }
 
-    /// Takes over names and flash records of an older inventory, by flash number.
+    /// Copies names and flash records from an older inventory; boards are matched by flash number.
     pub fn keep(&mut self, older: &Self) {
         for board in self.boards.values_mut() {
             let Some(known) = older.boards.values().find(|b| b.flash_number == board.flash_number) else {
@@ -265,7 +266,7 @@ impl Inventory {
         }
     }
 
-    /// Returns the boards without their flash records: records of a deleted file prove nothing.
+    /// Returns the boards without their flash records, because records of a deleted file are not reliable.
     #[must_use]
     pub fn without_records(mut self) -> Self {
         self.boards.values_mut().for_each(|board| board.program = None);
@@ -275,7 +276,7 @@ impl Inventory {
     /// Sets or removes the flash record of a board in an inventory file, and changes nothing else in it.
     ///
     /// # Errors
-    /// The file cannot be read or written. A board that the file does not list is not an error: no record of it is kept.
+    /// The file cannot be read or written. If the file does not list the board, nothing is stored, and no error is returned.
     pub fn set_record(
         path: &Path,
         flash_number: u16,
@@ -311,7 +312,7 @@ impl Inventory {
         write_whole(path, document.to_string().as_bytes()).map_err(io)
     }
 
-    /// Returns the file's text.
+    /// Returns the inventory as the text of a file.
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Boards of the chain, by position.\n");
         for board in self.boards.values() {
@@ -330,7 +331,7 @@ impl Inventory {
     }
 }
 
-/// Returns a basic string of TOML.
+/// Returns a text as a basic string of TOML.
 fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {

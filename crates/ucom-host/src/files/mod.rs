@@ -1,4 +1,4 @@
-//! Files of the PC side: images, recordings, inventories, meanings of words, parameters, signal databases.
+//! Files on the PC side: images, recordings, inventories, signal tables, parameters, DBC files.
 
 pub mod dbc;
 mod flash_record;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use host_kit::write_whole;
 
-/// Longest file that is read, bytes.
+/// Size limit of a file in bytes.
 pub(crate) const MAX_BYTES: u64 = 1 << 20;
 
 /// A text file that cannot be used at all.
@@ -28,7 +28,7 @@ pub enum TextError {
     },
 }
 
-/// Reads a text, also from a source without a known length, such as a pipe.
+/// Reads a text file. Sources without a known length, such as a pipe, are also accepted.
 pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     let io = |source| TextError::Io { path: path.into(), source };
     let mut text = String::new();
@@ -40,22 +40,22 @@ pub(crate) fn read_text(path: &Path) -> Result<String, TextError> {
     Ok(text)
 }
 
-/// Writes a file atomically. If the path is a link, its target is written; an existing file keeps its mode.
+/// Writes a file atomically. If the path is a link, its target is written. An existing file keeps its mode.
 ///
 /// # Errors
 ///
-/// Error of the system. The file is unchanged in this case.
+/// The system returned an error. In this case the file is unchanged.
 pub fn write_text(path: &Path, text: &str) -> Result<(), TextError> {
     write_whole(path, text.as_bytes()).map_err(|source| TextError::Io { path: path.into(), source })
 }
 
-/// Returns a basic string of TOML, which is also a double-quoted scalar of YAML.
+/// Returns a text as a basic string of TOML. The result is also a double-quoted scalar of YAML.
 pub(crate) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
         match c {
             '"' | '\\' => out.extend(['\\', c]),
-            // YAML treats these as line ends or does not allow them.
+            // YAML reads these characters as line ends or does not allow them.
             c if c.is_control()
                 || matches!(c, '\u{2028}' | '\u{2029}' | '\u{FEFF}' | '\u{FFFE}' | '\u{FFFF}') =>
             {

@@ -1,8 +1,8 @@
-//! DBC files: the protocol's frames, and the process data of known boards by name, for cantools, SavvyCAN and the like.
+//! DBC files for cantools, SavvyCAN and similar tools. They describe the protocol's frames, and the process data of known boards by name.
 //!
-//! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15).
-//! Packages of strings share an identifier with other frames and have no mark of their own, so DSP_INFO and the IO
-//! description show their first frame's fields; debug texts and program data are raw bytes.
+//! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15). Packages of strings have
+//! the same identifier as other frames, and nothing in them shows that they are strings. For DSP_INFO and the IO description the file
+//! therefore describes only the first frame. Debug texts and program data are raw bytes.
 mod names;
 #[cfg(test)]
 mod tests;
@@ -17,7 +17,7 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 /// An input, output or parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSignal {
-    /// Name of the signal; converted to an identifier.
+    /// Name of the signal. It is converted to an identifier.
     pub name: String,
     /// Meaning of its word (D-11).
     pub signal: Signal,
@@ -28,7 +28,7 @@ pub struct NamedSignal {
 pub struct DbcBoard {
     /// Board number.
     pub number: u8,
-    /// The controller inputs, one each.
+    /// The controller inputs, one entry each.
     pub ci: Vec<NamedSignal>,
     /// The sensor outputs.
     pub so: Vec<NamedSignal>,
@@ -54,11 +54,11 @@ struct DbcSignal {
     name: String,
     /// First byte.
     byte: usize,
-    /// Bit in that byte, for fields of less than a byte.
+    /// First bit in that byte, for fields of less than a byte.
     bit: usize,
     bits: usize,
     signed: bool,
-    /// ` M` or ` m3`, or nothing.
+    /// DBC multiplexer mark: ` M`, ` m3`, or empty.
     multiplex: String,
     /// Scale, offset and unit, if they are known.
     signal: Option<Signal>,
@@ -70,7 +70,7 @@ impl DbcSignal {
     }
 
     fn line(&self, endian: Endian, receiver: &str) -> String {
-        // Motorola order counts from the field's most significant bit, which is in its first byte.
+        // In Motorola order the start bit is the field's most significant bit, which is in its first byte.
         let big = endian == Endian::Big && self.bits > 8;
         let start = self.byte * 8 + if big { 7 } else { self.bit };
         let (order, sign) = (u8::from(!big), if self.signed { '-' } else { '+' });
@@ -81,7 +81,7 @@ impl DbcSignal {
         };
         let Self { name, multiplex, bits, signal, .. } = self;
         let (scale, offset, unit) = signal.as_ref().map_or((1.0, 0.0, ""), |e| (e.scale, e.offset, &e.unit));
-        // The shortest number for the limit, without rounding errors.
+        // Writes the limit with as few digits as possible, without rounding errors.
         let limit = |text: String| text.parse::<f64>().map_or(text, |n| n.to_string());
         let (low, high) = match signal {
             Some(signal) if signal.known && signal.kind != SignalType::Hex => {
@@ -96,7 +96,7 @@ impl DbcSignal {
     }
 }
 
-/// Returns the text of a DBC file for these boards, with the byte order of their words.
+/// Returns the text of a DBC file for these boards; `endian` is the byte order of their words.
 ///
 /// Boards with numbers above 31 are left out. The broadcasts of the PC are always included.
 pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
@@ -149,7 +149,7 @@ pub fn dbc(boards: &[DbcBoard], endian: Endian) -> String {
     text
 }
 
-/// Returns the fields of a function whose layout is equal for all boards.
+/// Returns the fields of a function whose layout is the same for all boards.
 fn fields(function: Function) -> Vec<DbcSignal> {
     let status = |byte| {
         let bits = Status::NAMES.iter().enumerate();
@@ -188,7 +188,7 @@ fn fields(function: Function) -> Vec<DbcSignal> {
     }
 }
 
-/// Returns the signals of a buffer: the offset selects three words each.
+/// Returns the signals of a buffer. Each offset selects three words.
 fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
     let offset = DbcSignal { multiplex: " M".into(), ..DbcSignal::field("offset", 0, 16) };
     let mut fields = vec![offset];
@@ -208,7 +208,7 @@ fn multiplexed(signals: &[NamedSignal], kind: &str) -> Vec<DbcSignal> {
 }
 
 fn message(text: &mut String, function: Function, number: Sequence, signals: Vec<DbcSignal>, endian: Endian) {
-    // Boards without signals never send the message, so it needs no selector.
+    // A board without signals never sends this message, so the message needs no multiplexer.
     let signals = if signals.len() == 1 && signals[0].multiplex == " M" { Vec::new() } else { signals };
     let length = match function {
         Function::Ci | Function::So | Function::Par | Function::DspCi => 8,
@@ -222,7 +222,7 @@ fn message(text: &mut String, function: Function, number: Sequence, signals: Vec
     };
     let (sender, receiver) = match function.sender() {
         Sender::Board => (board.as_str(), "PC"),
-        // A broadcast is from the PC; most frames under a board's own number are from that board.
+        // The PC sends the broadcasts. Most other frames with a board's number come from that board.
         Sender::Both if number != Sequence::ZERO => (board.as_str(), "PC"),
         _ => ("PC", board.as_str()),
     };

@@ -1,10 +1,10 @@
 //! Names of signals: unique C identifiers of at most 32 characters, made from free texts.
 
 use std::collections::BTreeSet;
-/// Longest name that every reader of DBC files accepts.
+/// Longest name that all readers of DBC files accept.
 const MAX: usize = 32;
 
-/// Words with another meaning to a reader of DBC files or to a C compiler.
+/// Words that have another meaning for a reader of DBC files or a C compiler.
 const RESERVED: [&str; 44] = [
     "auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum",
     "extern", "float", "for", "goto", "if", "int", "long", "register", "return", "short", "signed", "sizeof",
@@ -19,12 +19,12 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// Creates names that differ from the taken ones.
+    /// Creates a set of names that excludes the names in `taken`.
     pub(super) fn without(taken: &[&str]) -> Self {
         Self { used: taken.iter().map(|name| name.to_ascii_lowercase()).collect() }
     }
 
-    /// Returns the name for a text; `fallback` if the text has no letter or digit at all.
+    /// Returns the name for a text; `fallback` if the text has no letter or digit.
     pub(super) fn name(&mut self, text: &str, fallback: &str) -> String {
         let mut base = identifier(text);
         if base.is_empty() {
@@ -43,7 +43,7 @@ impl Names {
     }
 }
 
-/// Returns letters, digits and underscores only, umlauts as two letters; empty if nothing is left.
+/// Returns the text with letters, digits and underscores only; an umlaut becomes two letters. The result may be empty.
 fn identifier(text: &str) -> String {
     let mut name = String::new();
     for c in text.chars() {

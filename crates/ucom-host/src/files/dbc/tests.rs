@@ -1,4 +1,4 @@
-//! Tests with the crate `can-dbc`: it reads the files, and its result is used to decode frames.
+//! Tests with the crate `can-dbc`. It reads the files, and the tests decode frames with its result.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;
@@ -26,7 +26,7 @@ fn message(dbc: &Dbc, id: u16) -> &Message {
     dbc.messages.iter().find(|m| m.id == MessageId::Standard(id)).unwrap_or_else(|| panic!("no {id:03X}"))
 }
 
-/// Returns a signal's value by the rules of the DBC format alone, bit by bit.
+/// Computes a signal's value bit by bit, from the rules of the DBC format alone.
 fn value(signal: &Signal, data: &[u8]) -> i64 {
     let bit = |n: u64| i64::from(data[n as usize / 8] >> (n % 8) & 1);
     let mut raw = 0_i64;
@@ -45,7 +45,7 @@ fn value(signal: &Signal, data: &[u8]) -> i64 {
     raw
 }
 
-/// Returns the decoded signals of a frame, multiplexed ones only if they apply.
+/// Returns the decoded signals of a frame. Multiplexed signals are included only if the frame carries them.
 fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     let message = message(dbc, frame.id());
     let data = frame.payload().padded();
@@ -60,7 +60,7 @@ fn decode(dbc: &Dbc, frame: &Frame) -> Vec<(String, i64)> {
     message.signals.iter().filter(applies).map(|s| (s.name.clone(), value(s, &data))).collect()
 }
 
-/// P-21: process data have the names of their descriptions, and equal numbers in both byte orders.
+/// P-21: process data have the names of the description, and the same values in both byte orders.
 #[test]
 fn p21_so_frames_decode_by_name() {
     let numbers = [100_i16, -20, 32767, -32768, 5];
@@ -107,7 +107,7 @@ fn d11_signals_carry_scale_offset_and_unit() {
     assert!(text.contains("(0.01,0) [-60|60] \"deg\""), "{text}");
 }
 
-/// Limits are written without digits that only come from the calculation.
+/// Limits are written without digits that come only from floating-point arithmetic.
 #[test]
 fn d11_ranges_of_signals_are_short() {
     let table = "[[program]]\nprogram_id = 1\nso.tenths = { scale = 0.1 }\nso.odd = { scale = 0.1, min = -0.125, max = 7.25 }\n\
@@ -123,7 +123,7 @@ fn d11_ranges_of_signals_are_short() {
     Dbc::try_from(text.as_str()).expect("a DBC file");
 }
 
-/// The golden frame of a board's information, and a SETSTATUS.
+/// Decodes the golden frame of a board's information, and a PC_SETSTATUS.
 #[test]
 fn static_messages_decode() {
     let text = dbc(&boards(), Endian::Little);

@@ -1,31 +1,32 @@
-//! Format of a file without a format option: records by their first line, raw bytes only if they cannot be text.
+//! Detects the format of a file if no format option is set. Intel HEX and S-records are detected by their first line; other content is
+//! accepted as raw bytes only if it cannot be text.
 //!
-//! If a text were read as raw bytes, it would be flashed, read back and called verified, and the board would have no program any more.
-//! Therefore raw bytes are only read from a `.bin` without printable text. With the option for raw bytes other names are accepted as
-//! well, and a text from a `.bin`. Records are never read as raw bytes, not even damaged records.
+//! If a text were read as raw bytes, it would be flashed, read back and reported as verified, and the board would have no program any more.
+//! Therefore raw bytes are only read from a `.bin` file without printable text. With the option for raw bytes, files with other names are
+//! accepted as well, and text in a `.bin` file. Records are never read as raw bytes, even if they are damaged.
 
 use super::{Format, ImageError, segments::lines};
 use std::path::Path;
 
-/// Percentage of printable bytes from which a content counts as a text.
+/// Minimum percentage of printable bytes in a text.
 const TEXT_PERCENT: usize = 90;
-/// Percentage of hexadecimal digits from which a line counts as a record, whole or damaged.
+/// Minimum percentage of hexadecimal digits in a line that is considered a record, complete or damaged.
 const HEX_PERCENT: usize = 80;
 const MARKED_PERCENT: usize = 50;
-/// Length of the part of a text that is shown, characters.
+/// Number of characters of a text that an error message shows.
 const SHOWN: usize = 24;
 
-/// Bytes that editors put before a text, and their meaning.
+/// Byte order marks that editors write before a text, and their encodings.
 const MARKS: [(&[u8], &str); 3] =
     [(b"\xEF\xBB\xBF", "UTF-8"), (b"\xFF\xFE", "UTF-16"), (b"\xFE\xFF", "UTF-16")];
 
 impl Format {
-    /// Detects the format by content: the first line that is a record decides; a content without records is raw bytes.
+    /// Detects the format by content. The first line that is a record decides; content without records is raw bytes.
     pub fn detect(content: &[u8]) -> Self {
         record_form(content).unwrap_or(Self::Bin)
     }
 
-    /// Returns the format of a file of this name, if no option names it: raw bytes only from a `.bin`, and never text.
+    /// Returns the format of a file if no option sets it. Only a `.bin` file can be raw bytes, and a text never is.
     pub(super) fn of(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         let by_name = extension(name);
         let expected = by_name.as_deref().and_then(Self::by_extension);
@@ -53,7 +54,7 @@ impl Format {
         }
     }
 
-    /// Checks raw bytes that an option requests: never an executable or records, and a text only from a `.bin`.
+    /// Checks a file that an option declares as raw bytes. Executables and records are refused; text is accepted only from a `.bin` file.
     pub(super) fn raw(name: Option<&Path>, content: &[u8]) -> Result<Self, ImageError> {
         if content.starts_with(b"\x7fELF") {
             return Err(ImageError::Elf);
@@ -73,7 +74,7 @@ impl Format {
         }
     }
 
-    /// Returns the format of files whose names end with this extension.
+    /// Returns the format of files with this extension.
     fn by_extension(extension: &str) -> Option<Self> {
         match extension {
             "hex" | "ihex" | "ihx" | "h86" => Some(Self::IntelHex),
@@ -87,10 +88,10 @@ fn extension(name: Option<&Path>) -> Option<String> {
     name.and_then(Path::extension).and_then(|e| e.to_str()).map(str::to_ascii_lowercase)
 }
 
-/// Returns the place of the first line that is or may have been a record. The content may be a text in any encoding, with missing or
-/// damaged characters. `None`: the content is not a text, or has no such line.
+/// Returns the place of the first line that is a record or was one before it was damaged. The content may be a text in any encoding, with
+/// missing or damaged characters. `None`: the content is not a text, or has no such line.
 fn record_place(content: &[u8]) -> Option<String> {
-    // Texts with two bytes per character, padding, and end marks of old systems.
+    // Removes bytes that are not letters: zeros of two-byte encodings, padding, and end marks of old systems.
     let letters: Vec<u8> = content.iter().copied().filter(|b| !matches!(b, 0 | 0x1A)).collect();
     let letters = MARKS.iter().find_map(|(mark, _)| letters.strip_prefix(*mark)).unwrap_or(&letters);
     let mut lines = lines(letters);
@@ -100,8 +101,8 @@ fn record_place(content: &[u8]) -> Option<String> {
     Some(format!("line {line}"))
 }
 
-/// Returns `true` if nearly all characters of the line are hexadecimal digits, at least 8 as in the shortest records. For a line with the
-/// mark of a record half of them suffice.
+/// Returns `true` if the line has at least 8 hexadecimal digits, as in the shortest records, and they are nearly all of its characters.
+/// Half of the characters suffice if the line starts with the mark of a record.
 fn was_record(line: &[u8]) -> bool {
     let digits = line.iter().filter(|b| b.is_ascii_hexdigit()).count();
     let percent = match line {
@@ -111,7 +112,7 @@ fn was_record(line: &[u8]) -> bool {
     digits >= 8 && digits * 100 >= line.len() * percent
 }
 
-/// Returns the form of the first line that is a record, ignoring the lines before it.
+/// Returns the format of the first line that is a record. Lines before it are ignored.
 fn record_form(content: &[u8]) -> Option<Format> {
     let hex = |digits: &[u8]| digits.len() >= 8 && digits.iter().all(u8::is_ascii_hexdigit);
     let line = |line: &[u8]| {
@@ -125,14 +126,14 @@ fn record_form(content: &[u8]) -> Option<Format> {
     content.split(|b| matches!(b, b'\r' | b'\n')).find_map(line)
 }
 
-/// Returns `true` if nearly all of the content is printable, with one or two bytes per character.
+/// Returns `true` if nearly all of the content is printable text with one or two bytes per character.
 fn is_text(content: &[u8]) -> bool {
     let printed = |b: &&u8| b.is_ascii_graphic() || matches!(b, b' ' | b'\t' | b'\r' | b'\n');
     let share = |printed: usize, of: usize| of > 0 && printed * 100 >= of * TEXT_PERCENT;
     if share(content.iter().filter(printed).count(), content.len()) {
         return true;
     }
-    // UTF-8 letters beyond ASCII have bytes of their own, control characters do not.
+    // In UTF-8, letters beyond ASCII are allowed; control characters are not.
     let odd = |c: char| c.is_control() && !c.is_ascii_whitespace();
     if core::str::from_utf8(content).is_ok_and(|text| !text.is_empty() && !text.contains(odd)) {
         return true;

@@ -15,13 +15,13 @@ pub enum ImageError {
         /// System error.
         source: std::io::Error,
     },
-    /// No data byte.
+    /// The image has no data byte.
     #[error("the image holds no data")]
     Empty,
-    /// An executable instead of an image.
+    /// The file is an executable instead of an image.
     #[error("this is an ELF file, not an image; `objcopy -O srec` or `-O binary` makes one")]
     Elf,
-    /// A text, and no record in it.
+    /// The file is a text without any record.
     #[error(
         "line 1, column 1: a text and no image, no line is a record of Intel HEX or S-record: \"{starts}…\""
     )]
@@ -29,19 +29,19 @@ pub enum ImageError {
         /// Beginning of the text.
         starts: String,
     },
-    /// An editor has put a mark before the first record.
+    /// An editor has written a byte order mark before the first record.
     #[error("byte 1: a {mark} byte order mark stands before the text; save it as plain ASCII")]
     ByteOrderMark {
         /// Encoding of the mark.
         mark: &'static str,
     },
-    /// Bytes without a known format.
+    /// The format of the bytes is not known.
     #[error("{name}: no record of Intel HEX or S-record, and no `.bin`")]
     NotBin {
         /// The file.
         name: String,
     },
-    /// The file would be read as raw bytes, but holds records, whole or damaged.
+    /// The file would be read as raw bytes, but it contains records, complete or damaged.
     #[error(
         "{place}: a record of Intel HEX or S-record, or what is left of one; its characters are no program"
     )]
@@ -55,13 +55,13 @@ pub enum ImageError {
         /// Beginning of the text.
         starts: String,
     },
-    /// Raw bytes were requested, but the name is that of a file of records.
+    /// Raw bytes were requested, but the name is the name of an Intel HEX or S-record file.
     #[error("{name}: raw bytes were asked for, but the name is that of a file of records")]
     RawName {
         /// The file.
         name: String,
     },
-    /// The addresses do not fit in the usual unit, but they do in the other unit.
+    /// The addresses are not consistent in the usual unit, but they are in the other unit.
     #[error("{error}")]
     OtherUnit {
         /// Error in the usual unit.
@@ -75,7 +75,7 @@ pub enum ImageError {
         /// Requested name.
         name: String,
     },
-    /// Image or file larger than the limit.
+    /// The image or the file is larger than the limit.
     #[error("the image has {bytes} bytes, the limit is {limit}")]
     TooLarge {
         /// Size of the image or of the file.
@@ -86,9 +86,9 @@ pub enum ImageError {
     /// A line is not a valid record.
     #[error("line {line}, column {column}: {problem}")]
     Line {
-        /// From 1.
+        /// Line, from 1.
         line: usize,
-        /// From 1.
+        /// Column, from 1.
         column: usize,
         /// Error in the line.
         problem: LineProblem,
@@ -96,25 +96,25 @@ pub enum ImageError {
     /// The file ends before its end record.
     #[error("no end record after line {lines}: the {format} file was cut off")]
     NoEnd {
-        /// Form of the file.
+        /// Format of the file.
         format: Format,
-        /// Lines read.
+        /// Number of lines read.
         lines: usize,
     },
-    /// Records leave addresses out.
+    /// The records leave a gap in the addresses.
     #[error("{bytes} bytes at word address 0x{address_words:X} are in no record")]
     Gap {
-        /// First address without data, words.
+        /// First address without data, in words.
         address_words: u32,
-        /// Length of the gap, bytes.
+        /// Length of the gap in bytes.
         bytes: usize,
     },
     /// The image does not fit into 32-bit word addresses.
     #[error("{words} words from word address 0x{address_words:X} end beyond 32 bits")]
     AddressRange {
-        /// Load address, words.
+        /// Load address in words.
         address_words: u32,
-        /// Length, words.
+        /// Length in words.
         words: u32,
     },
 }
@@ -122,7 +122,7 @@ pub enum ImageError {
 /// Errors in a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LineProblem {
-    /// Not the mark of a record.
+    /// The line does not start with the mark of a record.
     #[error("a record starts with `{expected}`")]
     Start {
         /// The mark.
@@ -131,12 +131,12 @@ pub enum LineProblem {
     /// A character is not a hexadecimal digit.
     #[error("not a hexadecimal digit")]
     Digit,
-    /// The record has another length than it declares.
+    /// The length of the record differs from the length that it declares.
     #[error("the record declares {declared} bytes and has {has}")]
     Length {
-        /// Number that the length byte declares.
+        /// Number of bytes that the length byte declares.
         declared: usize,
-        /// Number in the line.
+        /// Number of bytes in the line.
         has: usize,
     },
     /// Wrong checksum.
@@ -144,48 +144,48 @@ pub enum LineProblem {
     Checksum {
         /// Checksum in the line.
         has: u8,
-        /// Checksum of the bytes.
+        /// Checksum computed from the bytes.
         should: u8,
     },
     /// The record type does not exist.
     #[error("record type {kind} is unknown")]
     Type {
-        /// The number.
+        /// The record type.
         kind: u8,
     },
-    /// Data that begin or end in the middle of a word.
+    /// The data begin or end in the middle of a word.
     #[error("address 0x{address:X} and length {bytes} do not make whole words")]
     HalfWord {
-        /// Address in the record's unit.
+        /// Address in the unit of the record.
         address: u64,
-        /// Data bytes.
+        /// Number of data bytes.
         bytes: usize,
     },
-    /// An address that already has another value.
+    /// An address already has another value.
     #[error("byte address 0x{address:X} is given twice with different values")]
     Overlap {
-        /// First such address, bytes.
+        /// First such byte address.
         address: u64,
     },
-    /// Data that would make the image larger than the limit.
+    /// The data would make the image larger than the limit.
     #[error("the image gets larger than {limit} bytes: 0x{from:X} to 0x{to:X} (byte addresses)")]
     TooLarge {
-        /// The limit, bytes.
+        /// The limit in bytes.
         limit: usize,
-        /// Lowest address, bytes.
+        /// Lowest byte address.
         from: u64,
-        /// End of the highest address, bytes.
+        /// End of the data with the highest byte address.
         to: u64,
     },
-    /// Data after the end record.
+    /// There are data after the end record.
     #[error("data after the end record")]
     AfterEnd,
-    /// The count record disagrees.
+    /// The count record has a wrong number.
     #[error("the count record declares {declared} data records, there are {has}")]
     Count {
-        /// Number in the count record.
+        /// Number of data records in the count record.
         declared: u32,
-        /// Number in the file.
+        /// Number of data records in the file.
         has: u32,
     },
 }
@@ -193,17 +193,17 @@ pub enum LineProblem {
 /// Remedy for an [`ImageError`]. No remedy bypasses a check of the file's content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageAdvice {
-    /// The error itself says everything.
+    /// No remedy beyond the error text.
     None,
     /// The file is damaged or not an image: create it again.
     MakeAgain,
-    /// Bytes that are not text: `.bin` is the name of raw bytes, or an option takes them as raw.
+    /// The bytes are not text. Raw bytes need the name `.bin`, or the option for raw bytes.
     NameRaw,
-    /// The file has the name of a file of records and holds none: rename it after its content.
+    /// The name is the name of an Intel HEX or S-record file, but the file has no records: rename it to match its content.
     Rename,
     /// Gaps between records can be filled.
     FillGaps,
-    /// The records follow one another if addresses count this unit.
+    /// The records follow one another without gaps if their addresses have this unit.
     OtherUnit(AddressUnit),
     /// Addresses overlap, do not start at whole words, or are too high.
     Addresses,
@@ -232,7 +232,8 @@ impl ImageError {
         }
     }
 
-    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high: they may count another unit.
+    /// Returns `true` if the records are valid, but their addresses leave gaps, overlap or are too high. Such addresses may have another
+    /// unit.
     pub fn is_of_addresses(&self) -> bool {
         use LineProblem::{HalfWord, Overlap, TooLarge};
         matches!(

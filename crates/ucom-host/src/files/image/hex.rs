@@ -1,10 +1,10 @@
-//! Intel HEX: `:` length, address, type, data, checksum.
+//! Intel HEX. A record is `:`, length, address, type, data, checksum.
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, LineProblem};
 
 pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageError> {
     let mut base = 0_u64;
-    // In 8086 segments the offset wraps within 64 KiB; with linear addresses it does not.
+    // With 8086 segment addresses the offset wraps at 64 KiB; with linear addresses it does not.
     let mut wraps = false;
     let mut ended = false;
     let mut last = 0;
@@ -43,7 +43,7 @@ pub(super) fn read(content: &[u8], segments: &mut Segments) -> Result<(), ImageE
             (1, []) => ended = true,
             (2, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 4, true),
             (4, [high, low]) => (base, wraps) = (u64::from(u16::from_be_bytes([*high, *low])) << 16, false),
-            // Start addresses are ignored: the loader has its own.
+            // Start addresses are ignored, because the loader has its own.
             (3 | 5, [_, _, _, _]) => {}
             (1..=5, data) => {
                 let declared = match kind {

@@ -1,10 +1,10 @@
-//! Firmware images. Raw bytes, Intel HEX and Motorola S-records are converted to the bytes on the wire. The characters of a file of
-//! records are never sent.
+//! Firmware images. Raw bytes, Intel HEX and Motorola S-records are converted to the bytes that are sent. The characters of an Intel HEX or
+//! S-record file are never sent themselves.
 //!
-//! The loader counts addresses in 16-bit words, so every image starts at a word and consists of whole words. S-records of the boards'
-//! tool chain count words as well; Intel HEX and all other formats count bytes. The reader detects files that count in the other unit by
-//! their records: these leave gaps or overlap in one unit and follow one another without gaps in the other. The unit of only one or two
-//! records is not guessed. An option can always set the unit.
+//! The loader's addresses count 16-bit words, so every image starts at a word and consists of complete words. In S-records of the boards'
+//! tool chain the addresses also count words; in Intel HEX and all other formats they count bytes. The reader detects files that use the
+//! other unit by their records: in the wrong unit these leave gaps or overlap, in the right unit they follow one another without gaps. The
+//! reader does not guess the unit of only one or two records. An option can always set the unit.
 mod detect;
 mod error;
 mod hex;
@@ -19,16 +19,16 @@ use core::str::FromStr;
 pub use error::{ImageAdvice, ImageError, LineProblem};
 use segments::Segments;
 
-/// Most bytes of an image unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
+/// Largest size of an image, in bytes, unless [`ImageOptions::max_bytes`] sets another limit: 1 MiB.
 pub const MAX_BYTES: usize = 1 << 20;
 
-/// Number of consecutive records that cannot be a coincidence. A hole as long as the record before it may be intended once. Such holes
-/// may also follow each entry of a table of interrupt vectors, whose records are short.
+/// Number of consecutive records that cannot fit by coincidence. A single gap as long as the record before it may be intended. In a table
+/// of interrupt vectors such a gap may follow every entry, but these records are short.
 const EVIDENCE: usize = 3;
-/// Minimum average length of these records, bytes; linkers write 16 and more.
+/// Minimum average length of these records in bytes. Linkers write 16 and more.
 const EVIDENCE_BYTES: usize = 12;
 
-/// Form of an image file.
+/// Format of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Raw bytes in wire order.
@@ -52,7 +52,7 @@ impl fmt::Display for Format {
 impl FromStr for Format {
     type Err = ImageError;
 
-    /// Reads `bin`, `hex` or `srec`.
+    /// Reads one of the texts `bin`, `hex` and `srec`.
     fn from_str(text: &str) -> Result<Self, ImageError> {
         match text {
             "bin" => Ok(Self::Bin),
@@ -68,7 +68,7 @@ impl FromStr for Format {
 pub enum AddressUnit {
     /// Bytes.
     Byte,
-    /// Words of 16 bits, two bytes of the record each.
+    /// Words of 16 bits, which are two bytes of the record each.
     Word,
 }
 
@@ -87,26 +87,26 @@ pub enum Gaps {
     /// Refuse the file.
     #[default]
     Refuse,
-    /// Fill with 0xFF, the erased state of flash, and note it in [`Image::notes`].
+    /// Fill the gap with 0xFF, the erased state of flash, and list it in [`Image::notes`].
     Fill,
 }
 
 /// Options for reading an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageOptions {
-    /// Format of the file; `None` derives it from content and name. Raw bytes never hold records, and a text only counts as raw bytes if
-    /// it is from a `.bin` and the format is set.
+    /// Format of the file; `None` derives it from content and name. Records are never read as raw bytes. A text is read as raw bytes only
+    /// if it is in a `.bin` file and the format is set.
     pub format: Option<Format>,
-    /// Unit of record addresses. `None`: words in S-records, bytes in Intel HEX. The other unit is used if at least three records follow
-    /// one another only in that unit.
+    /// Unit of record addresses. `None`: words in S-records, bytes in Intel HEX. The other unit is used if the file has at least three
+    /// records that follow one another only in that unit.
     pub address_unit: Option<AddressUnit>,
-    /// Gaps between records.
+    /// Treatment of gaps between records.
     pub gaps: Gaps,
-    /// Swaps the two bytes of each word, for tool chains that write another order than the wire has.
+    /// `true` to swap the two bytes of each word, for tool chains whose byte order differs from the wire.
     pub swap_bytes: bool,
-    /// Load address in words: for raw bytes 0 if `None`; otherwise it replaces the file's own address.
+    /// Load address in words. It replaces the address in the file. `None`: the address in the file, or 0 for raw bytes.
     pub load_address_words: Option<u32>,
-    /// Limit of the image length, gaps included, bytes.
+    /// Largest length of the image in bytes, including gaps.
     pub max_bytes: usize,
 }
 
@@ -123,24 +123,24 @@ impl Default for ImageOptions {
     }
 }
 
-/// A property of an image that its user should know.
+/// A property of an image that the user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageNote {
     /// A gap was filled with 0xFF.
     GapFilled {
-        /// First address without data, words.
+        /// First address without data, in words.
         address_words: u32,
-        /// Length, bytes.
+        /// Length in bytes.
         bytes: usize,
     },
     /// The last word had only one byte; 0xFF was added.
     LastWordPadded,
-    /// The file has no end record, but the count record at its end has the right number of data records.
+    /// The file has no end record, but a count record at its end has the correct number of data records.
     EndedByCount {
-        /// The data records.
+        /// Number of data records.
         records: u32,
     },
-    /// The records follow one another only if their addresses count this unit, which is not the usual unit of their format.
+    /// The records follow one another only if their addresses have this unit. It is not the usual unit of the format.
     AddressesCount(AddressUnit),
 }
 
@@ -161,7 +161,7 @@ impl fmt::Display for ImageNote {
     }
 }
 
-/// An image as the loader takes it.
+/// An image in the form that the loader accepts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     bytes: Vec<u8>,
@@ -171,7 +171,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file's content, as raw bytes if neither options nor content determine another format.
+    /// Reads the content of a file. It is raw bytes if neither options nor content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }
@@ -213,7 +213,7 @@ impl Image {
     /// Reads a file.
     pub fn read(path: &std::path::Path, options: &ImageOptions) -> Result<Self, ImageError> {
         let io = |source: std::io::Error| ImageError::Io { path: path.into(), source };
-        // A record takes at most 14 characters per byte (one byte in an S-record with 32-bit address and line end).
+        // A record needs at most 14 characters per byte: one data byte in an S-record with a 32-bit address and a line end.
         let most = (options.max_bytes as u64).saturating_mul(16).saturating_add(4096);
         let length = std::fs::metadata(path).map_err(io)?.len();
         if length > most {
@@ -229,7 +229,7 @@ impl Image {
         Ok(Self { bytes: content.to_vec(), address_words: 0, format: Format::Bin, notes: Vec::new() })
     }
 
-    /// Reads records in the usual unit of their format, or in the only unit in which they follow one another.
+    /// Reads records in the usual unit of their format. If they follow one another only in the other unit, that unit is used.
     fn records(content: &[u8], format: Format, options: &ImageOptions) -> Result<Self, ImageError> {
         let (usual, other) = match format {
             Format::SRecord => (AddressUnit::Word, AddressUnit::Byte),
@@ -260,7 +260,7 @@ impl Image {
                     Ok(image)
                 }
                 _ if options.gaps == Gaps::Fill => read(usual, Gaps::Fill).map(|(image, _)| image),
-                // Too few records to be certain: the user decides.
+                // There are too few records to be certain, so the user must decide.
                 Ok(_) if e.is_of_addresses() => {
                     Err(ImageError::OtherUnit { error: Box::new(e), unit: other })
                 }
@@ -269,22 +269,22 @@ impl Image {
         }
     }
 
-    /// Returns the bytes in wire order, an even number of at least two.
+    /// Returns the bytes in wire order. Their number is even and at least two.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Returns the bytes without a copy.
+    /// Converts the image to its bytes without a copy.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }
 
-    /// Returns the load address, words.
+    /// Returns the load address in words.
     pub fn address_words(&self) -> u32 {
         self.address_words
     }
 
-    /// Returns the length, words.
+    /// Returns the length in words.
     pub fn length_words(&self) -> u32 {
         (self.bytes.len() / 2) as u32
     }
@@ -303,7 +303,7 @@ impl Image {
         self.format
     }
 
-    /// Returns the unit of the records' addresses; `None` for raw bytes, which have no addresses.
+    /// Returns the unit of the record addresses; `None` for raw bytes, which have no addresses.
     pub fn address_unit(&self, options: &ImageOptions) -> Option<AddressUnit> {
         let detected = self.notes.iter().find_map(|note| match note {
             ImageNote::AddressesCount(unit) => Some(*unit),
@@ -317,7 +317,7 @@ impl Image {
         Some(options.address_unit.or(detected).unwrap_or(usual))
     }
 
-    /// Returns the changes made while reading.
+    /// Returns the notes about the image, such as changes made while reading.
     pub fn notes(&self) -> &[ImageNote] {
         &self.notes
     }

@@ -3,7 +3,7 @@
 use super::{AddressUnit, Gaps, ImageError, ImageNote, LineProblem};
 use std::collections::BTreeMap;
 
-/// Runs of bytes by byte address; adjacent bytes form one run.
+/// Segments of bytes, sorted by byte address. Bytes that are added directly after a segment extend it.
 pub(super) struct Segments {
     unit: AddressUnit,
     limit: usize,
@@ -16,7 +16,7 @@ impl Segments {
         Self { unit, limit, runs: BTreeMap::new(), records: 0 }
     }
 
-    /// Takes the data of one record at `address` in the file's unit.
+    /// Adds the data of one record; `address` is in the file's unit.
     pub(super) fn add(&mut self, address: u64, data: &[u8]) -> Result<(), LineProblem> {
         if data.is_empty() {
             return Ok(());
@@ -60,19 +60,19 @@ impl Segments {
         Ok(())
     }
 
-    /// Records with data so far.
+    /// Returns the number of records with data so far.
     pub(super) fn records(&self) -> usize {
         self.records
     }
 
-    /// Starts of the runs that share addresses with `start..end`.
+    /// Returns the starts of the segments that overlap `start..end`.
     fn covering(&self, start: u64, end: u64) -> Vec<u64> {
         let before = self.runs.range(..start).next_back();
         let before = before.filter(|(a, run)| *a + run.len() as u64 > start).map(|(a, _)| *a);
         before.into_iter().chain(self.runs.range(start..end).map(|(a, _)| *a)).collect()
     }
 
-    /// Adds bytes at addresses that are free.
+    /// Adds bytes at addresses that have no data yet.
     fn put(&mut self, at: u64, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -86,7 +86,7 @@ impl Segments {
         self.runs.insert(at, bytes.to_vec());
     }
 
-    /// Joins all segments: load address and bytes.
+    /// Joins all segments. Returns the load address and the bytes.
     pub(super) fn join(self, gaps: Gaps, notes: &mut Vec<ImageNote>) -> Result<(u32, Vec<u8>), ImageError> {
         let Some((&first, _)) = self.runs.first_key_value() else { return Err(ImageError::Empty) };
         let words = |byte: u64| u32::try_from(byte / 2);
@@ -113,7 +113,7 @@ impl Segments {
     }
 }
 
-/// Reads two hexadecimal digits per byte; an error comes with its column from 0.
+/// Reads two hexadecimal digits per byte. An error includes its column, counted from 0.
 pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> {
     if let Some(i) = digits.iter().position(|d| !d.is_ascii_hexdigit()) {
         return Err((i, LineProblem::Digit));
@@ -125,7 +125,7 @@ pub(super) fn hex_bytes(digits: &[u8]) -> Result<Vec<u8>, (usize, LineProblem)> 
     Ok(digits.as_chunks::<2>().0.iter().map(|[high, low]| value(*high) << 4 | value(*low)).collect())
 }
 
-/// Returns lines with their numbers from 1, without line ends and surrounding blanks; empty lines are left out.
+/// Returns the lines with their numbers from 1, without line ends and surrounding blanks. Empty lines are left out.
 pub(super) fn lines(content: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
     let lines = content.split(|b| *b == b'\n').enumerate();
     lines.map(|(i, line)| (i + 1, line.trim_ascii())).filter(|(_, line)| !line.is_empty())

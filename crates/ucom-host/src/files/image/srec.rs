@@ -1,8 +1,8 @@
-//! Motorola S-records: `S` type, length, address, data, checksum.
+//! Motorola S-records. A record is `S`, type, length, address, data, checksum.
 use super::segments::{Segments, hex_bytes, lines};
 use super::{Format, ImageError, ImageNote, LineProblem};
 
-/// Reads the records. A count record at the end also proves that the file is complete: some tools write no end record.
+/// Reads the records. Some tools write no end record; then a count record at the end shows that the file is complete.
 pub(super) fn read(
     content: &[u8],
     segments: &mut Segments,
@@ -10,7 +10,7 @@ pub(super) fn read(
 ) -> Result<(), ImageError> {
     let mut records = 0_u32;
     let mut ended = false;
-    // The record before this line was a count record with exactly this number.
+    // Number of data records, if the previous line was a count record with exactly this number.
     let mut counted_to = None;
     let mut last = 0;
     for (number, line) in lines(content) {
@@ -22,7 +22,7 @@ pub(super) fn read(
         }
         let kind = kind - b'0';
         let bytes = hex_bytes(digits).map_err(|(column, problem)| at(column + 2, problem))?;
-        // The length counts address, data and checksum.
+        // The declared length includes address, data and checksum.
         let (declared, has) = (usize::from(*bytes.first().unwrap_or(&0)), bytes.len().saturating_sub(1));
         if declared != has || has == 0 {
             return Err(at(2, LineProblem::Length { declared, has }));

@@ -1,4 +1,4 @@
-//! References: records from the published examples of the formats, and encoders written here from the rules of the formats.
+//! Tests against records from the published examples of the formats, and against encoders written here from the rules of the formats.
 
 use proptest::prelude::*;
 use std::panic;
@@ -39,7 +39,7 @@ fn s_line(kind: u8, width: usize, address: u32, data: &[u8]) -> String {
 
 #[test]
 fn intel_hex_as_published() {
-    // The example of the format's Wikipedia page (addresses in bytes).
+    // The example on the format's Wikipedia page. Its addresses count bytes.
     let text = ":10010000214601360121470136007EFE09D2190140\n\
                 :100110002146017E17C20001FF5F16002148011928\n\
                 :10012000194E79234623965778239EDA3F01B2CAA7\n\
@@ -53,7 +53,7 @@ fn intel_hex_as_published() {
 
 #[test]
 fn s_records_as_published_count_words_here() {
-    // The example of the format's manual page, completed; as byte addresses it has no gap, as word addresses it has one.
+    // The example on the format's manual page, completed. It has no gap if its addresses count bytes, and one gap if they count words.
     let text = "S00F000068656C6C6F202020202000003C\n\
                 S11F00007C0802A6900100049421FFF07C6C1B787C8C23783C6000003863000026\n\
                 S11F001C4BFFFFE5398000007D83637880010014382100107C0803A64E800020E9\n\
@@ -92,15 +92,15 @@ fn the_unit_of_addresses_is_taken_from_the_records() {
     let in_bytes = read(&file(4, 16, 16)).unwrap();
     let note = ImageNote::AddressesCount(AddressUnit::Byte);
     assert_eq!(in_bytes, (0x80, bytes.clone(), Some(AddressUnit::Byte), vec![note]));
-    // A hole may be intended, or the unit may differ: the reader does not guess.
+    // Either the gap is intended or the unit differs. The reader does not guess.
     let other = |text: &str| match read(text) {
         Err(ImageError::OtherUnit { error, unit: AddressUnit::Byte }) => error.to_string(),
         other => panic!("{other:?}"),
     };
     assert_eq!(other(&file(2, 16, 16)), "16 bytes at word address 0x108 are in no record");
-    // A table of vectors: two words, then a hole of two.
+    // A table of vectors: two words, then a gap of two words.
     assert_eq!(other(&file(16, 4, 4)), "4 bytes at word address 0x102 are in no record");
-    // Intel HEX whose addresses count words: in byte addresses the data would overlap.
+    // Intel HEX with addresses that count words. Read as byte addresses, the data would overlap.
     let lines = bytes.chunks(16).zip(0..).map(|(data, i)| hex_line(0x100 + i * 8, 0, data));
     let hex = lines.collect::<String>() + ":00000001FF\n";
     let note = ImageNote::AddressesCount(AddressUnit::Word);
@@ -147,12 +147,12 @@ fn raw_bytes_are_whole_words() {
     assert_eq!((image.bytes(), image.address_words()), (&[2, 1, 4, 3][..], 7));
     let options = ImageOptions { load_address_words: Some(u32::MAX), ..Default::default() };
     assert!(matches!(Image::parse(&[1, 2], &options), Err(ImageError::AddressRange { .. })));
-    // Even on request, records are not raw bytes.
+    // Records are not read as raw bytes, even on request.
     let forced = ImageOptions { format: Some(Format::Bin), ..Default::default() };
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text never counts as raw bytes, with any name; the error reports the place of the record.
+/// A text is never read as raw bytes, whatever its name is. The error reports the place of the record.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -188,7 +188,7 @@ fn a_text_is_no_image() {
             assert!(read(name, text).is_err(), "{name}: {text:?}");
         }
     }
-    // The name promises records: the first mistake in them is reported.
+    // The name is that of an S-record file, so the first error in its records is reported.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();
@@ -198,7 +198,7 @@ fn a_text_is_no_image() {
     }
 }
 
-/// A count record at the end ends a file of S-records, if it is right and nothing follows it.
+/// A count record ends a file of S-records if its number is correct and nothing follows it.
 #[test]
 fn a_count_record_ends_a_file() {
     let data: Vec<String> = (0..4).map(|i| s_line(1, 2, i * 8, &[i as u8 + 1; 16])).collect();
@@ -207,14 +207,14 @@ fn a_count_record_ends_a_file() {
     for kind in [5, 6] {
         let image = parse(&(s_line(0, 2, 0, b"name") + &whole + &count(kind, 4))).unwrap();
         assert_eq!((image.bytes().len(), image.notes()), (64, &[ImageNote::EndedByCount { records: 4 }][..]));
-        // With an end record there is no note.
+        // With an end record there is no note about the count record.
         let image = parse(&(whole.clone() + &count(kind, 4) + &s_line(9, 2, 0, &[]))).unwrap();
         assert!(image.notes().is_empty());
         for wrong in [0, 1, 3, 5, 0x104] {
             let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
             assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
         }
-        // Cut after the count, or extended by records that the count does not include: the file is not complete.
+        // If a record follows the count record and there is no end record, the file is not complete.
         for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
             let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
             assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
@@ -223,8 +223,8 @@ fn a_count_record_ends_a_file() {
     assert!(matches!(parse(&whole), Err(ImageError::NoEnd { lines: 4, .. })));
 }
 
-/// Damaged files of records in both formats. Each is refused by its content, with and without the option for raw bytes, with any name.
-/// The advice bypasses no check.
+/// Damaged Intel HEX and S-record files. Each is refused because of its content, with and without the option for raw bytes, and with any
+/// name. The advice never bypasses a check.
 #[test]
 fn characters_of_records_are_never_an_image() {
     let data: Vec<u8> = (0..128_u32).map(|i| (i * 37 + 11) as u8).collect();
@@ -295,7 +295,7 @@ fn characters_of_records_are_never_an_image() {
     }
 }
 
-/// Raw bytes on request: any name except that of a file of records, and a text only from a `.bin`.
+/// Raw bytes on request may have any name except that of an Intel HEX or S-record file. A text is accepted only from a `.bin` file.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();
@@ -332,7 +332,7 @@ fn raw_bytes_on_request_are_looked_at() {
 }
 
 proptest! {
-    /// Equal bytes in the three formats, in records of any size and order, give equal images.
+    /// The same bytes in the three formats, with records of any size and order, give the same image.
     #[test]
     fn three_forms_are_one_image(
         words in prop::collection::vec(any::<[u8; 2]>(), 1..300),
@@ -359,7 +359,7 @@ proptest! {
         prop_assert_eq!((from_hex.address_words(), from_srec.address_words()), (base, base));
     }
 
-    /// Random bytes, and any single damaged byte, give an image or a named error, never a panic.
+    /// Random bytes, and records with a damaged byte, give an image or a specific error, never a panic.
     #[test]
     fn anything_is_an_image_or_an_error(
         data in prop::collection::vec(any::<u8>(), 0..300),

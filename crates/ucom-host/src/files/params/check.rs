@@ -1,4 +1,4 @@
-//! Checks a file against the boards on the bus: reports every mistake with its place before anything is sent.
+//! Checks a parameter file against the boards on the bus. Every error is reported with its place before anything is sent.
 
 use super::{ParamsBoard, ParamsEntry, Place};
 use crate::files::signals::{BoardSignals, ValueError};
@@ -12,40 +12,40 @@ use ucom::BoardInfo;
 pub struct ParamsTarget<'a> {
     /// Answer to PC_INFO.
     pub info: &'a BoardInfo,
-    /// Name in the inventory; `None`: the inventory has no name.
+    /// Name in the inventory; `None`: the inventory has no name for the board.
     pub name: Option<&'a str>,
 }
 
-/// A word that a file has for a board.
+/// The word for a signal that follows from a value in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParamsWord {
-    /// Place in the buffer.
+    /// Index of the signal in its buffer.
     pub index: u16,
-    /// Text of the signal, not shortened.
+    /// Complete name of the signal as the board reports it.
     pub name: String,
     /// The word.
     pub word: u16,
     /// The value in the signal's unit, with the unit.
     pub text: String,
-    /// `0.04 → 0.0` if the value lies between two words; `None` otherwise.
+    /// Requested and sent value, such as `0.04 → 0.0`, if the value lies between two words; `None` otherwise.
     pub rounded: Option<String>,
 }
 
-/// Mistake in a file.
+/// Error in a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsProblem {
     /// Place in the file.
     pub place: Place,
     /// Board number.
     pub board: u8,
-    /// Kind of mistake.
+    /// Kind of the error.
     pub kind: ParamsProblemKind,
 }
 
 impl core::fmt::Display for ParamsProblem {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { place, board, kind } = self;
-        // The library's own message for an unknown name begins with the board.
+        // The error for an unknown name already begins with the board.
         let board = if matches!(kind, ParamsProblemKind::NoSignal(_)) {
             String::new()
         } else {
@@ -55,7 +55,7 @@ impl core::fmt::Display for ParamsProblem {
     }
 }
 
-/// Kinds of mistakes.
+/// Kinds of errors in a file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ParamsProblemKind {
@@ -78,7 +78,7 @@ pub enum ParamsProblemKind {
         /// Name in the inventory.
         found: Option<String>,
     },
-    /// The board has another program.
+    /// The board has another program than the file expects.
     #[error("its program is {}, the names in the file belong to 0x{wanted:04X}", found.map_or("missing".into(), |f| format!("0x{f:04X}")))]
     WrongProgram {
         /// Program ID in the file.
@@ -89,7 +89,7 @@ pub enum ParamsProblemKind {
     /// No signal has this name.
     #[error("{0}")]
     NoSignal(SignalError),
-    /// Two entries for one signal.
+    /// A signal has two entries.
     #[error("{kind} `{name}` is given twice, first in line {first}")]
     Twice {
         /// `CI` or `PAR`.
@@ -99,7 +99,7 @@ pub enum ParamsProblemKind {
         /// Line of the first entry.
         first: u32,
     },
-    /// The value does not fit.
+    /// The value is not valid for the signal.
     #[error("{kind} `{name}`: {problem}")]
     Value {
         /// `CI` or `PAR`.
@@ -111,7 +111,7 @@ pub enum ParamsProblemKind {
     },
 }
 
-/// Checks that the board and its program are those of the file.
+/// Checks that the board and its program are the ones in the file.
 pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<ParamsProblem> {
     let mut problems = Vec::new();
     let mut add = |kind| problems.push(ParamsProblem { place: board.place, board: board.number, kind });
@@ -135,7 +135,8 @@ pub fn check_identity(board: &ParamsBoard, target: &ParamsTarget<'_>) -> Vec<Par
     problems
 }
 
-/// Returns the words for a board whose description is known, first inputs, then parameters; or every mistake.
+/// Returns the words for a board whose description is known: first its inputs, then its parameters. If there are errors, returns all of
+/// them.
 pub fn check_board(
     board: &ParamsBoard,
     description: &IoDescription,

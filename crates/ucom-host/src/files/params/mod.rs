@@ -1,7 +1,7 @@
-//! Parameter files: parameters and first inputs for boards, in YAML that users edit.
+//! Parameter files: parameters and initial inputs for boards, in YAML that users edit.
 //!
-//! The protocol has no way to read parameters back (D-35), so a file holds requested values, never the present values of a board. Boards
-//! are identified by flash number or name, and the names of signals belong to a Program ID.
+//! The protocol has no way to read parameters back (D-35). A file therefore contains requested values, never the present values of a board.
+//! It identifies boards by flash number or name. The names of signals apply to one Program ID.
 
 mod check;
 mod read;
@@ -20,7 +20,7 @@ pub const PARAMS_HELP: &str = include_str!("help.txt");
 /// A parameter file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ParamsFile {
-    /// Boards, each number once, in the order of the file.
+    /// Boards in the order of the file. Each number occurs once.
     pub boards: Vec<ParamsBoard>,
 }
 
@@ -33,20 +33,20 @@ pub struct ParamsBoard {
     pub place: Place,
     /// Flash number that the board at this position must have.
     pub flash_number: Option<u16>,
-    /// Name in the inventory that the board at this position must have. A board has this, a flash number, or both.
+    /// Name in the inventory that the board at this position must have. Each board in the file has a flash number, a name, or both.
     pub name: Option<String>,
-    /// Program that the names belong to; `None`: `any` in the file.
+    /// Program that the names apply to; `None` for `any` in the file.
     pub program_id: Option<u16>,
     /// Parameters.
     pub par: Vec<ParamsEntry>,
-    /// First inputs, used at a start.
+    /// Initial inputs, which are sent at a start.
     pub ci: Vec<ParamsEntry>,
 }
 
 /// A value of a parameter file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsEntry {
-    /// Name or number of the signal.
+    /// Name or index of the signal.
     pub name: String,
     /// The value.
     pub given: SignalValue,
@@ -81,10 +81,10 @@ pub enum ParamsError {
     Form {
         /// Place.
         place: Place,
-        /// Error.
+        /// Error text.
         what: String,
     },
-    /// The text is not YAML of this form; the place is not known.
+    /// The text is not YAML of this form, and the place of the error is not known.
     #[error("{0}")]
     Nowhere(String),
     /// Error in a file.
@@ -104,7 +104,7 @@ impl ParamsFile {
         Self::parse(&text).map_err(|e| ParamsError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Returns the values for a board.
+    /// Returns the entries for a board.
     pub fn board(&self, number: u8) -> Option<&ParamsBoard> {
         self.boards.iter().find(|b| b.number == number)
     }

@@ -1,4 +1,4 @@
-//! Conversion from YAML to values, each with its place.
+//! Conversion of YAML to values with their places in the file.
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde_saphyr::Spanned;
@@ -6,7 +6,7 @@ use serde_saphyr::Spanned;
 use super::{ParamsBoard, ParamsEntry, ParamsError, ParamsFile, Place};
 use crate::files::signals::SignalValue;
 
-/// Limit of YAML nodes: more boards than a bus has, and more values than a buffer.
+/// Limit of YAML nodes. It allows more boards than a bus has and more values than a buffer has.
 const MAX_NODES: usize = 400_000;
 
 #[derive(Deserialize)]
@@ -15,7 +15,7 @@ struct File {
     boards: Vec<Spanned<Board>>,
 }
 
-// Every scalar is read as it is written: 0x10 and 16 differ here.
+// Every scalar is read as text, so 0x10 and 16 are different here.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Board {
@@ -32,7 +32,7 @@ struct Board {
     ci: Option<Values>,
 }
 
-/// Names and values in their order.
+/// Names and values in the order of the file.
 struct Values(Vec<(String, Spanned<String>)>);
 
 impl<'de> Deserialize<'de> for Values {
@@ -66,7 +66,7 @@ fn wrong(place: Place, what: String) -> ParamsError {
     ParamsError::Form { place, what }
 }
 
-/// Reads a number of 16 bits, decimal or with 0x.
+/// Reads a 16-bit number in decimal, or in hexadecimal with 0x.
 fn number(text: &Spanned<String>, what: &str) -> Result<u16, ParamsError> {
     let number = match text.value.trim().parse() {
         Ok(SignalValue::Raw(word)) => Some(word),
@@ -117,9 +117,9 @@ fn board(spanned: Spanned<Board>) -> Result<ParamsBoard, ParamsError> {
     Ok(ParamsBoard { number: number_of, place: at, flash_number, name, program_id, par, ci })
 }
 
-/// Rewords the YAML library's message for the author of the file.
+/// Rewords a message of the YAML library for the author of the file.
 fn people(words: &str) -> String {
-    // This message names another place itself.
+    // The message itself contains another place, which is removed.
     let words = words.split(" at line ").next().unwrap_or(words).trim_end_matches(':');
     if let Some(rest) = words.strip_prefix("duplicate mapping key") {
         let key = rest.split(", set ").next().unwrap_or("").trim_start_matches([':', ' ']);

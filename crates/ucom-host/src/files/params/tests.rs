@@ -1,4 +1,4 @@
-//! Parameter files that are read, checked and written.
+//! Tests that read, check and write parameter files.
 
 use super::*;
 use crate::files::signals::{BoardSignals, Signal, SignalTable, SignalType};
@@ -77,7 +77,7 @@ fn another_board_or_program_is_a_problem_with_its_line() {
     assert!(message(&other, 2, None).contains("calls it nothing"));
 }
 
-/// Every mistake is reported at once, with line and column.
+/// All errors are reported together, each with line and column.
 #[test]
 fn names_and_ranges_are_checked_with_their_place() {
     let text = "boards:\n- board: 1\n  flash_number: 33\n  program_id: any\n  par:\n    kq: 1\n    KP: 4000\n    kp: 70000\n    current_max: 3 A\n    mode: on\n  ci:\n    set_position: 61 deg\n";
@@ -151,7 +151,7 @@ fn saved() -> SavedBoard {
     }
 }
 
-/// D-35: a value that is not requested is written as a comment.
+/// D-35: a signal without a requested value is written as a comment.
 #[test]
 fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     let text = params_text(&[saved()]);
@@ -166,7 +166,8 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: with another signal table, or without one, a saved file gives the same word or is refused, never another word.
+/// D-11, D-35: if a saved file is read with another signal table, or without one, it gives the same word or is refused. It never gives
+/// another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };
@@ -221,7 +222,7 @@ fn names() -> impl Strategy<Value = Vec<String>> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// For any parameter names, a saved file gives the same words at the same places.
+    /// For any parameter names, a saved file gives the same words at the same positions.
     #[test]
     fn a_saved_file_gives_the_same_words(par in names(), words in prop::collection::vec(any::<Option<u16>>(), 8), kind in 0..4_usize, text in any::<String>()) {
         let description = IoDescription { description: text.clone(), par, ..Default::default() };

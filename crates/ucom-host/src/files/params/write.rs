@@ -1,4 +1,4 @@
-//! Text of a parameter file: requested values, and every other name as a comment.
+//! Writes a parameter file: the requested values, and all other signals as comments.
 
 use crate::files::signals::{Signal, SignalType, SignalValue};
 use crate::files::text::quoted;
@@ -12,7 +12,7 @@ pub struct SavedBoard {
     pub number: u8,
     /// Flash number of the board.
     pub flash_number: u16,
-    /// Name in the inventory; empty if there is none.
+    /// Name in the inventory; empty if the inventory has none.
     pub name: String,
     /// Program ID.
     pub program_id: u16,
@@ -24,14 +24,14 @@ pub struct SavedBoard {
     pub ci: Vec<SavedSignal>,
 }
 
-/// Entry of a signal.
+/// Signal of a board to be saved.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SavedSignal {
-    /// Meaning.
+    /// Meaning of the word.
     pub signal: Signal,
-    /// Requested word; `None`: the name is written as a comment.
+    /// Requested word; `None`: the signal is written as a comment.
     pub word: Option<u16>,
-    /// For a requested word the time of writing; for other signals further information.
+    /// Remark after the entry. For a requested word it is the time of writing.
     pub remark: String,
 }
 
@@ -90,8 +90,8 @@ fn line(text: &mut String, board: &SavedBoard, kind: Kind, i: usize, saved: &Sav
     };
 }
 
-/// Returns the text for a word. The file may be read again with another signal table, or without one. A bare number would then give
-/// another word. So each number gets a unit, which a reader without the table refuses, or the word itself is written.
+/// Returns the text for a word. A file may be read again with another signal table, or without one. A number without a unit would then give
+/// another word. Therefore each number gets a unit, which a reader without the table refuses, or the raw word is written.
 fn value(signal: &Signal, word: u16) -> String {
     let raw = format!("0x{word:04X}");
     let text = match signal.kind {
@@ -101,7 +101,7 @@ fn value(signal: &Signal, word: u16) -> String {
         }
         _ => return raw,
     };
-    // Rounding lost a digit, or the word is beyond a limit.
+    // Writes the raw word if rounding lost a digit or the word is beyond a limit.
     if text.parse::<SignalValue>().map(|given| signal.word(&given)) != Ok(Ok(word)) {
         return raw;
     }
@@ -109,29 +109,29 @@ fn value(signal: &Signal, word: u16) -> String {
     if text.chars().all(plain) { text } else { quoted(&text) }
 }
 
-/// Returns a remark for the end of a line. Texts of boards may hold any characters, so control characters and line separators become
-/// blanks.
+/// Returns a remark for the end of a line. Texts of boards may contain any characters, so control characters and line separators are
+/// replaced by blanks.
 fn comment(words: &str) -> String {
     let one_line: String = words.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let one_line = one_line.replace(['\u{2028}', '\u{2029}', '\u{FEFF}', '\u{FFFE}', '\u{FFFF}'], " ");
     if one_line.trim().is_empty() { String::new() } else { format!("   # {}", one_line.trim()) }
 }
 
-/// Characters that YAML allows an implicit key (1.2.2, section 7.4.2), quotes and escapes counted.
+/// Longest implicit key that YAML allows (1.2.2, section 7.4.2), in characters, including quotes and escapes.
 const KEY_MAX: usize = 1024;
 
-/// Returns the shortest unambiguous name of a signal; its number if a YAML key cannot hold the name.
+/// Returns the shortest unambiguous name of a signal. If a YAML key cannot hold the name, returns the signal's index.
 fn key(description: &IoDescription, kind: Kind, i: usize) -> String {
     let means = |name: &str| description.find(0, kind, name).is_ok_and(|found| usize::from(found) == i);
     let full = description.names(kind).get(i).map_or("", String::as_str);
-    // A board may have another signal with the name "#1": further signs distinguish the number from every name.
+    // A board may have another signal with the name "#1". Additional `#` characters distinguish the index from every name.
     let numbers = (1..=description.names(kind).len() + 1).map(|n| "#".repeat(n) + &i.to_string());
     let names = [short(full), full].into_iter().filter(|name| !name.is_empty()).map(str::to_owned);
     let fits = |name: &str| quoted(name).chars().count() <= KEY_MAX;
     let name = names.chain(numbers).find(|name| fits(name) && means(name)).unwrap_or_default();
     let word = name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
-    // Words that have another meaning in YAML.
+    // Words that have a special meaning in YAML.
     let taken = ["null", "true", "false", "yes", "no", "on", "off", "y", "n"];
     if word && !taken.contains(&name.to_ascii_lowercase().as_str()) { name } else { quoted(&name) }
 }

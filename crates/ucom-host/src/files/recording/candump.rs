@@ -1,10 +1,10 @@
-//! `candump -L` of can-utils: `(sec.frac) interface ID#DATA`, optionally followed by `R` or `T`.
+//! Format of `candump -L` of can-utils: `(sec.frac) interface ID#DATA`, optionally followed by `R` or `T`.
 
 use super::{Direction, FrameKind, Record, RecordProblem, RecordedFrame, RecordingError};
 use super::{hex_bytes, lines::Lines, seconds};
 use std::io::{BufRead, Write};
 
-/// Mark of a comment line that carries one line of the profile.
+/// Beginning of a comment line that carries one line of the profile.
 const PROFILE: &str = "# profile: ";
 
 /// Reads records one by one.
@@ -28,7 +28,7 @@ impl<R: BufRead> CandumpReader<R> {
 impl<R: BufRead> Iterator for CandumpReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// Returns the next record; the first error ends the sequence.
+    /// Returns the next record. The sequence ends after the first error.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |comment| {
             if let Some(text) = comment.strip_prefix(PROFILE.trim_end()) {
@@ -115,7 +115,7 @@ pub struct CandumpWriter<W> {
 }
 
 impl<W: Write> CandumpWriter<W> {
-    /// Creates a writer. The output has no header, as with candump.
+    /// Creates a writer. Like candump's output, the file has no header.
     pub fn new(out: W) -> Self {
         Self { out }
     }
@@ -128,7 +128,7 @@ impl<W: Write> CandumpWriter<W> {
         Ok(())
     }
 
-    /// Adds a line. Times have six decimals, because can-utils refuse any other number of decimals.
+    /// Adds a line. Times have six decimals, because can-utils refuses any other number of decimals.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let (seconds, ns) = (record.time_ns / 1_000_000_000, record.time_ns % 1_000_000_000);
         write!(self.out, "({seconds:010}.{:06})", ns / 1000)?;

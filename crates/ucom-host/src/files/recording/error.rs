@@ -24,7 +24,7 @@ pub enum RecordingError {
     /// The file is not an FZI-CAN stream of version 1.2.
     #[error("the first line is `{first}`, not `{}`", super::FZI_HEADER)]
     FziHeader {
-        /// First line of the file.
+        /// First line in the file.
         first: String,
     },
     /// The format cannot hold this frame.
@@ -33,7 +33,7 @@ pub enum RecordingError {
         /// The frame.
         frame: String,
     },
-    /// An MCAP file is damaged.
+    /// The MCAP file is damaged.
     #[error("{}{problem}", prefix(path))]
     Mcap {
         /// File; empty if not known.
@@ -49,7 +49,7 @@ pub enum RecordProblem {
     /// The line is longer than any record.
     #[error("longer than {} bytes; is this a recording?", super::MAX_LINE)]
     TooLong,
-    /// Wrong number of columns.
+    /// The line has a wrong number of columns.
     #[error("a line of candump is `(seconds) interface ID#DATA`")]
     Columns,
     /// The text is not a time.
@@ -64,10 +64,10 @@ pub enum RecordProblem {
     /// The text is not data.
     #[error("the data are not pairs of hexadecimal digits, or too many")]
     Data,
-    /// The file ends in the middle of the record, so the readable part may be only its beginning.
+    /// The file ends in the middle of the record. The readable part may be only the beginning of the record.
     #[error("the file is broken off here: the line has no end")]
     BrokenOff,
-    /// Wrong number of columns.
+    /// The line has a wrong number of columns.
     #[error("a line of FZI-CAN is `sec.usec id dlc` and eight bytes")]
     FziColumns,
 }

@@ -1,4 +1,4 @@
-//! Frame of a recording, foreign frames included.
+//! Frames of a recording, including frames of other protocols.
 
 use std::fmt;
 /// Kind of a frame.
@@ -11,16 +11,16 @@ pub enum FrameKind {
         /// Requested length, 0..8.
         length: u8,
     },
-    /// CAN FD.
+    /// CAN FD frame.
     Fd {
-        /// Flags as candump writes them: 1 bit rate switch, 2 error state.
+        /// Flags in candump's form: bit 0 is the bit rate switch, bit 1 the error state.
         flags: u8,
     },
-    /// Error report of the adapter instead of a frame.
+    /// Error report of the adapter; not a frame on the bus.
     Error,
 }
 
-/// A frame as recorded.
+/// A recorded frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordedFrame {
     /// Identifier, or the error class of an error report.
@@ -31,7 +31,7 @@ pub struct RecordedFrame {
     pub kind: FrameKind,
     /// Payload.
     pub data: Vec<u8>,
-    /// Raw DLC 9..15 of a classic frame with eight bytes, as candump notes it.
+    /// Raw DLC 9..15 of a classic frame with eight bytes, if candump recorded it.
     pub dlc: Option<u8>,
 }
 
@@ -41,7 +41,7 @@ impl RecordedFrame {
         Self { id: id.into(), extended: false, kind: FrameKind::Data, data: data.to_vec(), dlc: None }
     }
 
-    /// Returns identifier and payload of a classic data frame with an 11-bit identifier (D-02); `None` for a foreign frame.
+    /// Returns identifier and payload of a classic data frame with an 11-bit identifier (D-02); `None` for other frames.
     pub fn as_classic(&self) -> Option<(u16, &[u8])> {
         let id = u16::try_from(self.id).ok().filter(|id| *id <= 0x7FF)?;
         (self.kind == FrameKind::Data && !self.extended && self.data.len() <= 8)
@@ -73,7 +73,7 @@ impl fmt::Display for RecordedFrame {
     }
 }
 
-/// Direction of a frame, if the recording shows it.
+/// Direction of a frame, if the recording contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Received (`R`).

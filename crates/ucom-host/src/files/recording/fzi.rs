@@ -1,4 +1,4 @@
-//! FZI-CAN 1.2: `sec.usec id dlc b0 … b7`; the id is decimal, the bytes are hexadecimal, always eight of them.
+//! Format FZI-CAN 1.2: `sec.usec id dlc b0 … b7`. The id is decimal. There are always eight bytes, in hexadecimal.
 
 use super::{Record, RecordProblem, RecordedFrame, RecordingError, lines::Lines, seconds};
 use std::io::{BufRead, Write};
@@ -6,7 +6,7 @@ use std::io::{BufRead, Write};
 /// First line of a stream.
 pub const FZI_HEADER: &str = "# FZI-CAN Stream version 1.2";
 
-/// Interface name of the records, because the format has none.
+/// Interface name of the records. The format has no interface names.
 const CHANNEL: &str = "can0";
 
 /// Reads records one by one.
@@ -29,7 +29,7 @@ impl<R: BufRead> FziReader<R> {
 impl<R: BufRead> Iterator for FziReader<R> {
     type Item = Result<Record, RecordingError>;
 
-    /// Returns the next record; the first error ends the sequence.
+    /// Returns the next record. The sequence ends after the first error.
     fn next(&mut self) -> Option<Self::Item> {
         self.lines.record(record, |_| ())
     }
@@ -68,7 +68,7 @@ impl<W: Write> FziWriter<W> {
         Ok(Self { out })
     }
 
-    /// Adds a line. This format cannot hold foreign frames.
+    /// Adds a line. The format cannot represent frames of other protocols.
     pub fn write(&mut self, record: &Record) -> Result<(), RecordingError> {
         let Some((id, data)) = record.frame.as_classic() else {
             return Err(RecordingError::NotRepresentable { frame: record.frame.to_string() });

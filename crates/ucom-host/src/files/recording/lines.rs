@@ -1,4 +1,4 @@
-//! Lines of the text formats: one record each, with blank lines and comments between.
+//! Lines of the text formats. Each record is one line; blank lines and comments may be between them.
 
 use super::{MAX_LINE, Record, RecordProblem, RecordingError};
 use std::io::{BufRead, Read};
@@ -18,7 +18,7 @@ impl<R: BufRead> Lines<R> {
         Self { input, number: 0, endless: false, failed: false }
     }
 
-    /// Returns the next line without blanks around it; `None` at the end of the file. Memory is bounded for any input.
+    /// Returns the next line without surrounding blanks; `None` at the end of the file. The memory is bounded for any input.
     pub fn line(&mut self) -> Result<Option<String>, RecordingError> {
         let mut line = Vec::new();
         self.input.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut line)?;
@@ -33,8 +33,8 @@ impl<R: BufRead> Lines<R> {
         Ok(Some(String::from_utf8_lossy(&line).trim().to_owned()))
     }
 
-    /// Returns the next record, which `parse` makes from its line; the first error ends the sequence. `comment` receives the comments
-    /// before it.
+    /// Returns the next record. `parse` creates it from its line, and `comment` receives the comment lines before it. The sequence ends
+    /// after the first error.
     pub fn record(
         &mut self,
         parse: fn(&str) -> Result<Record, RecordProblem>,

@@ -1,4 +1,4 @@
-//! MCAP with one channel `/can` of JSON messages, readable by Foxglove, PlotJuggler and the MCAP tools.
+//! MCAP files with one channel `/can` of JSON messages. Foxglove, PlotJuggler and the MCAP tools can read them.
 
 use host_kit::mcap::each_record;
 use mcap::records::{self, MessageHeader, Metadata};
@@ -135,7 +135,7 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(Self { out, channel, sequence: 0 })
     }
 
-    /// Adds a frame with its description in words.
+    /// Adds a frame; `name` describes it in words.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         let header = MessageHeader {
             channel_id: self.channel,
@@ -153,14 +153,14 @@ impl<W: Write + Seek> McapWriter<W> {
         Ok(self.out.flush()?)
     }
 
-    /// Writes index and end.
+    /// Writes the index and the end of the file.
     pub fn finish(mut self) -> Result<W, RecordingError> {
         self.out.finish()?;
         Ok(self.out.into_inner())
     }
 }
 
-/// Reads a whole file, or all whole records of a killed writer's file.
+/// Reads a complete file. If its writer was killed, reads all complete records.
 pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
     let mut recording = Recording::default();
     let mut channels = BTreeMap::new();
@@ -185,7 +185,7 @@ pub fn read_mcap(file: &[u8]) -> Result<Recording, RecordingError> {
         }
         Ok(())
     });
-    // A chunk whose writer was killed does not contain its length yet, so the damage is not always at the end.
+    // A writer that was killed leaves a chunk without its length. Therefore the damage is not always at the end of the file.
     let ended = file.len() >= 2 * MAGIC.len() && file.ends_with(MAGIC);
     let broken_off = |why: String| format!("the file is broken off after {} bytes{why}", file.len());
     recording.broken_off = match read {

@@ -1,9 +1,9 @@
-//! Recordings of a bus: `candump -L`, FZI-CAN 1.2 and MCAP.
+//! Recordings of a bus in the formats `candump -L`, FZI-CAN 1.2 and MCAP.
 //!
-//! A recording is only meaningful with the profile that was in use. MCAP stores the profile as metadata. In the two text formats no place
-//! for it suits every reader: python-can's candump reader, for example, takes each line for a frame. For text formats the profile is
-//! therefore stored in a separate file next to the recording, see [`profile_path`]. Comment lines `# …` with a profile are read if they
-//! occur.
+//! A recording can be interpreted only with the profile that was in use. MCAP stores the profile as metadata. The two text formats have no
+//! place for it that every reader accepts: python-can's candump reader, for example, reads each line as a frame. For text formats the
+//! profile is therefore stored in a separate file next to the recording, see [`profile_path`]. Comment lines `# …` with a profile are also
+//! read.
 mod candump;
 mod error;
 mod frame;
@@ -23,7 +23,7 @@ pub use frame::{Direction, FrameKind, Record, RecordedFrame};
 pub use fzi::{FZI_HEADER, FziReader, FziWriter};
 pub use mcap::{McapWriter, read_mcap};
 
-/// Longest line of a text recording, bytes; a longer line is not a recording.
+/// Longest line of a text recording in bytes. A file with a longer line is not a recording.
 pub const MAX_LINE: usize = 4096;
 
 /// Format of a recording.
@@ -38,7 +38,7 @@ pub enum RecordingFormat {
 }
 
 impl RecordingFormat {
-    /// Returns the format by the file's first bytes.
+    /// Returns the format according to the first bytes of the file.
     pub fn detect(start: &[u8]) -> Self {
         if start.starts_with(b"\x89MCAP0\r\n") {
             Self::Mcap
@@ -49,7 +49,7 @@ impl RecordingFormat {
         }
     }
 
-    /// Returns the format by the ending of a name: `.mcap`, `.fzi`; candump otherwise.
+    /// Returns the format according to the extension: `.mcap`, `.fzi`, or candump for all others.
     pub fn of_path(path: &Path) -> Self {
         match path.extension().and_then(|e| e.to_str()) {
             Some("mcap") => Self::Mcap,
@@ -59,26 +59,27 @@ impl RecordingFormat {
     }
 }
 
-/// Returns the path of the profile of a text recording: `NAME.profile.toml` next to it.
+/// Returns the path of the profile for a text recording: `NAME.profile.toml` next to it.
 pub fn profile_path(recording: &Path) -> PathBuf {
     let mut name = recording.as_os_str().to_owned();
     name.push(".profile.toml");
     name.into()
 }
 
-/// A whole recording.
+/// A complete recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recording {
     /// Profile in use, as TOML; `None` if it is not known.
     pub profile: Option<String>,
     /// Frames in the order of the file.
     pub records: Vec<Record>,
-    /// Place and kind of an end in the middle of a record, as a killed writer leaves it; `None`: the file is complete.
+    /// Place and kind of the damage if the file ends in the middle of a record, because its writer was killed; `None`: the file is
+    /// complete.
     pub broken_off: Option<String>,
 }
 
 impl Recording {
-    /// Reads a file of any format, and the profile next to it.
+    /// Reads a file of any format, and the profile file next to it.
     pub fn read(path: &Path) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let mut file = BufReader::new(File::open(path).map_err(io)?);
@@ -111,7 +112,7 @@ impl Recording {
     }
 }
 
-/// Returns the records of a text up to its end, and the error of the last line if that is cut off.
+/// Returns the records of a text. If the last line is cut off, also returns its error.
 fn whole(
     lines: &mut dyn Iterator<Item = Result<Record, RecordingError>>,
 ) -> Result<(Vec<Record>, Option<String>), RecordingError> {
@@ -139,7 +140,7 @@ pub enum RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Creates the file, and for text formats the profile's file next to it.
+    /// Creates the file. For text formats, also creates the profile file next to it.
     pub fn create(path: &Path, format: RecordingFormat, profile: &str) -> Result<Self, RecordingError> {
         let io = |source| RecordingError::Io { path: path.into(), source };
         let out = BufWriter::new(File::create(path).map_err(io)?);
@@ -155,7 +156,7 @@ impl RecordingWriter {
         .map_err(|e| e.with_path(path))
     }
 
-    /// Adds a frame. FZI-CAN cannot hold foreign frames: this is an error, and nothing is written.
+    /// Adds a frame. For a frame of another protocol, FZI-CAN returns an error and writes nothing.
     pub fn write(&mut self, record: &Record, name: Option<&str>) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.write(record),
@@ -164,7 +165,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes all data to the file: a writer that is killed later loses only newer records.
+    /// Writes all data to the file. If the writer is killed later, only newer records are lost.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => w.flush(),
@@ -173,7 +174,7 @@ impl RecordingWriter {
         }
     }
 
-    /// Writes the remaining data; without this call an MCAP file has no index and a text file may lack its last lines.
+    /// Writes the remaining data. Without this call an MCAP file has no index, and a text file may lack its last lines.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self {
             Self::Candump(w) => Ok(w.into_inner().flush()?),
@@ -183,7 +184,7 @@ impl RecordingWriter {
     }
 }
 
-/// Returns `sec.fraction` with any number of digits as nanoseconds; finer digits are dropped.
+/// Converts `sec.fraction` to nanoseconds. Digits after the ninth decimal are dropped.
 fn seconds(text: &str) -> Option<u64> {
     let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
     let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
@@ -197,7 +198,7 @@ fn seconds(text: &str) -> Option<u64> {
     whole.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(ns)
 }
 
-/// Returns bytes from pairs of hexadecimal digits, at most `most`.
+/// Reads at most `most` bytes from pairs of hexadecimal digits.
 fn hex_bytes(text: &str, most: usize) -> Option<Vec<u8>> {
     let digits = text.as_bytes();
     if digits.len() % 2 == 1 || digits.len() > most * 2 || !digits.iter().all(u8::is_ascii_hexdigit) {

@@ -1,4 +1,4 @@
-//! C-3 and C-7 for files; the reference checks run the Python readers.
+//! C-3 and C-7 for files. The reference checks run the Python readers.
 
 use proptest::prelude::*;
 use std::io::Cursor;
@@ -17,7 +17,7 @@ fn problem(line: &str) -> RecordProblem {
     }
 }
 
-/// C-3: a reset of all boards is a frame like any other.
+/// C-3: a reset of all boards is read and written like any other frame.
 #[test]
 fn c3_reset_for_all_is_kept() {
     let records = read("(1.5) can0 000#\n").unwrap();
@@ -35,7 +35,7 @@ fn times_have_any_number_of_digits() {
     assert_eq!(ns, [0, 500_000_000, 123_456_000, 123_456_789, 123_456_789]);
 }
 
-/// can-utils of 2020 refuse a log whose times do not have six decimals.
+/// can-utils of 2020 refuses a log whose times do not have six decimals.
 #[test]
 fn times_are_written_with_six_decimals() {
     let frame = RecordedFrame::classic(0x680, &[]);
@@ -118,7 +118,7 @@ fn frames() -> impl Strategy<Value = RecordedFrame> {
     })
 }
 
-/// Returns the bytes that a file's writer left when it was killed.
+/// Returns the bytes in a file whose writer was killed.
 fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("recording");
@@ -132,7 +132,7 @@ fn left_behind(format: RecordingFormat, records: &[Record]) -> Vec<u8> {
     bytes
 }
 
-/// A killed writer leaves a file that is cut off at any place. Whole records are read, no record is invented, and the remainder is
+/// If a writer is killed, its file can be cut off at any place. All complete records are read, no record is invented, and the damage is
 /// reported.
 #[test]
 fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
@@ -169,7 +169,7 @@ fn a_file_that_is_cut_off_is_read_up_to_its_last_whole_record() {
     }
 }
 
-/// As before, but a chunk of MCAP was being written: its head does not contain its length yet.
+/// The file of a killed writer, with an MCAP chunk that was being written. The head of the chunk does not contain its length yet.
 #[test]
 fn a_chunk_without_its_end_hides_nothing_before_it() {
     let record = |i: u64| {
@@ -216,7 +216,7 @@ proptest! {
         prop_assert_eq!(read(&text).unwrap(), records);
     }
 
-    /// C-7 for FZI-CAN: frames that the format can hold are read back unchanged, DLC below 8 included.
+    /// C-7 for FZI-CAN: frames that the format can represent are read back unchanged, including frames with a DLC below 8.
     #[test]
     fn c7_fzi_round_trip(records in records(true)) {
         let mut out = FziWriter::new(Vec::new()).unwrap();
@@ -239,7 +239,7 @@ proptest! {
         prop_assert_eq!(back.profile.as_deref(), Some("endian = \"big\"\n"));
     }
 
-    /// Random text gives records or a named error.
+    /// Random text gives records or a specific error.
     #[test]
     fn any_text_is_read_or_refused(text in "[ -~\n#()R]{0,200}", bytes in prop::collection::vec(any::<u8>(), 0..200)) {
         let _ = read(&text);

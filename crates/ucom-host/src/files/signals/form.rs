@@ -1,4 +1,4 @@
-//! TOML form of a signal table, and the ranges of its numbers.
+//! TOML form of a signal table, and the valid ranges of its numbers.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use super::value::may_follow;
 use super::{Signal, SignalType};
 
-/// Largest scale and offset; the smallest scale is its inverse. The limit keeps displayed values within the range of a number.
+/// Largest scale and offset. The smallest scale is the inverse. These limits keep displayed values within the range of a number.
 pub(super) const LARGEST: f64 = 1e9;
 
 #[derive(Deserialize)]
@@ -49,7 +49,7 @@ impl Default for FileSignal {
     }
 }
 
-/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the place of a mistake.
+/// Reads `0x1234` or `[0x1234, 0x4B3F]`. An untagged enum would lose the place of an error.
 fn one_or_many<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Vec<u16>, D::Error> {
     struct Ids;
     impl<'de> serde::de::Visitor<'de> for Ids {
@@ -119,7 +119,7 @@ impl FileSignal {
     }
 }
 
-/// Rewords the TOML library's message for the author of the table.
+/// Rewords a message of the TOML library for the author of the table.
 pub(super) fn people(words: &str) -> String {
     let terms = [
         ("duplicate key", "the same key is given twice"),

@@ -1,5 +1,5 @@
-//! Signal tables: type, scale, offset, unit and limits of a program's inputs, outputs and parameters (D-11), as in the `SG_` lines of a
-//! DBC file. The table is a separate file because boards send only a text for each signal.
+//! Signal tables: type, scale, offset, unit and limits of the inputs, outputs and parameters of a program (D-11), like the `SG_` lines of a
+//! DBC file. The table is a separate file, because boards send only a text for each signal.
 
 mod form;
 mod signal;
@@ -23,7 +23,7 @@ pub struct BoardSignals {
 }
 
 impl BoardSignals {
-    /// Creates the signals of a description. A signal that the table does not know becomes a bare word.
+    /// Creates the signals of a description. A signal that is not in the table becomes a raw word.
     pub fn new(description: &IoDescription, program: Option<&ProgramSignals>, profile: &Profile) -> Self {
         let of = |kind: Kind| {
             let names = description.names(kind).iter().enumerate();
@@ -36,8 +36,8 @@ impl BoardSignals {
         Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 
-    /// Returns the signals of a program that the given table does not know. Only words themselves are accepted, because the units of
-    /// numbers are not known.
+    /// Returns the signals of a program for which the signal table has no entry. They accept only raw words, because the units of numbers
+    /// are not known.
     pub fn raw_only(mut self) -> Self {
         for signal in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
             signal.raw_only = true;

@@ -15,30 +15,30 @@ pub enum SignalType {
     Int16,
     /// Unsigned.
     Uint16,
-    /// Bits, shown as 0x0000; has no scale.
+    /// Bits, displayed like 0x0000. Has no scale.
     Hex,
-    /// Off (0) or on (1); has no scale.
+    /// Off (0) or on (1). Has no scale.
     Bool,
 }
 
-/// Meaning of a signal's word: `word × scale + offset`, in a unit.
+/// Meaning of a signal's word: the value in the signal's unit is `word × scale + offset`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
     /// Number type of the word.
     pub kind: SignalType,
     /// Units per step of the word.
     pub scale: f64,
-    /// Value of the word 0, in units.
+    /// Value of the word 0, in the signal's unit.
     pub offset: f64,
     /// Unit such as `deg`; empty if there is none.
     pub unit: String,
-    /// Smallest value that may be written, in units.
+    /// Smallest value that may be written, in the signal's unit.
     pub min: Option<f64>,
-    /// Largest value that may be written, in units.
+    /// Largest value that may be written, in the signal's unit.
     pub max: Option<f64>,
-    /// `true` if the signal comes from a table; otherwise it is a bare word.
+    /// `true` if a table has an entry for the signal; otherwise its word is raw.
     pub known: bool,
-    /// `true` if a table is given that does not know the program: only the word itself is accepted.
+    /// `true` if a table is used that has no entry for the program. Then only raw words are accepted.
     pub raw_only: bool,
 }
 
@@ -46,7 +46,7 @@ pub struct Signal {
 const SLACK: f64 = 1e-9;
 
 impl Signal {
-    /// Creates a signal that no table knows: a bare word, signed or not by the profile.
+    /// Creates a signal that is in no table: a raw word, signed or unsigned as the profile defines.
     pub fn bare(profile: &Profile) -> Self {
         let kind = if profile.pd_signed { SignalType::Int16 } else { SignalType::Uint16 };
         Self {
@@ -70,7 +70,7 @@ impl Signal {
         self.kind == SignalType::Int16
     }
 
-    /// Returns the range of the word as a number.
+    /// Returns the smallest and the largest number that the word can hold.
     fn words(&self) -> (i32, i32) {
         match self.kind {
             SignalType::Int16 => (-32768, 32767),
@@ -87,7 +87,7 @@ impl Signal {
         f64::from(number) * self.scale + self.offset
     }
 
-    /// Returns the number of decimals that distinguish two neighbouring words.
+    /// Returns the number of decimals that are needed to distinguish two neighbouring words.
     fn digits(&self) -> usize {
         let written = |x: f64| format!("{x}").split_once('.').map_or(0, |(_, digits)| digits.len());
         let enough = (-self.scale.abs().log10()).ceil().max(0.0) as usize + 2;
@@ -96,7 +96,7 @@ impl Signal {
 
     fn written(&self, value: f64) -> String {
         let text = format!("{value:.*}", self.digits());
-        // Rounding may leave a sign in front of zero.
+        // Rounding can give a negative zero, whose sign is removed.
         let zero = text.starts_with('-') && text.chars().all(|c| "-0.".contains(c));
         if zero { text.trim_start_matches('-').into() } else { text }
     }
@@ -115,7 +115,7 @@ impl Signal {
         self.text(word) + &space(&self.unit)
     }
 
-    /// Returns the value for programs: a number in the signal's unit, or true and false.
+    /// Returns the value as JSON: a number in the signal's unit, or true or false.
     pub fn json(&self, word: u16) -> Value {
         match self.kind {
             SignalType::Bool => json!(word != 0),
@@ -125,7 +125,7 @@ impl Signal {
         }
     }
 
-    /// Returns the smallest and the largest value that may be written, in units.
+    /// Returns the smallest and the largest value that may be written, in the signal's unit.
     pub fn range(&self) -> (f64, f64) {
         let (low, high) = self.words();
         let (a, b) = (self.scaled(low), self.scaled(high));
@@ -140,7 +140,7 @@ impl Signal {
         }
         let text = |limit: f64, own: Option<f64>| {
             let text = self.written(limit);
-            // A limit of the table that lies between two words is shown unchanged.
+            // A limit of the table that lies between two words is displayed unchanged.
             let odd = own == Some(limit) && text.parse() != Ok(limit);
             if odd { limit.to_string() } else { text }
         };
@@ -148,7 +148,8 @@ impl Signal {
         (text(low, self.min), text(high, self.max))
     }
 
-    /// Returns the smallest and largest word, as numbers, whose values are within the limits; the first is larger if no word is.
+    /// Returns the smallest and the largest word, as numbers, with values within the limits. If no word is within them, the first number is
+    /// larger than the second.
     pub(super) fn allowed(&self) -> (i32, i32) {
         let (low, high) = self.words();
         let steps = |limit: f64| (limit - self.offset) / self.scale;
@@ -159,7 +160,7 @@ impl Signal {
         (from.map_or(low, |from| from.max(low)), to.map_or(high, |to| to.min(high)))
     }
 
-    /// Returns `true` if a value keeps the limits, within the tolerance of floating-point arithmetic.
+    /// Returns `true` if a value is within the limits, with a tolerance for floating-point arithmetic.
     fn within(&self, value: f64) -> bool {
         let slack = |limit: f64| SLACK * (limit.abs().max(value.abs()) + self.scale.abs());
         let below = self.min.is_some_and(|min| value < min - slack(min));
@@ -167,7 +168,7 @@ impl Signal {
         !below && !above
     }
 
-    /// Returns the value, with its unit, that is sent instead of a value between two words; `None`: the value itself is sent.
+    /// Returns the value that is really sent, with its unit, if the requested value lies between two words; `None` otherwise.
     pub fn rounded(&self, given: &SignalValue, word: u16) -> Option<String> {
         let SignalValue::Number { value, .. } = given else { return None };
         let sent = self.scaled(self.number(word));
@@ -175,18 +176,18 @@ impl Signal {
         (!same).then(|| self.text_with_unit(word))
     }
 
-    /// Returns the word for a value. A value between two words gives the nearer word if the signal has a scale, but never a word beyond
+    /// Returns the word for a value. If the signal has a scale, a value between two words gives the nearer word, but never a word beyond
     /// the limits.
     ///
     /// # Errors
-    /// The value is out of the limits, in another unit, between two words of a signal without a scale, or of another type.
+    /// The value is out of the limits, has another unit or type, or lies between two words of a signal without a scale.
     pub fn word(&self, given: &SignalValue) -> Result<u16, ValueError> {
         let text = || given.to_string();
         let number = match (given, self.kind) {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // The word itself is sent unscaled; limits apply to it as well.
+            // A raw word is sent unchanged, whatever the scale is. The limits apply to it as well.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {
@@ -201,7 +202,7 @@ impl Signal {
                 if !unit.is_empty() && *unit != self.unit {
                     return Err(ValueError::Unit { given: text(), unit: self.unit.clone() });
                 }
-                // Otherwise the meaning of a bare number would depend on the table in the directory.
+                // Without this check, the meaning of a number without a unit would depend on the signal table in the directory.
                 if unit.is_empty() && self.known && (!self.unit.is_empty() || !self.plain()) {
                     return Err(ValueError::NoUnit { given: text(), unit: self.unit.clone() });
                 }
@@ -224,12 +225,12 @@ impl Signal {
         Ok(number as u16)
     }
 
-    /// Returns the error for a value, in the signal's unit, that is out of the limits.
+    /// Returns the error for a value that is out of the limits; `value` is in the signal's unit.
     fn outside(&self, given: &SignalValue, value: f64) -> ValueError {
         let (min, max) = self.limits();
         let (low, high) = self.range();
         let (limit, shown) = if value < low { (low, &min) } else { (high, &max) };
-        // Without the digits that floating-point arithmetic adds.
+        // Removes the digits that floating-point arithmetic adds.
         let limit = shown.parse().unwrap_or(limit);
         ValueError::Range { given: given.to_string(), min, max, unit: self.unit.clone(), value, limit }
     }

@@ -1,4 +1,4 @@
-//! The file: TOML with tables by Program ID.
+//! Signal table files: TOML with one table for each Program ID.
 
 use super::Signal;
 use super::form::{File, FileSignal, LARGEST, people};
@@ -20,7 +20,7 @@ pub struct SignalTable {
 /// Signals of a program.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProgramSignals {
-    /// Program IDs of the program versions that the table fits.
+    /// Program IDs of the versions of the program to which the table applies.
     pub program_ids: Vec<u16>,
     /// Name for display.
     pub name: String,
@@ -36,10 +36,10 @@ pub enum SignalTableError {
     /// The file cannot be read.
     #[error(transparent)]
     Text(#[from] TextError),
-    /// Not TOML of this form; the text names the line.
+    /// The text is not TOML of this form. The message contains the line.
     #[error("{0}")]
     Form(String),
-    /// A program without an ID.
+    /// A program has no ID.
     #[error("program {number} has no program_id")]
     NoId {
         /// Index, from 1.
@@ -51,7 +51,7 @@ pub enum SignalTableError {
         /// The Program ID.
         id: u16,
     },
-    /// A number that is not valid.
+    /// A number is not valid.
     #[error("program 0x{id:04X}, {kind} `{signal}`: {what}")]
     Signal {
         /// The first Program ID.
@@ -60,7 +60,7 @@ pub enum SignalTableError {
         kind: &'static str,
         /// The signal.
         signal: String,
-        /// Error, with the limit.
+        /// Error text, with the limit.
         what: String,
     },
     /// Error in a file.
@@ -113,7 +113,7 @@ impl SignalTable {
         Self::parse(&text).map_err(|e| SignalTableError::In { path: path.into(), source: Box::new(e) })
     }
 
-    /// Returns `true` if a table was read; otherwise the meaning of words is unknown.
+    /// Returns `true` if a table was read. Otherwise the meaning of words is unknown.
     pub fn is_given(&self) -> bool {
         self.given
     }
@@ -123,8 +123,8 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// Returns the file's text for programs that need a table: every name, with scale and unit as guessed from the texts of the boards.
-    /// An expert must review it.
+    /// Returns the text of a table for programs that need one. It contains every name, with scale and unit guessed from the texts of the
+    /// boards. An expert must review it.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\
@@ -149,7 +149,8 @@ impl SignalTable {
                         name if unique => quoted(name),
                         _ => format!("\"#{i}\""),
                     };
-                    // Two signals share a name, and a third has the number of the second as its name: not solvable.
+                    // Skips a key that is already used: two signals share a name, and a third signal is called like the index of one of
+                    // them, such as `#2`.
                     if used.insert(key.clone()) {
                         text += &format!("{key} = {{ {} }}\n", keys(name));
                     }
@@ -160,7 +161,7 @@ impl SignalTable {
     }
 }
 
-/// Returns `scale = 0.01, unit = "deg"` for `position [0.01 deg]`.
+/// Returns keys such as `scale = 0.01, unit = "deg"` for a name such as `position [0.01 deg]`.
 fn keys(name: &str) -> String {
     let bracket =
         name.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside.trim());
@@ -182,7 +183,7 @@ fn keys(name: &str) -> String {
 }
 
 impl ProgramSignals {
-    /// Returns the known signals of one kind, by the table's own names.
+    /// Returns the names in the table of one kind of signal.
     pub fn names(&self, kind: Kind) -> impl Iterator<Item = &String> {
         self.of(kind).keys()
     }
@@ -195,8 +196,8 @@ impl ProgramSignals {
         }
     }
 
-    /// Returns a signal: by its whole text, its text without the unit in brackets, or its number. Letter case is ignored
-    /// if names stay distinct without it, as for names given by the user.
+    /// Returns a signal by its complete name, its name without the unit in brackets, or its index. The letter case is ignored if the names
+    /// are still distinct then; this is the same rule as for names given by the user.
     pub fn signal(&self, kind: Kind, index: usize, name: &str) -> Option<&Signal> {
         let all = self.of(kind);
         let like = |wanted: &str| {
@@ -210,7 +211,7 @@ impl ProgramSignals {
             .or_else(|| all.get(&format!("#{index}")))
     }
 
-    /// Returns names in the table that the program does not have, which are mostly typing errors.
+    /// Returns the names in the table that the program does not have. Most of them are typing errors.
     pub fn strays(&self, description: &IoDescription) -> Vec<String> {
         let mut strays = Vec::new();
         for kind in [Kind::Ci, Kind::So, Kind::Par] {
@@ -249,7 +250,7 @@ mod tests {
         }
     }
 
-    /// D-11: the Program ID selects the table. A signal without an entry stays a bare word.
+    /// D-11: the Program ID selects the table. A signal without an entry stays a raw word.
     #[test]
     fn d11_tables_are_found_by_program_and_name() {
         let text = "[[program]]\nprogram_id = [0x1234, 0x4B3F]\n[program.ci]\nset_position = { scale = 0.01, unit = \"deg\" }\n\
@@ -296,7 +297,7 @@ mod tests {
         assert!(form("[[program]]\nprogram_id = 70000").contains("line 2"));
     }
 
-    /// D-11: letter case does not matter for names, as with given values.
+    /// D-11: the letter case of names in the table does not matter, as for values given by the user.
     #[test]
     fn d11_names_of_the_table_are_found_in_any_case() {
         let text = "[[program]]\nprogram_id = 1\n[program.ci]\nSet_Position = { scale = 0.01, unit = \"deg\" }\n\
@@ -309,7 +310,7 @@ mod tests {
         assert!(table.is_given() && !SignalTable::default().is_given());
     }
 
-    /// A template is a valid table and names every signal.
+    /// A template is a valid table and contains every signal.
     #[test]
     fn a_template_is_a_table_of_all_signals() {
         let text = SignalTable::template(&[(0x1234, &description())]);

@@ -1,16 +1,16 @@
-//! Value as written by a user: on a command line, in a parameter file.
+//! Value written by a user, on a command line or in a parameter file.
 use core::fmt;
 use core::str::FromStr;
 
 /// Longest unit, in bytes.
 const UNIT_MAX: usize = 32;
 
-/// A value whose signal is not known yet.
+/// A value that is not assigned to a signal yet.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SignalValue {
-    /// `0x05DC`: the word itself, for any type and scale of the signal.
+    /// `0x05DC`: a raw word, whatever the type and scale of the signal are.
     Raw(u16),
-    /// `15.5 deg`: in the unit of the signal. `15.5`: for a signal without a unit; without a table, the word as a number.
+    /// `15.5 deg`: a value in the signal's unit. `15.5`: a value of a signal without a unit; if there is no table, the word as a number.
     Number {
         /// The number.
         value: f64,
@@ -21,13 +21,13 @@ pub enum SignalValue {
     Switch(bool),
 }
 
-/// Texts that are not valid values.
+/// Reasons why a text is not a valid value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalValueError {
-    /// Hexadecimal, but not a word of 16 bits.
+    /// The text is hexadecimal, but not a 16-bit word.
     #[error("\"{0}\" is no word of 16 bits; they are 0x0000 to 0xFFFF")]
     Hex(String),
-    /// Not a value of any form.
+    /// The text has none of the forms of a value.
     #[error(
         "\"{0}\" is no value; values are numbers (15.5deg; without a unit where there is none), words (0x05DC), on and off"
     )]
@@ -50,11 +50,11 @@ impl FromStr for SignalValue {
             return word.map(Self::Raw).ok_or_else(|| SignalValueError::Hex(text.into()));
         }
         let wrong = || SignalValueError::Form(text.into());
-        // Words like "inf" and "nan" are numbers for Rust, but not for users.
+        // Rust reads words like "inf" and "nan" as numbers, but users do not mean numbers.
         if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) || text.len() > 64 {
             return Err(wrong());
         }
-        // The number is the longest valid beginning; the remainder is its unit.
+        // The number is the longest valid beginning. The remainder is the unit.
         let ends = (1..=text.len()).rev().filter(|end| text.is_char_boundary(*end));
         let mut parts = ends.map(|end| text.split_at(end));
         let (value, unit) =
@@ -62,7 +62,7 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // 0o10 and -0x10 are numbers elsewhere, not 0 with a unit of that name.
+        // 0o10 and -0x10 are numbers in other languages. They are refused, so that they are not read as 0 with a unit.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined
@@ -76,7 +76,7 @@ impl FromStr for SignalValue {
     }
 }
 
-/// Returns `true` if a unit can follow a number without becoming a part of it.
+/// Returns `true` if a unit can follow a number without being read as a part of it.
 pub(super) fn may_follow(unit: &str) -> bool {
     !unit.starts_with(|c: char| c.is_ascii_digit() || "+-.,_:;'".contains(c))
 }
@@ -93,7 +93,7 @@ impl fmt::Display for SignalValue {
             Self::Raw(word) => write!(f, "0x{word:04X}"),
             Self::Number { value, unit } => {
                 let size = value.abs();
-                // 1e300 is not printed with 300 zeros.
+                // Without this, 1e300 would be printed with 300 zeros.
                 if *value != 0.0 && !(1e-6..1e15).contains(&size) {
                     write!(f, "{value:e}")?;
                 } else {
@@ -133,7 +133,7 @@ mod tests {
             assert!(given(wrong).is_err(), "{wrong}");
         }
         assert_eq!(given("5m/s2"), number(5.0, "m/s2"));
-        // The displayed form of an accepted text is accepted again, although it has one more blank.
+        // The displayed form of an accepted text is also accepted, although it has an additional blank.
         assert!(given(&format!("0{}", "µ".repeat(31))).is_err());
         for (text, short) in [("1e300", "1e300"), ("-2e-9 A", "-2e-9 A"), ("123456.5", "123456.5")] {
             assert_eq!(given(text).unwrap().to_string(), short);

@@ -2,10 +2,10 @@
 /// Reasons why a value cannot be written to a signal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ValueError {
-    /// Too large or too small.
+    /// The value is too large or too small.
     #[error("{given} is outside {min}..{max}{}", space(unit))]
     Range {
-        /// Given text.
+        /// Text of the user.
         given: String,
         /// Smallest value.
         min: String,
@@ -18,46 +18,46 @@ pub enum ValueError {
         /// The limit that was exceeded.
         limit: f64,
     },
-    /// The unit differs from the signal's.
+    /// The unit differs from the signal's unit.
     #[error("{given}: {}", if unit.is_empty() { "it has no unit that is known here".into() } else { format!("its unit is {unit}") })]
     Unit {
-        /// Given text.
+        /// Text of the user.
         given: String,
         /// The signal's unit.
         unit: String,
     },
-    /// A bare number that could be the word or a value in the signal's unit.
+    /// A number without a unit, which could be the raw word or a value in the signal's unit.
     #[error("{given}: {}, or the word itself as 0x0000", no_unit(given, unit))]
     NoUnit {
-        /// Given text.
+        /// Text of the user.
         given: String,
-        /// Unit of the signal; empty: the table scales the signal and names no unit.
+        /// Unit of the signal. Empty if the table scales the signal but has no unit for it.
         unit: String,
     },
-    /// A value between two words.
+    /// The value lies between two words.
     #[error("{given}: it is a whole number")]
     Fraction {
-        /// Given text.
+        /// Text of the user.
         given: String,
     },
-    /// A value other than 0, 1, on or off.
+    /// The value is not 0, 1, on or off.
     #[error("{given}: it is on or off")]
     Switch {
-        /// Given text.
+        /// Text of the user.
         given: String,
     },
-    /// A number or a switch without a known meaning here.
+    /// The value is a number or a switch, but the meaning of the signal is not known.
     #[error(
         "{given}: the signal table knows nothing of this program, so only the word itself (0x0000 to 0xFFFF) can be given"
     )]
     Meaning {
-        /// Given text.
+        /// Text of the user.
         given: String,
     },
-    /// On or off for a signal that is a number.
+    /// The value is on or off, but the signal is a number.
     #[error("{given}: it is a number")]
     NoSwitch {
-        /// Given text.
+        /// Text of the user.
         given: String,
     },
 }

@@ -29,7 +29,7 @@ fn d11_a_bare_word_is_signed_unless_the_profile_says_otherwise() {
     assert!(word(&unsigned, "-1").is_err() && word(&unsigned, "65536").is_err());
 }
 
-/// With a table that does not know the program, numbers have no meaning.
+/// If the table has no entry for the program, numbers have no meaning.
 #[test]
 fn d11_without_meaning_only_the_word_itself_is_taken() {
     let signal = Signal { raw_only: true, ..Signal::bare(&Profile::default()) };
@@ -46,11 +46,11 @@ fn d11_scale_offset_and_unit() {
     assert_eq!(word(&angle, "-15.504 deg"), Ok(-1550_i16 as u16));
     assert_eq!(angle.text_with_unit(0xFFFF), "-0.01 deg");
     assert_eq!(angle.json(1550), json!(15.5));
-    // The number could be the word, or a value in the unit.
+    // The number could be the raw word or a value in the unit.
     let message = word(&angle, "15").unwrap_err().to_string();
     assert_eq!(message, "15: the unit is missing: `15deg`, or the word itself as 0x0000");
     assert!(word(&angle, "0").is_err());
-    // The word itself is never scaled.
+    // A raw word is never scaled.
     assert_eq!(word(&angle, "0x0010"), Ok(16));
     let message = word(&angle, "400 deg").unwrap_err().to_string();
     assert_eq!(message, "400 deg is outside -327.68..327.67 deg");
@@ -59,7 +59,7 @@ fn d11_scale_offset_and_unit() {
     assert_eq!((warm.text(643), word(&warm, "24.3°C")), ("24.3".into(), Ok(643)));
     let down = signal(SignalType::Int16, -0.5, 0.0, "");
     assert_eq!((down.text(3), down.limits().0), ("-1.5".into(), "-16383.5".into()));
-    // Without the table the number would mean the word. Without a unit only the word can be given.
+    // Without the table the number would be the raw word. The signal has no unit, so only a raw word is accepted.
     let message = word(&down, "2").unwrap_err().to_string();
     assert!(
         message.starts_with("2: the table scales it and names no unit") && message.contains("0x0000"),
@@ -78,7 +78,7 @@ fn d11_limits_of_the_table_hold_for_every_form() {
     assert!(word(&signal, "0x03E9").is_err() && word(&signal, "-0.01A").is_err());
 }
 
-/// For any step size, no value beyond a limit is accepted and no word beyond it is sent.
+/// For any step size, no value beyond a limit is accepted, and no word beyond a limit is sent.
 #[test]
 fn d11_rounding_never_leaves_the_limits() {
     let coarse = Signal { max: Some(150.0), ..signal(SignalType::Int16, 100.0, 0.0, "mA") };
@@ -147,7 +147,7 @@ proptest! {
         }
     }
 
-    /// The displayed text of a word gives that word again.
+    /// The displayed text of a word is read as the same word.
     #[test]
     fn d11_text_gives_the_word_again(w: u16, kind in 0..4_usize, exponent in -6..4_i32, mantissa in 1..100_u32, negative: bool, offset in -1000..1000_i32) {
         let kind = [SignalType::Int16, SignalType::Uint16, SignalType::Hex, SignalType::Bool][kind];

@@ -1,6 +1,6 @@
-//! The controller of this computer has left the bus (bus-off, ISO 11898-1): the message and the next command.
+//! Bus-off (ISO 11898-1): the message when the CAN controller of this computer has left the bus, and the next command.
 
-/// Minimum time between two messages, µs, because with a bad wire the controller is bus-off again and again.
+/// Minimum time between two messages in µs. With a bad wire the controller is bus-off again and again.
 const AGAIN_US: u64 = 5_000_000;
 
 /// The likely causes.
@@ -15,7 +15,7 @@ pub struct BusOff {
 }
 
 impl BusOff {
-    /// Returns the message for a new bus-off; `None` if there is no new one or if one was reported in the last 5 s.
+    /// Returns the message for a new bus-off; `None` if there is no new one, or if a bus-off was reported in the last 5 s.
     pub fn look(&mut self, times: u64, now_us: u64, url: &str) -> Option<String> {
         let new = times.saturating_sub(self.reported);
         if new == 0 || self.reported_us.is_some_and(|at| now_us.saturating_sub(at) < AGAIN_US) {
@@ -30,8 +30,8 @@ impl BusOff {
     }
 }
 
-/// Returns the command that ends the bus-off or finds its cause. Only interfaces of the kernel stay off the bus
-/// until a command restarts them.
+/// Returns the command that ends the bus-off or finds its cause. Only the kernel's CAN interfaces stay off the bus until a command restarts
+/// them.
 pub fn next(url: &str) -> String {
     match url.strip_prefix("socketcan:") {
         Some(interface) => format!(
@@ -45,7 +45,7 @@ pub fn next(url: &str) -> String {
 mod tests {
     use super::*;
 
-    /// The first bus-off is reported at once, later ones at most every 5 s, and each is counted.
+    /// The first bus-off is reported at once, later ones at most every 5 s. The report contains the number of bus-offs.
     #[test]
     fn it_is_reported_once_and_counted() {
         let mut off = BusOff::default();

@@ -1,33 +1,33 @@
-//! Cache between sessions: small files in a directory.
+//! Cache that keeps data between sessions, as small files in a directory.
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Longest file that is read in advance, bytes.
+/// Size limit of a file that is read in advance, in bytes.
 const FILE_MAX: u64 = 1 << 20;
-/// Limit of files that wait for the disk; further files are not stored.
+/// Limit of files that wait to be written. Files beyond it are not stored on the disk.
 const WAITING_MAX: usize = 64;
 
-/// Place of the cached names, and a flag to ignore them.
+/// Cache of names, and a flag to ignore it.
 #[derive(Clone, Debug, Default)]
 pub struct Cache {
     place: Place,
-    /// `true` to ask the boards although their names are known.
+    /// `true` to ask the boards for their names although the names are cached.
     pub fresh: bool,
 }
 
 #[derive(Clone, Debug, Default)]
 enum Place {
-    /// The session has no cache.
+    /// There is no cache.
     #[default]
     Nowhere,
     Directory(PathBuf),
     Memory(Memory),
 }
 
-/// Files of a directory in memory, and the channel to the thread that writes new ones.
+/// The files of a directory in memory, and the channel to the thread that writes new files.
 #[derive(Clone, Debug)]
 struct Memory {
     texts: Arc<Mutex<BTreeMap<String, String>>>,
@@ -35,24 +35,24 @@ struct Memory {
 }
 
 impl Cache {
-    /// Creates a cache in this directory; `None`: no cache.
+    /// Creates a cache in this directory; `None` for a session without a cache.
     pub fn new(directory: Option<PathBuf>, fresh: bool) -> Self {
         Self { place: directory.map_or(Place::Nowhere, Place::Directory), fresh }
     }
 
-    /// Like `new`, for a caller that must never wait for a disk. Reads all files now; a separate thread writes new files.
+    /// Converts the cache for a caller that must never wait for a disk. Reads all files now; a separate thread writes new files.
     #[must_use]
     pub fn in_memory(self) -> Self {
         let Self { place: Place::Directory(directory), fresh } = self else { return self };
         let texts = Arc::new(Mutex::new(all(&directory)));
         let (writer, written) = sync_channel::<(String, String)>(WAITING_MAX);
-        // The thread ends with the last clone of this cache, which does not wait for it. Data that could not be stored is read from the
-        // boards again.
+        // The thread ends with the last clone of this cache, but the clone does not wait for it. If data are not stored in time, they are
+        // read from the boards again.
         std::thread::spawn(move || written.iter().for_each(|(name, text)| write(&directory, &name, text)));
         Self { place: Place::Memory(Memory { texts, writer }), fresh }
     }
 
-    /// Returns a cache that ignores stored names, so that boards are asked again.
+    /// Returns a cache that ignores the stored names, so that the boards are asked again.
     pub(super) fn refreshed(&self) -> Self {
         Self { fresh: true, ..self.clone() }
     }
@@ -68,7 +68,7 @@ impl Cache {
         }
     }
 
-    /// Stores a file. A failed write is ignored and does not count as an error.
+    /// Stores a file. If writing fails, the failure is ignored.
     pub(super) fn write(&self, name: String, text: String) {
         match &self.place {
             Place::Nowhere => {}
@@ -90,7 +90,7 @@ fn all(directory: &Path) -> BTreeMap<String, String> {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     let text = |entry: fs::DirEntry| {
         let name = entry.file_name().into_string().ok().filter(|name| name.ends_with(".json"))?;
-        // Only regular files: reading from anything else could block for ever.
+        // Only regular files are read. Reading from other files could block for ever.
         let about = entry.metadata().ok().filter(|about| about.is_file() && about.len() <= FILE_MAX);
         about.and_then(|_| Some((name, fs::read_to_string(entry.path()).ok()?)))
     };
@@ -107,7 +107,7 @@ mod tests {
         let on_disk = Cache::new(Some(dir.path().join("new")), false);
         on_disk.write("a.json".into(), "1".into());
         let cache = on_disk.clone().in_memory();
-        // From here on the cache does not read the disk.
+        // From here on the cache does not read from the disk.
         on_disk.write("a.json".into(), "2".into());
         assert_eq!(cache.read("a.json").as_deref(), Some("1"));
         cache.write("b.json".into(), "3".into());

@@ -1,4 +1,5 @@
-//! Single actions on several boards: no board is changed before all answer, and changes before a failure are reported.
+//! Single actions on several boards. No board is changed until all boards have answered. After a failure, the boards that were already
+//! changed are reported.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +10,7 @@ use super::error::SessionError;
 use super::selection::Boards;
 use crate::master::{Error, MasterError, Outcome, RawStatus, Request, StopLevel};
 
-/// A board by its number, with its answer to PC_INFO.
+/// Board number, with the board's answer to PC_INFO.
 pub type Numbered = (u8, BoardInfo);
 
 /// Result of a stop of several boards, or of switching off their outputs.
@@ -21,7 +22,7 @@ pub struct Stopped {
     pub failed: Vec<(u8, SessionError)>,
 }
 
-/// Returns the only board of an outcome.
+/// Returns the board of an outcome, which must have exactly one.
 fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
     match outcome {
         Outcome::Status { board, info } => Ok((board, info)),
@@ -31,7 +32,7 @@ fn numbered(outcome: Outcome) -> Result<Numbered, SessionError> {
 }
 
 impl SessionError {
-    /// Returns this error together with the boards that were changed before it, if there are any.
+    /// Adds the boards that were changed before this error, if there are any.
     #[must_use]
     pub fn after(self, done: impl IntoIterator<Item = u8>) -> Self {
         let done: Vec<u8> = done.into_iter().collect();
@@ -40,7 +41,7 @@ impl SessionError {
 }
 
 impl Driver {
-    /// Returns status and numbers of boards.
+    /// Returns number and status of boards.
     ///
     /// # Errors
     /// Error of the first board that does not answer.
@@ -48,10 +49,10 @@ impl Driver {
         boards.iter().map(|board| numbered(self.run(Request::Info { board: *board })?)).collect()
     }
 
-    /// Changes one board after the other, and no board before all of them answer.
+    /// Changes one board after the other. No board is changed until all of them have answered.
     ///
     /// # Errors
-    /// Error of the first board that fails; [`SessionError::Partly`] if others were changed before it.
+    /// Error of the first board that fails; [`SessionError::Partly`] if other boards were changed before.
     pub fn change_each(
         &mut self,
         boards: &[u8],
@@ -68,10 +69,10 @@ impl Driver {
         Ok(all)
     }
 
-    /// Sends one PC_SETSTATUS with these two bytes to each board, or by broadcast to all; `new = (old & ~mask) | value`.
+    /// Sends a single PC_SETSTATUS with these two bytes to each board, or a single broadcast to all: `new = (old & ~mask) | value`.
     ///
     /// # Errors
-    /// As [`Self::change_each`].
+    /// The errors of [`Self::change_each`].
     pub fn set_raw_status(
         &mut self,
         boards: &Boards,
@@ -95,7 +96,7 @@ impl Driver {
         Ok(all)
     }
 
-    /// Checks that each of several boards answers before the first one is changed.
+    /// If there are several boards, checks that each of them answers before the first one is changed.
     fn all_there(&mut self, boards: &[u8]) -> Result<(), SessionError> {
         let mut several = boards.iter().filter(|_| boards.len() > 1);
         several.try_for_each(|board| self.seen(*board).map(drop))
@@ -128,12 +129,12 @@ impl Driver {
         Ok(stopped)
     }
 
-    /// Makes the outputs of boards safe; their control loops go on. Commands every board, even if that board or another board does not
-    /// answer. Failures are collected.
+    /// Makes the outputs of boards safe; their control loops continue. Every board gets the command, even if this board or another one does
+    /// not answer. Failures are collected.
     pub fn outputs_safe(&mut self, boards: &[u8], force: bool) -> Stopped {
         let mut stopped = Stopped { boards: Vec::new(), failed: Vec::new() };
         for board in boards {
-            // After Ctrl-C the state of boards that were not commanded is unknown.
+            // After Ctrl-C the remaining boards get no command, so their state is unknown.
             let done = match self.stop_asked() {
                 true => Err(Error::Master(MasterError::Cancelled).into()),
                 false => self.run(Request::Stop { board: *board, level: StopLevel::Outputs, force }),
@@ -149,11 +150,11 @@ impl Driver {
         stopped
     }
 
-    /// Ends a run: all control loops at once, then applications in reverse order, then the session. Returns the boards that may still
-    /// run. Each reason is noted once, except for the reason in `known`.
+    /// Ends a run: first all control loops at once, then the applications in reverse order, then the session. Returns the boards that may
+    /// still run. Each reason is shown once, and the reason in `known` is not shown again.
     pub fn halt(&mut self, boards: &[u8], known: Option<String>) -> Vec<u8> {
         self.stop_at_once(Some(boards));
-        // A lost bus is lost for all boards.
+        // A lost bus gives the same reason for all boards, so it is shown once.
         let mut noted: BTreeSet<String> = known.into_iter().collect();
         let mut running = BTreeSet::new();
         for level in [StopLevel::Loop, StopLevel::Application] {

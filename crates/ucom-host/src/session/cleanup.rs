@@ -1,20 +1,20 @@
-//! Cleanup list: work that would be left undone if the process ended now, and the command that finishes it.
+//! List of work that would remain if the process ended now, and of the commands that finish it.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::master::{Request, StopLevel};
 
-/// Work that would be left undone if the process ended now, and the next command.
+/// Work that would remain if the process ended now, and the next command.
 type Cleanup = (String, String);
 
-/// List of unfinished work. A clone shares the list, also in the thread that receives Ctrl-C.
+/// List of unfinished work. Clones share one list, including the clone in the thread that receives Ctrl-C.
 #[derive(Clone, Debug, Default)]
 pub struct CleanupList(Arc<Mutex<State>>);
 
 #[derive(Debug, Default)]
 struct State {
-    /// Work that the requests in progress would leave undone, the outermost first.
+    /// Work that would remain of the requests in progress, the outermost request first.
     now: Vec<Option<Cleanup>>,
     /// Boards that a finished request left running.
     running: Vec<u8>,
@@ -26,7 +26,7 @@ struct State {
 
 impl State {
     fn words(&self) -> String {
-        // A request in progress on running boards does not hide that they run.
+        // Running boards are listed even if a request that works with them is in progress.
         let runs = (!self.running.is_empty()).then(|| cleanup_of_running(&self.running));
         let under_way = self.now.iter().flatten().next().cloned().filter(|_| runs.is_none());
         let started: Vec<String> =
@@ -47,12 +47,12 @@ impl State {
 }
 
 impl CleanupList {
-    /// Returns the work that would be left undone if the process ended now, and the command that finishes it, as lines for the operator.
+    /// Returns lines for the operator: the work that would remain if the process ended now, and the commands that finish it.
     pub fn words(&self) -> String {
         self.lock().words()
     }
 
-    /// Begins an action that is not a request. `what` is the work that it would leave undone, `next` the next command.
+    /// Begins an action that is not a request. `what` is the work that would remain, `next` the next command.
     pub fn begin_other(&self, what: &str, next: &str) {
         let mut state = self.lock();
         state.changed = true;
@@ -67,7 +67,7 @@ impl CleanupList {
         state.now.push(cleanup);
     }
 
-    /// Ends the request that began last. Boards that it started, or that run, remain on the list until they are stopped.
+    /// Ends the request that began last. Boards that it has started or that run stay on the list until they are stopped.
     pub fn end(&self, request: &Request, done: bool) {
         let mut state = self.lock();
         state.now.pop();
@@ -108,7 +108,7 @@ fn several(count: usize, list: &str) -> String {
     format!("board{} {list}", if count == 1 { "" } else { "s" })
 }
 
-/// Returns the work that a request may leave undone; `None` if the request changes no board.
+/// Returns the work that would remain of a request; `None` if the request changes no board.
 fn cleanup_of(request: &Request) -> Option<Cleanup> {
     let (what, next) = match request {
         Request::Scan | Request::Info { .. } | Request::Describe { .. } | Request::InitialInputs { .. } => {
@@ -163,7 +163,7 @@ mod tests {
         Request::Stop { board, level: StopLevel::Application, force: true }
     }
 
-    /// An action counts as undone until it ends, even while another action runs inside it.
+    /// An action stays on the list until it ends, even while another action runs inside it.
     #[test]
     fn what_is_left_undone() {
         let cleanup = CleanupList::default();
@@ -184,7 +184,7 @@ mod tests {
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
-    /// Boards that earlier requests of the same command started are named, for any request in progress.
+    /// The list contains boards that earlier requests of the same command have started, whatever request is in progress.
     #[test]
     fn boards_started_before_are_named() {
         let cleanup = CleanupList::default();
@@ -202,7 +202,7 @@ mod tests {
         assert!(cleanup.words().contains("ucom stop 2\n"));
     }
 
-    /// A dry run changes nothing, and the message says so.
+    /// A dry run changes nothing, and the message says this.
     #[test]
     fn a_dry_run_leaves_nothing_undone() {
         for dry_run in [true, false] {

@@ -1,4 +1,4 @@
-//! Runs procedures over a bus in wall-clock time, in one loop.
+//! Runs procedures on a bus in real time, in one loop.
 
 use std::cell::RefCell;
 use std::time::Duration;
@@ -17,25 +17,25 @@ use crate::master::{
     StopLevel, Supervision,
 };
 
-/// Operator of a session, who can end it and receives notes in addition to results.
+/// Operator of a session. The operator can end the session, and receives notes in addition to the results.
 pub trait Operator {
-    /// Returns `true` if the user requested an end (Ctrl-C).
+    /// Returns `true` if the operator requested an end (Ctrl-C).
     fn stop_asked(&self) -> bool;
-    /// Takes a line without waiting for a reader.
+    /// Shows a line. Must not wait until the line is read.
     fn note(&self, text: String);
-    /// Receives an event outside the running procedure; `text` is the note to show for it.
+    /// Handles an event that is not a result of the running procedure. `text` is the note for it.
     fn happened(&self, _event: &Event, text: Option<String>) {
         if let Some(text) = text {
             self.note(text);
         }
     }
-    /// Runs in each turn, also during procedures, for work that cannot wait for their end.
+    /// Called in each turn, even during procedures. For work that cannot wait for their end.
     fn turned(&self, _master: &mut Master, _link: &mut Link) {}
 }
 
 /// PC side on an open bus.
 pub struct Driver {
-    /// Procedures and boards.
+    /// The master: procedures and boards.
     pub master: Master,
     link: Link,
     pump: Pump,
@@ -51,7 +51,7 @@ struct Loss {
 }
 
 impl Driver {
-    /// Creates the PC side on a bus. `cleanup` lists the work that its requests would leave undone.
+    /// Creates the PC side on a bus. `cleanup` lists the work that would remain of its requests.
     pub fn new(profile: Profile, link: Link, operator: Box<dyn Operator>, cleanup: CleanupList) -> Self {
         let (master, pump) = (Master::new(profile), Pump::default());
         Self { master, link, pump, operator, cleanup, lost: RefCell::default() }
@@ -62,7 +62,7 @@ impl Driver {
         self.link.now_us()
     }
 
-    /// Returns the bus.
+    /// Returns the link to the bus.
     pub fn link(&mut self) -> &mut Link {
         &mut self.link
     }
@@ -72,7 +72,7 @@ impl Driver {
         self.operator.stop_asked()
     }
 
-    /// Delivers received frames and sends due frames; waits for either no longer than `patience`.
+    /// Delivers received frames and sends the frames that are due. Waits for either at most `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         let turned = self.pump.turn(&mut self.master, &mut self.link, patience);
         self.operator.turned(&mut self.master, &mut self.link);
@@ -82,12 +82,12 @@ impl Driver {
         turned
     }
 
-    /// Runs a procedure to its end. Ctrl-C cancels it; the procedure still undoes its changes on the boards.
+    /// Runs a procedure to its end. Ctrl-C cancels the procedure, which still undoes its changes on the boards.
     pub fn run(&mut self, request: Request) -> Result<Outcome, SessionError> {
         self.run_with(request, &mut |_| {})
     }
 
-    /// Like `run`, and passes every event to `see`.
+    /// Like `run`, but passes every event to `see`.
     pub fn run_with(
         &mut self,
         request: Request,
@@ -101,7 +101,7 @@ impl Driver {
         self.ask(board, true)
     }
 
-    /// Like `seen`, also after Ctrl-C, because a cancelled procedure may have left the board in any state.
+    /// Like `seen`, but is not cancelled by Ctrl-C, because a cancelled procedure may have left the board in any state.
     pub fn seen_for_certain(&mut self, board: u8) -> Result<BoardSeen, SessionError> {
         self.ask(board, false)
     }
@@ -113,12 +113,12 @@ impl Driver {
         }
     }
 
-    /// Ends control loops before anything else is sent or asked: those of these boards, or by broadcast those of all.
+    /// Stops the control loops of these boards, or of all boards by broadcast, before anything else is sent.
     pub fn stop_at_once(&mut self, boards: Option<&[u8]>) {
         self.master.stop_at_once(self.link.now_us(), boards);
     }
 
-    /// Stops a board, also after Ctrl-C, so that a started board is not left running.
+    /// Stops a board. Ctrl-C does not prevent this, so that no started board is left running.
     pub fn stop_board(&mut self, board: u8, level: StopLevel) -> Result<(), SessionError> {
         let request = Request::Stop { board, level, force: true };
         self.drive(request, false, &mut |_, _| {}).map(drop)
@@ -137,7 +137,7 @@ impl Driver {
             Err(error) => Err(error.into()),
         };
         self.cleanup.end(&request, result.is_ok());
-        // A board that does not answer may not have received the request.
+        // A board that does not answer may not have received the request, if this computer was bus-off.
         let was_off = self.link.times_bus_off() > times_off;
         result.map_err(|failure| match was_off && failure.kind() == ErrorKind::NoLink {
             true => SessionError::BusOff { failure: Box::new(failure), url: self.link.url().into() },
@@ -155,7 +155,7 @@ impl Driver {
         loop {
             let broken = self.turn(LOOK).err();
             if let Some(failure) = &broken {
-                // The procedure ends at once, with the known results.
+                // The bus has failed. The procedure ends at once with the results that are known.
                 self.master.abandon(id, &failure.to_string());
             }
             while let Some(event) = self.master.take_event() {
@@ -164,7 +164,7 @@ impl Driver {
                     Event::Done { id: done, result } if done == id => {
                         return match (result, broken) {
                             (Err(Error::Master(MasterError::Bus { .. })), Some(failure)) => Err(failure),
-                            // The results of boards are reported even if the bus fails.
+                            // The results for the boards are reported even if the bus fails.
                             (result, Some(_)) | (result @ Ok(Outcome::Update(_)), None) => Ok(result?),
                             (result, None) => {
                                 let sent = self.pump.flush(&mut self.master, &mut self.link);
@@ -196,7 +196,7 @@ impl Driver {
         self.operator.note(text);
     }
 
-    /// Returns an error if a board was lost, or if one of these boards has rebooted, according to the reports.
+    /// Returns an error if a board was lost, or if one of these boards has rebooted. The error is based on the supervision events so far.
     pub fn nobody_lost(&self, boards: &[u8]) -> Result<(), SessionError> {
         let losses = self.lost.borrow();
         let lost = losses.iter().filter(|l| !l.rebooted).count();
@@ -204,7 +204,7 @@ impl Driver {
         if lost + rebooted == 0 { Ok(()) } else { Err(SessionError::Lost { lost, rebooted }) }
     }
 
-    /// Notes an event outside a procedure.
+    /// Passes an event to the operator, with its note. `during` is the running procedure.
     pub fn note_event(&self, event: &Event, during: Option<ProcedureId>) {
         if let Event::Supervision {
             board,
@@ -217,12 +217,12 @@ impl Driver {
         self.operator.happened(event, event_text(event, during));
     }
 
-    /// Handles an event that is not noted.
+    /// Passes an event to the operator without a note.
     pub(super) fn pass_over(&self, event: &Event) {
         self.operator.happened(event, None);
     }
 
-    /// Returns the numbers of the selected boards. For `all` it scans the bus, and refuses if two boards have one number.
+    /// Returns the numbers of the selected boards. For `all`, scans the bus and returns an error if two boards have the same number.
     pub fn numbers(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         let numbers = self.numbers_to_stop(boards)?;
         match self.master.shared_numbers().into_iter().next() {
@@ -231,7 +231,7 @@ impl Driver {
         }
     }
 
-    /// Like `numbers`, but accepts numbers that two boards share, because a stop stops both.
+    /// Like `numbers`, but accepts numbers that two boards share, because a stop reaches both.
     pub fn numbers_to_stop(&mut self, boards: &Boards) -> Result<Vec<u8>, SessionError> {
         match boards {
             Boards::Some(numbers) => Ok(numbers.clone()),
@@ -245,7 +245,7 @@ impl Driver {
                 }));
                 numbers.sort_unstable();
                 if !numbers.is_empty() {
-                    // Boards that are not among these numbers are noted, not silently left out.
+                    // Boards that are not among these numbers are reported, so that they are not left out silently.
                     let more = report.findings.iter().filter(|finding| finding.error().is_none());
                     more.for_each(|finding| self.note(finding.to_string()));
                     return Ok(numbers);
@@ -259,7 +259,7 @@ impl Driver {
     }
 }
 
-/// Returns the text for an event; `None` if the procedure reports the event itself.
+/// Returns the note for an event; `None` if the procedure reports the event itself.
 pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> {
     Some(match event {
         Event::Note { text, .. } => text.clone(),
@@ -296,12 +296,12 @@ pub fn event_text(event: &Event, during: Option<ProcedureId>) -> Option<String> 
     })
 }
 
-/// Refuses to go on if two boards on the bus have one number.
+/// Returns an error if two boards on the bus have the same number.
 pub fn nothing_shared(master: &Master) -> Result<(), SessionError> {
     master.shared_numbers().into_iter().next().map_or(Ok(()), |error| Err(error.into()))
 }
 
-/// Returns one short line per finished test.
+/// Returns a short line about a finished test.
 fn test_text(test: &ConformanceTest) -> String {
     let how = match &test.verdict {
         Verdict::Pass => "passed",

@@ -1,4 +1,4 @@
-//! Errors of a session: a procedure or its environment failed.
+//! Errors of a session. Either a procedure failed, or something that it needs.
 use can_link::{CanError, InvalidFrame, OpenError};
 use host_kit::{Diagnose, Diagnosis, ErrorKind, Facts};
 
@@ -16,7 +16,7 @@ pub enum SessionError {
     /// A procedure failed.
     #[error(transparent)]
     Procedure(#[from] Error),
-    /// Values do not fit the boards, or the result of sending them is not known.
+    /// The values are not valid for the boards, or it is not known whether the boards received them.
     #[error(transparent)]
     Values(#[from] ValuesError),
     /// The inventory cannot be read.
@@ -28,13 +28,13 @@ pub enum SessionError {
     /// The open bus failed.
     #[error("{0}")]
     Bus(CanError),
-    /// The frame is not possible on this bus.
+    /// This bus cannot carry the frame.
     #[error("{0}")]
     Frame(InvalidFrame),
-    /// No answer came while the controller of this computer was bus-off, so the request may never have been sent.
+    /// No answer was received while the controller of this computer was bus-off, so the request may never have been sent.
     #[error("{failure}; the CAN controller of this computer was bus-off meanwhile")]
     BusOff {
-        /// Failure.
+        /// The failure.
         failure: Box<SessionError>,
         /// The URL of the bus.
         url: String,
@@ -42,15 +42,15 @@ pub enum SessionError {
     /// A board failed after other boards had been changed.
     #[error("{failure}; changed already: board {}", list(done))]
     Partly {
-        /// Failure.
+        /// The failure.
         failure: Box<SessionError>,
-        /// Boards that were changed before it.
+        /// Boards that had been changed before.
         done: Vec<u8>,
     },
     /// No board answers.
     #[error("no board answers")]
     NoBoards,
-    /// No board has a number.
+    /// Boards are present, but none of them has a number.
     #[error("{}", if *boards == 1 { "1 board is there, without a number".to_owned() } else { format!("{boards} boards are there, none has a number") })]
     NoNumbers {
         /// Number of boards.
@@ -59,15 +59,15 @@ pub enum SessionError {
     /// Boards were lost or have rebooted during the session.
     #[error("{}", losses(*lost, *rebooted))]
     Lost {
-        /// Number of losses of a board.
+        /// Number of times that a board was lost.
         lost: usize,
-        /// Number of reboots of a board.
+        /// Number of times that a board rebooted.
         rebooted: usize,
     },
-    /// Boards have left their control loops by themselves.
+    /// Boards left their control loops by themselves.
     #[error("{}", left(boards))]
     LeftLoop {
-        /// Their numbers.
+        /// Numbers of these boards.
         boards: Vec<u8>,
     },
     /// The names of boards' inputs, outputs and parameters are not known.
@@ -76,23 +76,23 @@ pub enum SessionError {
         /// These boards, each with its error.
         failed: Vec<(u8, SessionError)>,
     },
-    /// An outcome that does not fit its request: an error in this library.
+    /// The outcome is not of the kind that the request has. This is an error in this library.
     #[error("unexpected outcome {0:?}")]
     Unexpected(Box<Outcome>),
 }
 
-/// Reasons why values cannot be sent to boards, or why the result is not known.
+/// Reasons why values cannot be sent to boards, or why it is not known whether the boards received them.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ValuesError {
-    /// The board has no signal at this place.
+    /// The board has no signal with this index.
     #[error("board {board} has no {} {index}", kind.name())]
     NoSignal {
         /// Board number.
         board: u8,
         /// Buffer.
         kind: Kind,
-        /// Place in the buffer.
+        /// Index in the buffer.
         index: u16,
     },
     /// The value is not valid for the signal.
@@ -102,7 +102,7 @@ pub enum ValuesError {
         board: u8,
         /// Buffer.
         kind: Kind,
-        /// Name as given.
+        /// Name that the user gave.
         name: String,
         /// Program ID of the board.
         program_id: u16,
@@ -126,20 +126,20 @@ pub enum ValuesError {
         board: u8,
         /// Name of the signal.
         name: String,
-        /// Action for which boards were selected, as a verb.
+        /// Action for which the boards were selected, as a verb.
         to: &'static str,
     },
-    /// Values were sent, but the application did not run and could not take them.
+    /// Values were sent, but the application was not running and could not receive them.
     #[error("board {board}: values were sent, but {why}: what it has now is unknown{}", before(written))]
     Unknown {
         /// The board.
         board: u8,
         /// Reason.
         why: String,
-        /// Boards that were written before it; `None` if irrelevant.
+        /// Boards that were written before; `None` if there is no such list.
         written: Option<Vec<u8>>,
     },
-    /// A parameter file cannot be read, or has no value to write.
+    /// A parameter file cannot be read, or contains no value.
     #[error("{message}")]
     File {
         /// Message with the file's name.
@@ -147,7 +147,7 @@ pub enum ValuesError {
         /// Remedy.
         hint: &'static str,
     },
-    /// A parameter file does not fit the boards: one line for each mistake.
+    /// A parameter file does not match the boards. There is one line for each error.
     #[error("{}", lines.join("\n"))]
     Misfit {
         /// Lines, each with the file's name and the line number.
@@ -156,22 +156,22 @@ pub enum ValuesError {
 }
 
 impl SessionError {
-    /// Returns `true` if the operator requested an end before the procedure was complete.
+    /// Returns `true` if the operator ended the procedure before it was complete.
     pub fn is_cancelled(&self) -> bool {
         matches!(self, Self::Procedure(Error::Master(MasterError::Cancelled)))
     }
 
-    /// Returns `true` if the error concerns one board only, so that others may answer.
+    /// Returns `true` if the error concerns only one board, so other boards may still answer.
     pub(crate) fn is_of_one_board(&self) -> bool {
         matches!(self, Self::Procedure(Error::Exchange(_) | Error::Identity(_) | Error::Signal(_)))
     }
 
-    /// Returns `true` if the board could answer after a start of its application.
+    /// Returns `true` if the board could answer once its application is started.
     fn is_not_started(&self) -> bool {
         matches!(self, Self::Procedure(Error::Signal(SignalError::NoApplication { valid: true, .. })))
     }
 
-    /// Returns `true` if a board did not answer, for any reason.
+    /// Returns `true` if a board did not answer.
     pub fn is_no_answer(&self) -> bool {
         match self {
             Self::Procedure(Error::Exchange(ExchangeError::NoAnswer { .. })) => true,
@@ -288,7 +288,7 @@ impl Diagnose for ValuesError {
     }
 }
 
-/// Lists the cause for each board, with the next command if there are several.
+/// Returns the cause for each board. If there are several boards, adds the next command for each.
 fn unnamed(failed: &[(u8, SessionError)]) -> String {
     let asked = "the names of inputs, outputs and parameters are not known";
     match failed {

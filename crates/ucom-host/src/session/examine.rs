@@ -1,4 +1,4 @@
-//! Diagnosis of a bus: listens, asks if questions cannot do harm, and reports the findings.
+//! Diagnosis of a bus: listens, sends questions if they cannot do harm, and reports findings.
 
 use std::time::{Duration, Instant};
 
@@ -23,7 +23,7 @@ pub struct Examination {
 }
 
 impl Examination {
-    /// Returns the kind of failure; `None`: no problem.
+    /// Returns the kind of failure; `None` if no problem was found.
     pub fn failure(&self) -> Option<ErrorKind> {
         let bad = self.findings.iter().any(|f| f.severity == Severity::Problem);
         bad.then_some(if self.received == 0 { ErrorKind::NoLink } else { ErrorKind::Device })
@@ -32,7 +32,7 @@ impl Examination {
 
 impl Driver {
     /// Listens to the bus for a while, then scans it. If a competing master is on the bus, no question is sent, because even questions
-    /// could mix with those of that master (D-08).
+    /// could interfere with the questions of that master (D-08).
     ///
     /// # Errors
     /// The bus failed, or the operator requested an end.
@@ -70,14 +70,14 @@ impl Driver {
         Ok(Examination { findings, boards, received: seen.statistics.received })
     }
 
-    /// Returns the state that the CAN adapter reports; `None` if it reports none.
+    /// Returns the state that the CAN adapter reports; `None` if the adapter does not report its state.
     pub fn controller(&mut self) -> Option<Controller> {
         self.link().controller()
     }
 }
 
 impl Link {
-    /// Returns the state that the CAN adapter reports; `None` if it reports none.
+    /// Returns the state that the CAN adapter reports; `None` if the adapter does not report its state.
     pub fn controller(&mut self) -> Option<Controller> {
         let state = self.state();
         (state.errors != ErrorState::Unknown).then_some(Controller {

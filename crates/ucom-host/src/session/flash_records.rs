@@ -1,4 +1,4 @@
-//! Updates with flash records: an update reads the records of the boards' flash, and its results are stored as records.
+//! Updates with flash records. An update uses the records of the boards, and stores its results as new records.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -9,7 +9,8 @@ use crate::files::{FlashRecord, Inventory, InventoryError};
 use crate::master::update::{UpdateOptions, UpdateReport};
 use crate::master::{Event, Outcome, Request};
 
-/// Flash records of this tool (D-62): in the inventory file for boards that it lists, otherwise in memory until the session ends.
+/// Flash records of this tool (D-62). Records of boards in the inventory are stored in the inventory file, others in memory until the
+/// session ends.
 #[derive(Debug, Default)]
 pub struct FlashRecords {
     inventory: Option<PathBuf>,
@@ -18,12 +19,12 @@ pub struct FlashRecords {
 }
 
 impl FlashRecords {
-    /// Creates the records of an inventory file, which need not exist; `None`: only the session stores them.
+    /// Creates the records of an inventory file, which need not exist. `None`: records are kept only during the session.
     pub fn new(inventory: Option<PathBuf>) -> Self {
         Self { inventory, ..Self::default() }
     }
 
-    /// Reads the inventory again, because other programs and users may change it.
+    /// Reads the inventory again, because other programs and users may have changed it.
     fn read(&mut self) -> Result<(), InventoryError> {
         self.listed.clear();
         let Some(path) = self.inventory.as_ref().filter(|path| path.exists()) else { return Ok(()) };
@@ -52,11 +53,11 @@ impl FlashRecords {
 }
 
 impl Driver {
-    /// Updates boards. The record of a board is removed before the board is reset for programming, and written again after the
-    /// board has been read back. If it cannot be removed, the update is cancelled before anything is erased.
+    /// Updates boards. The record of a board is removed before the board is reset for programming, and stored again after the board has
+    /// been read back. If the record cannot be removed, the update is cancelled before more is erased.
     ///
     /// # Errors
-    /// As [`Driver::run`], and if the inventory cannot be read.
+    /// The errors of [`Driver::run`], or the inventory cannot be read.
     pub fn update(
         &mut self,
         mut options: UpdateOptions,

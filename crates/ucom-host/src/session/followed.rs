@@ -1,7 +1,8 @@
-//! Boards that a run supervises: which boards have left their control loops, and the age of their values.
+//! Supervision of the boards of a run: which boards have left their control loops, and how old their values are.
 //!
-//! A board leaves its loop by itself if it misses the PC's heartbeat, if another PC stops it, or if its application stops it. The board
-//! reports this once (MCA_ADMIN_DATA). If that frame is lost, the outputs stop and the master reads the board's status.
+//! A board leaves its control loop by itself if the PC's heartbeats are missing, if another PC stops it, or if its application ends the
+//! loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the outputs are no longer sent, and the master
+//! reads the board's status.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +13,11 @@ use super::error::SessionError;
 use crate::master::io::Snapshot;
 use crate::master::{Board, Event, Life, Master, Outcome, ProcedureId, Request, Supervision};
 
-/// Age at which the last outputs count as old, µs. Outputs normally come every few milliseconds.
+/// Age in µs above which the last outputs are considered old. Outputs normally arrive every few milliseconds.
 const OLD_US: u64 = 500_000;
-/// Minimum time between questions to a board that sends heartbeats but no outputs, µs.
+/// Minimum time in µs between questions to a board that sends heartbeats but no outputs.
 const ASK_US: u64 = 1_000_000;
-/// Time without any board in its loop after which a run has ended, µs.
+/// A run has ended when no board has been in its loop for this time, µs.
 const OVER_US: u64 = 3_000_000;
 
 /// Change of a board.
@@ -39,7 +40,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// Returns a short name for programs.
+    /// Returns a short name for JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Late => "late",
@@ -53,26 +54,26 @@ impl Change {
     }
 }
 
-/// A change of a board, to be printed at once.
+/// A change of a board that is shown to the user at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
     /// The board.
     pub board: u8,
-    /// Change.
+    /// The change.
     pub change: Change,
-    /// Time, s.
+    /// Time in s.
     pub time_s: f64,
-    /// Age of the board's last outputs, s; `None` if none came, or if the change concerns heartbeats.
+    /// Age of the board's last outputs in s; `None` if there were no outputs, or if the change concerns heartbeats.
     pub age_s: Option<f64>,
 }
 
 impl Notice {
-    /// Returns `true` if the notice is about the control loop, not about heartbeats.
+    /// Returns `true` if the notice concerns the control loop. Other notices concern heartbeats.
     pub fn is_of_loop(&self) -> bool {
         matches!(self.change, Change::LeftLoop | Change::StoppedByPolicy | Change::InLoop)
     }
 
-    /// Returns the text; `None` if the driver notes the event itself.
+    /// Returns the text; `None` if the driver shows the event itself.
     pub fn text(&self) -> Option<String> {
         let board = self.board;
         let age = self.age_s.map_or_else(|| "none came".to_owned(), |s| format!("{s:.1} s old"));
@@ -90,12 +91,12 @@ impl Notice {
     }
 }
 
-/// The boards of a run.
+/// The boards of a run and their state.
 #[derive(Default)]
 pub struct Followed {
     boards: BTreeMap<u8, One>,
     asking: Option<ProcedureId>,
-    /// Time since which no board is in its loop.
+    /// Time since when no board has been in its loop.
     nobody_since: Option<u64>,
 }
 
@@ -103,24 +104,24 @@ pub struct Followed {
 struct One {
     last: Option<Snapshot>,
     out: bool,
-    /// `true` if a board was lost or has rebooted since this board runs: with `on_lost` that may be why it stopped.
+    /// `true` if any board was lost or has rebooted since this board started to run. With `on_lost` this may be the reason for its stop.
     lost: bool,
-    /// `true` if the board has ever left its loop for another reason than the loss of another board.
+    /// `true` if the board has ever left its loop while no board was lost.
     left: bool,
-    /// `true` if the board's status shows that it is out of its loop; its own report was lost.
+    /// `true` if the status byte shows that the board has left its loop. The board's own report was then lost.
     status_out: bool,
     asked_us: u64,
 }
 
 impl Followed {
-    /// Creates the list of boards that run now.
+    /// Creates the list of the boards that run now.
     pub fn new(boards: impl Iterator<Item = u8>, now_us: u64) -> Self {
         let mut new = Self::default();
         new.add(&boards.collect::<Vec<_>>(), now_us);
         new
     }
 
-    /// Adds boards that run now or have been restarted. The state of other boards stays.
+    /// Adds boards that run now or have been restarted. The state of other boards does not change.
     pub fn add(&mut self, boards: &[u8], now_us: u64) {
         for board in boards {
             let one = self.boards.entry(*board).or_default();
@@ -134,7 +135,7 @@ impl Followed {
         self.boards.remove(&board);
     }
 
-    /// Handles an event of the bus, and returns a notice. The driver prints the event's own text.
+    /// Handles an event of the bus. Returns a notice if a board changed; the driver shows the event's own text.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         match event {
             Event::Snapshot { board, snapshot } => {
@@ -168,7 +169,7 @@ impl Followed {
         None
     }
 
-    /// Returns the boards that left or re-entered their loops since the last call. Reads the status of boards that send nothing.
+    /// Returns the boards that have left or re-entered their loops since the last call. Reads the status of boards that send no outputs.
     pub fn look(&mut self, master: &mut Master, now_us: u64) -> Vec<Notice> {
         let boards = master.boards();
         let (mut notices, mut silent) = (Vec::new(), None);
@@ -200,8 +201,8 @@ impl Followed {
         notices
     }
 
-    /// Returns `true` if the run has ended: every board has left its loop, or was lost and, by `on_lost`, stopped. Only a new run starts
-    /// a board's loop again. With `report` the run waits for a lost board, which may still be in its loop.
+    /// Returns `true` if the run has ended: every board has left its loop, has rebooted, or was lost and stopped by `on_lost`. Only a new
+    /// run starts the loop of a board again. With `on_lost = report` the run waits for a lost board, which may still be in its loop.
     pub fn is_over(&mut self, master: &Master, now_us: u64) -> bool {
         let boards = master.boards();
         let waits_for_lost = master.profile().on_lost == OnLost::Report;
@@ -216,14 +217,14 @@ impl Followed {
         now_us.saturating_sub(*self.nobody_since.get_or_insert(now_us)) >= OVER_US
     }
 
-    /// Cancels the question in progress: the next request must not find a board busy.
+    /// Cancels the question in progress, so that the next request does not find the board busy.
     pub fn ask_no_more(&mut self, master: &mut Master) {
         if let Some(id) = self.asking.take() {
             master.cancel(id);
         }
     }
 
-    /// Returns the last outputs of each board, their age in s, and `true` if they are too old to count as current.
+    /// Returns the last outputs of each board, their age in s, and `true` if they may no longer be current.
     pub fn outputs(&self, master: &Master, now_us: u64) -> Vec<(u8, &Snapshot, f64, bool)> {
         let boards = master.boards();
         let rows = self.boards.iter().filter_map(|(number, one)| Some((number, one, one.last.as_ref()?)));
@@ -262,7 +263,7 @@ mod tests {
 
     use super::*;
 
-    /// Receives frames of board 1 at a time, and returns the notices.
+    /// Delivers frames of board 1 at a time, and returns the notices.
     fn receive(master: &mut Master, followed: &mut Followed, at_us: u64, frames: &[&str]) -> Vec<String> {
         frames.iter().for_each(|text| master.handle(at_us, Ok(text.parse().unwrap())));
         let mut sent = Vec::new();
@@ -304,7 +305,7 @@ mod tests {
         assert_eq!(receive(&mut master, &mut followed, 20_000, &["601#00000000"]), ["left-loop"]);
         assert!(receive(&mut master, &mut followed, 30_000, &["601#00000000"]).is_empty(), "reported once");
         assert_eq!(stale(&master, &followed, 30_000), [true]);
-        // Another PC starts the board again: the run counts as interrupted nevertheless.
+        // Another PC starts the board again. The run is still reported as interrupted.
         let again = ["601#01000000", "381#0000640065006600"];
         assert_eq!(receive(&mut master, &mut followed, 40_000, &again), ["in-loop"]);
         assert_eq!(stale(&master, &followed, 40_000), [false]);
@@ -336,7 +337,7 @@ mod tests {
         assert!(followed.nobody_left().is_ok(), "the loss is what failed");
     }
 
-    /// A start or stop of a board does not change the state of the others.
+    /// Starting or stopping a board does not change the state of the others.
     #[test]
     fn d37_boards_that_come_and_go_leave_the_others_as_they_were() {
         let (mut master, mut followed) = running();
@@ -350,7 +351,7 @@ mod tests {
             assert_eq!(stale(&master, &followed, 30_000), [true]);
             assert!(followed.nobody_left().is_err());
         }
-        // The board is restarted. Earlier losses do not count: it leaves its loop by itself.
+        // The board is restarted. Earlier losses no longer matter: when it leaves its loop, it does so by itself.
         assert_eq!(receive(&mut master, &mut followed, 3_100_000, &[]), ["lost"]);
         receive(&mut master, &mut followed, 3_200_000, &["681#", "601#01000000", "381#0000640065006600"]);
         followed.add(&[1], 3_200_000);
@@ -373,7 +374,7 @@ mod tests {
         assert!(followed.is_over(&master, 5_100_000));
     }
 
-    /// A silent board has been stopped by policy, and the run ends; with `report` the run waits for it.
+    /// A lost board has been stopped by the policy, so the run ends. With `report` the run waits for the board.
     #[test]
     fn d51_a_lost_board_is_waited_for_only_where_nobody_stops_it() {
         for on_lost in [OnLost::StopAll, OnLost::StopBoard, OnLost::Report] {

@@ -1,8 +1,8 @@
-//! Boards that a session has started, and its knowledge of them. All programs that own a bus for others use this module. A board in doubt
-//! counts as started, because an additional stop does no harm.
+//! The boards that a session has started, and the data about them. All programs that own a bus for others use this module. A board whose
+//! state is in doubt is listed as started, because an additional stop does no harm.
 //!
-//! - [`Held`]: the state, which the session's [`Operator`](super::Operator) writes in the middle of procedures.
-//! - [`Session`]: a driver with that state; all starts and stops of boards go through it.
+//! - [`Held`]: the state, which the session's [`Operator`](super::Operator) updates even during procedures.
+//! - [`Session`]: a driver with that state. All starts and stops of boards go through it.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +24,7 @@ use crate::master::io::Snapshot;
 use crate::master::update::{UpdateOutcome, UpdateReport};
 use crate::master::{Event, InitReport};
 
-/// Boards that a session has started, and its knowledge of them.
+/// The boards that a session has started, and the data about them.
 #[derive(Default)]
 pub struct Held {
     started: BTreeSet<u8>,
@@ -39,7 +39,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// Creates a state without started boards; `has_started` tells other threads when that changes.
+    /// Creates a state without started boards. `has_started` tells other threads whether there are started boards.
     pub fn new(has_started: Arc<AtomicBool>) -> Self {
         Self { has_started, ..Self::default() }
     }
@@ -54,7 +54,7 @@ impl Held {
         &self.running
     }
 
-    /// Handles an event of the bus: stores outputs, and returns a change of a supervised board.
+    /// Handles an event of the bus: stores outputs, and returns the change of a supervised board.
     pub fn see(&mut self, event: &Event, now_us: u64) -> Option<Notice> {
         if let Event::Snapshot { board, snapshot } = event {
             self.snapshots.insert(*board, snapshot.clone());
@@ -62,7 +62,7 @@ impl Held {
         self.followed.see(event, now_us)
     }
 
-    /// Counts these boards as started.
+    /// Adds these boards to the started boards.
     fn starts(&mut self, boards: &[u8]) {
         self.started.extend(boards);
         self.show();
@@ -95,18 +95,18 @@ impl Held {
 
 /// Session on a bus, with its state.
 pub struct Session {
-    /// Procedures and boards.
+    /// The driver: procedures and boards.
     pub driver: Driver,
     /// Cache of names.
     pub cache: Cache,
     /// Meanings of the words.
     pub signals: SignalTable,
-    /// Started boards and knowledge of them, shared with the operator of the driver.
+    /// Started boards and data about them, shared with the operator of the driver.
     pub held: Rc<RefCell<Held>>,
 }
 
 impl Session {
-    /// Runs the bus for a moment, waiting no longer than `patience`.
+    /// Runs the bus for a moment. Waits at most `patience`.
     pub fn turn(&mut self, patience: Duration) -> Result<(), SessionError> {
         self.driver.turn(patience)?;
         while let Some(event) = self.driver.master.take_event() {
@@ -115,26 +115,27 @@ impl Session {
         Ok(())
     }
 
-    /// Returns the boards that left or re-entered their control loops since the last call. Reads the status of boards that send nothing.
+    /// Returns the boards that have left or re-entered their control loops since the last call. Reads the status of boards that send no
+    /// outputs.
     pub fn look(&mut self) -> Vec<Notice> {
         let now_us = self.driver.now_us();
         self.held.borrow_mut().followed.look(&mut self.driver.master, now_us)
     }
 
-    /// Cancels background questions: the next request must not find a board busy.
+    /// Cancels background questions, so that the next request does not find the board busy.
     pub fn quiet(&mut self) {
         self.held.borrow_mut().followed.ask_no_more(&mut self.driver.master);
     }
 
-    /// Ends the heartbeats unless this session has started boards or a client holds the lease (`commands`). Boards of another PC must
-    /// become safe if that PC is lost (D-50).
+    /// Ends the heartbeats if this session has not started a board and no client holds the lease (`commands`). Otherwise the boards of
+    /// another PC would not become safe if that PC is lost (D-50).
     pub fn rest(&mut self, commands: bool) {
         if self.driver.master.is_master() && self.held.borrow().started.is_empty() && !commands {
             self.driver.master.end_session();
         }
     }
 
-    /// Returns the names and meanings of a board's values; asks the board if they are not known.
+    /// Returns the names and meanings of a board's values. Asks the board if they are not known.
     pub fn known(&mut self, board: u8) -> Result<Arc<Known>, SessionError> {
         let kept = self.held.borrow().known.get(&board).cloned();
         let info = self.driver.master.boards().get(board).and_then(|board| board.info);
@@ -157,7 +158,7 @@ impl Session {
         Ok(self.knows(known))
     }
 
-    /// Stores the names of a board, and begins to reassemble its outputs.
+    /// Stores the names of a board, and begins to reassemble the board's outputs.
     pub fn knows(&mut self, known: Known) -> Arc<Known> {
         let known = Arc::new(known);
         self.driver.master.watch(known.board, Some(known.names.dimensions().so), true);
@@ -165,7 +166,8 @@ impl Session {
         known
     }
 
-    /// Runs an action by names. If a board has other names than the cached names, runs the action once more with those.
+    /// Runs an action that uses names. If a board no longer has the cached names, reads the names from the board and runs the action once
+    /// more.
     pub fn by_names<T>(
         &mut self,
         mut act: impl FnMut(&mut Self, &Cache) -> Result<T, SessionError>,
@@ -174,14 +176,15 @@ impl Session {
         with_names(&cache, |cache| act(self, cache))
     }
 
-    /// Runs an action that starts or moves these boards. The boards count as started before anything is sent, because the user may end
-    /// the action at any time. After a failure, boards that received no command, or that answer that they are stopped, no longer count.
+    /// Runs an action that starts or moves these boards. The boards are listed as started before anything is sent, because the user may end
+    /// the action at any time. After a failure, boards are removed from the list if nothing was sent to them or if they answer that they
+    /// are stopped.
     pub fn starting<T>(
         &mut self,
         boards: &[u8],
         act: impl FnOnce(&mut Self) -> Result<T, SessionError>,
     ) -> Result<T, SessionError> {
-        // No board receives a command if one of them does not answer.
+        // If a board does not answer, no board gets a command.
         for board in boards {
             self.driver.seen(*board)?;
         }
@@ -190,7 +193,7 @@ impl Session {
         let done = act(self);
         if done.is_err() {
             for board in boards.iter().filter(|board| !counted.contains(board)) {
-                // A session that is not master has sent questions only.
+                // If this session is not master, it has sent only questions.
                 if !self.driver.master.is_master() || self.is_stopped(*board) {
                     self.runs_no_more(Some(*board));
                 }
@@ -199,7 +202,7 @@ impl Session {
         done
     }
 
-    /// Returns `true` if the board answers that its application does not run. Asks even after a cancelled request.
+    /// Returns `true` if the board answers that its application does not run. Asks even if the request was cancelled.
     fn is_stopped(&mut self, board: u8) -> bool {
         self.driver.seen_for_certain(board).is_ok_and(|seen| !seen.info.status.has(Status::MSTART))
     }
@@ -210,13 +213,13 @@ impl Session {
         self.held.borrow_mut().runs(boards, now_us);
     }
 
-    /// Removes this board, or all, from the running boards; its last outputs no longer count as its state.
+    /// Removes this board, or all boards, from the started and running boards, together with their last outputs.
     pub fn runs_no_more(&mut self, board: Option<u8>) {
         self.held.borrow_mut().runs_no_more(board);
     }
 
-    /// Records that the control loop of this board has ended while its application goes on. If this session has not started the board,
-    /// the board does not count as started: its heartbeats are not supervised here.
+    /// Records that the control loop of this board has ended but its application still runs. A board that this session has not started is
+    /// not listed as started, because its heartbeats are not supervised here.
     pub fn only_started(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         let counted = held.started.contains(&board);
@@ -226,19 +229,19 @@ impl Session {
         }
     }
 
-    /// Forgets a board whose number or application has changed or is gone.
+    /// Removes all data about a board whose number or application has changed or no longer exists.
     pub fn forget(&mut self, board: u8) {
         let mut held = self.held.borrow_mut();
         held.runs_no_more(Some(board));
         held.known.remove(&board);
     }
 
-    /// Returns the boards that count as started.
+    /// Returns the boards that are listed as started.
     pub fn started(&self) -> Vec<u8> {
         self.held.borrow().started.iter().copied().collect()
     }
 
-    /// Stops the boards that this session has started. Returns the boards that may still run; they still count as started.
+    /// Stops the boards that this session has started. Returns the boards that may still run; they stay listed as started.
     pub fn leave(&mut self) -> Vec<u8> {
         self.quiet();
         let started = self.started();
@@ -252,11 +255,11 @@ impl Session {
         not_stopped
     }
 
-    /// Applies the result of an update: boards that were written no longer run, and may have been restarted.
+    /// Applies the result of an update. Boards that were written no longer run, unless the update has restarted them.
     pub fn updated(&mut self, report: &UpdateReport, start: bool) {
         for result in report.boards.iter().filter(|_| !report.dry_run) {
             match result.outcome {
-                // The board continues to run if it ran, or its state is unknown.
+                // In these cases the board may still run as before.
                 UpdateOutcome::NotStarted
                 | UpdateOutcome::Cancelled
                 | UpdateOutcome::UpToDate
@@ -274,9 +277,9 @@ impl Session {
         }
     }
 
-    /// Handles new numbers of boards: all stored names are dropped. After a complete init no board counts as started. After an incomplete
-    /// init, boards that the report does not list still count, because they may run under their old numbers. Boards that show a started
-    /// application count as well, because they may have missed the reset.
+    /// Handles new numbers of boards. All stored names are dropped. After a complete init no board is listed as started. After an
+    /// incomplete init, boards that are not in the report stay listed, because they may run under their old numbers. Boards whose status
+    /// shows a started application are listed, because they may not have received the reset.
     pub fn renumbered(&mut self, report: Option<&InitReport>) {
         let mut held = self.held.borrow_mut();
         match report {

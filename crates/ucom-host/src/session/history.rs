@@ -1,5 +1,5 @@
-//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now. The protocol has no
-//! read-back, and a restart of the application, which may go unnoticed, resets them (D-35).
+//! Values that this tool wrote to the parameters of a board, with times. The board may have other values now: the protocol has no
+//! read-back, and a restart of the application, which may go unnoticed, resets the parameters (D-35).
 
 use std::collections::BTreeMap;
 
@@ -8,29 +8,29 @@ use ucom::{BoardInfo, DateForm};
 
 use super::cache::Cache;
 
-/// Written value of a parameter.
+/// A value that was written to a parameter.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq, Serialize)]
 pub struct Written {
     /// The word.
     pub word: u16,
-    /// Seconds since 1970.
+    /// Time of writing, in seconds since 1970.
     pub at: u64,
 }
 
-/// Values last written to the parameters of one board, by place in the buffer.
+/// The values last written to the parameters of one board, by index in the buffer.
 #[derive(Clone, Debug, Default, Deserialize, Serialize)]
 #[serde(default)]
 pub struct History {
     program_id: u16,
     date: u16,
     par: BTreeMap<u16, Written>,
-    /// Cache, and name of the file.
+    /// The cache, and the name of the file in it.
     #[serde(skip)]
     kept: (Cache, String),
 }
 
 impl History {
-    /// Returns the history of a board; empty if the board has another program now.
+    /// Returns the history of a board. It is empty if the board has another program now.
     pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
         let file = format!("written-{:04X}.json", info.flash_number);
         let text = cache.read(&file);
@@ -40,7 +40,7 @@ impl History {
         Self { program_id: info.program_id, date: info.date, par, kept: (cache.clone(), file) }
     }
 
-    /// Records words that were written now. A failed write of the file is ignored and does not count as an error.
+    /// Records words that were written now. If the file cannot be written, the failure is ignored.
     pub fn wrote(&mut self, words: impl Iterator<Item = (u16, u16)>) {
         let at = host_kit::unix_time().as_secs();
         self.par.extend(words.map(|(index, word)| (index, Written { word, at })));
@@ -57,9 +57,9 @@ impl History {
 }
 
 impl Written {
-    /// Returns the time as `2026-11-21 06:10 UTC`.
+    /// Returns the time in the form `2026-11-21 06:10 UTC`.
     pub fn when(&self) -> String {
-        // Days from 1970-01-01 to 2000-01-01 are subtracted.
+        // Subtracts the days from 1970-01-01 to 2000-01-01.
         let days = (self.at / 86_400).saturating_sub(10_957);
         let date = u16::try_from(days).ok().and_then(|days| DateForm::Days2000.decode(days));
         let (year, month, day) = date.unwrap_or((2000, 1, 1));
@@ -78,7 +78,7 @@ mod tests {
         assert_eq!(Written { word: 0, at: 1_234_567_890 }.when(), "2009-02-13 23:31 UTC");
     }
 
-    /// Another program has other parameters, even at the same places.
+    /// Another program has other parameters, even at the same index.
     #[test]
     fn d35_another_program_remembers_nothing() {
         let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Cached names of boards' inputs, outputs and parameters (D-36), and the meaning of their words (D-11).
+//! Cached names of the boards' inputs, outputs and parameters (D-36), and the meaning of their words (D-11).
 
 use ucom::{BoardInfo, Profile};
 
@@ -10,7 +10,7 @@ use crate::files::{BoardSignals, SignalTable};
 use crate::master::io::{DescriptionKey, IoDescription, Kind};
 use crate::master::{Outcome, Request, Setting};
 
-/// Board, with its names and the meaning of its words.
+/// A board with its names and the meaning of its words.
 #[derive(Clone, Debug)]
 pub struct Known {
     /// Board number.
@@ -21,13 +21,13 @@ pub struct Known {
     pub names: IoDescription,
     /// Types, scales and units.
     pub signals: BoardSignals,
-    /// Mismatches of signal table and program.
+    /// Names in the signal table that the program does not have.
     strays: Vec<String>,
 }
 
 impl Cache {
-    /// Returns a board with its names. The names come from the cache, or from the running application. A failed write to the cache is
-    /// ignored: the names are then read again next time.
+    /// Returns a board with its names from the cache. If the cache does not have them, the running application is asked. If the cache
+    /// cannot be written, the failure is ignored, and the names are read again next time.
     pub fn known(&self, driver: &mut Driver, table: &SignalTable, board: u8) -> Result<Known, SessionError> {
         let info = driver.seen(board)?.info;
         if let Some(names) = self.kept(driver, &info) {
@@ -36,7 +36,7 @@ impl Cache {
         self.described(driver, table, board)
     }
 
-    /// Like `known`, for a board whose application must run. Asks the board, because cached names may be of another application.
+    /// Like `known`, for a board whose application must run. The board is asked, because cached names may belong to another application.
     pub fn described(
         &self,
         driver: &mut Driver,
@@ -54,10 +54,10 @@ impl Cache {
         Ok(with_signals(board, info, names, table, driver.master.profile()).with_notes(driver))
     }
 
-    /// Returns boards with their names, as [`Self::known`] does; boards in `must_run` as [`Self::described`] does.
+    /// Returns boards with their names. Boards in `must_run` are read as in [`Self::described`], others as in [`Self::known`].
     ///
     /// # Errors
-    /// [`SessionError::NoNames`] with every board that failed, after all were asked; other errors at once.
+    /// [`SessionError::NoNames`] lists every board that failed, after all boards were asked. Other errors are returned at once.
     pub fn all(
         &self,
         driver: &mut Driver,
@@ -103,20 +103,20 @@ fn file(key: DescriptionKey) -> String {
 }
 
 impl Known {
-    /// Returns a word of this board in the master's form, by number if the name would mean another signal.
+    /// Returns a word in the form that the master uses: by name, or by index if the name means another signal.
     pub fn setting(&self, kind: Kind, word: &ParamsWord) -> Setting {
-        // A text that means another signal cannot identify this one, and numbers may be names.
+        // The text of a signal may mean another signal, and an index may be the name of another signal.
         let by_name = self.names.find(self.board, kind, &word.name) == Ok(word.index);
         let name = if by_name { word.name.clone() } else { format!("##{}", word.index) };
         Setting { name, value: word.word }
     }
 
-    /// Returns this board with the names that it has sent meanwhile.
+    /// Returns this board with the names that it has sent since.
     pub fn renamed(self, names: IoDescription, table: &SignalTable, profile: Profile) -> Self {
         if self.names == names { self } else { with_signals(self.board, self.info, names, table, profile) }
     }
 
-    /// Notes mismatches between signal table and program.
+    /// Shows the names in the signal table that the program does not have.
     fn with_notes(self, driver: &Driver) -> Self {
         for stray in &self.strays {
             driver.note(format!("signal table: {stray}"));
@@ -137,7 +137,7 @@ fn with_signals(
     let strays = program.map(|p| p.strays(&names)).unwrap_or_default();
     let mut strays: Vec<String> = strays.iter().map(|stray| format!("{who} has no {stray}")).collect();
     let mut signals = BoardSignals::new(&names, program, &profile);
-    // A table was given, so units are expected: values for a program without an entry would be sent unscaled.
+    // The user has a table and therefore expects units. Without an entry for this program, values would be sent unscaled.
     if table.is_given() && program.is_none() && info.has_application() {
         strays.push(format!("it knows nothing of {who}"));
         signals = signals.raw_only();

@@ -1,4 +1,4 @@
-//! An open bus, and conversion of its frames to and from the protocol's.
+//! An open bus, and the conversion between its frames and the frames of the protocol.
 
 use std::time::{Duration, Instant};
 
@@ -10,11 +10,11 @@ use super::error::SessionError;
 use super::pump::Line;
 use crate::files::recording::{FrameKind, RecordedFrame};
 
-/// Longest wait that is kept precisely.
+/// Longest wait that is timed precisely.
 const COARSE: Duration = Duration::from_millis(12);
-/// Interval at which the bus is polled in such a wait.
+/// Interval at which the bus is polled during such a wait.
 const LOOK: Duration = Duration::from_micros(100);
-/// Longest delay of a sleep beyond its duration; this last part of a wait is not slept.
+/// Time by which a sleep may last too long. The last part of a wait, of this length, is not slept.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// An open bus with its clock.
@@ -35,7 +35,7 @@ impl Link {
         Ok(Self::on(bus, url))
     }
 
-    /// Creates a link on an open bus; `url` is its display name.
+    /// Creates a link on an open bus. `url` is only displayed.
     pub fn on(bus: Box<dyn CanBus + Send>, url: &str) -> Self {
         Self { bus, url: url.into(), start: Instant::now(), bus_off: BusOff::default() }
     }
@@ -50,17 +50,17 @@ impl Link {
         self.start.elapsed().as_micros() as u64
     }
 
-    /// Puts a frame of any protocol on the bus.
+    /// Sends a frame of any protocol.
     pub fn send_wire(&mut self, frame: &CanFrame) -> Result<(), SessionError> {
         self.bus.send(frame).map_err(SessionError::Bus)
     }
 
-    /// Returns the next frame of any protocol; waits at most `timeout`.
+    /// Returns the next frame of any protocol. Waits at most `timeout`.
     pub fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, SessionError> {
         if timeout > COARSE {
             return self.bus.receive(timeout - COARSE).map_err(SessionError::Bus);
         }
-        // Sockets round their timeouts up to the system's tick, up to 10 ms. Gaps between frames are shorter.
+        // Sockets round their timeouts up to the system's tick of up to 10 ms, but gaps between frames are shorter.
         let end = Instant::now() + timeout;
         loop {
             if let Some(frame) = self.bus.receive(Duration::ZERO).map_err(SessionError::Bus)? {
@@ -72,7 +72,7 @@ impl Link {
             }
             match left.checked_sub(OVERSLEPT) {
                 Some(left) => std::thread::sleep(left.min(LOOK)),
-                // No yield here: on a busy machine that would lose some milliseconds.
+                // The thread does not yield here, because on a busy machine it would lose some milliseconds.
                 None => std::hint::spin_loop(),
             }
         }
@@ -88,7 +88,7 @@ impl Link {
         self.bus.times_bus_off()
     }
 
-    /// Returns the message for a new bus-off of this computer's controller, and the next command.
+    /// Returns the message for a new bus-off of this computer's controller, which includes the next command.
     pub fn news(&mut self) -> Option<String> {
         let (times, now_us) = (self.bus.times_bus_off(), self.now_us());
         self.bus_off.look(times, now_us, &self.url)
@@ -116,7 +116,7 @@ pub fn to_wire(frame: &Frame) -> Result<CanFrame, SessionError> {
     made.map_err(SessionError::Frame)
 }
 
-/// Converts a frame of the bus to the protocol, or returns the reason why it is foreign (D-02).
+/// Converts a frame of the bus to a frame of the protocol. If the frame is foreign, returns the reason (D-02).
 pub fn from_wire(frame: &CanFrame) -> Result<Frame, Foreign> {
     let format = Format { extended: frame.is_extended(), remote: frame.is_remote(), fd: frame.is_fd() };
     Frame::received(frame.id().value(), format, frame.data())
@@ -135,7 +135,7 @@ pub fn recorded(frame: &CanFrame) -> RecordedFrame {
     RecordedFrame { id, extended, kind, data: frame.data().to_vec(), dlc: None }
 }
 
-/// Converts a frame of a recording for the bus; `None` for error frames and invalid frames.
+/// Converts a frame of a recording to a frame of the bus; `None` for error frames and invalid frames.
 pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     let id = if frame.extended { Id::extended(frame.id) } else { Id::standard(frame.id) }.ok()?;
     match frame.kind {
@@ -146,7 +146,7 @@ pub fn replayed(frame: &RecordedFrame) -> Option<CanFrame> {
     }
 }
 
-/// Converts a frame of a recording to the protocol, or returns the reason why it is foreign.
+/// Converts a frame of a recording to a frame of the protocol. If the frame is foreign, returns the reason.
 pub fn protocol_frame(frame: &RecordedFrame) -> Result<Frame, Foreign> {
     let format = Format {
         extended: frame.extended,

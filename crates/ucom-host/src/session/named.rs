@@ -1,4 +1,4 @@
-//! Values of boards by the names of their signals, for programs.
+//! Values of boards by the names of their signals, as JSON.
 
 use serde_json::{Map, Value, json};
 
@@ -7,18 +7,19 @@ use crate::files::Signal;
 use crate::master::io::{Kind, short};
 
 impl Known {
-    /// Returns the words of a buffer by signal names, in units if a signal table knows them (D-11), as a JSON object.
+    /// Returns the words of a buffer as a JSON object with signal names as keys. Values are in units if a signal table has the signal
+    /// (D-11).
     pub fn values(&self, kind: Kind, words: &[u16]) -> Value {
         named(self.names.names(kind), self.signals.all(kind), words)
     }
 
-    /// Returns the keys of such values, in the order of the buffer.
+    /// Returns the keys of this object, in the order of the buffer.
     pub fn keys(&self, kind: Kind) -> Vec<String> {
         let names = self.names.names(kind);
         keys(names, names.len())
     }
 
-    /// Returns the units of such values, by the same keys, as far as a signal table has them.
+    /// Returns the units of the values under the same keys, for signals whose unit is in a signal table.
     pub fn units(&self, kind: Kind) -> Value {
         let (names, signals) = (self.names.names(kind), self.signals.all(kind));
         let pairs = keys(names, names.len()).into_iter().zip(signals);
@@ -27,8 +28,8 @@ impl Known {
     }
 }
 
-/// Returns `count` keys: the short names; the whole text if another signal has this short name, with its place if the
-/// whole text is not unique either.
+/// Returns `count` keys. A key is the short name of its signal if that is unique, otherwise the complete name. If the complete name is not
+/// unique either, the index is added.
 fn keys(names: &[String], count: usize) -> Vec<String> {
     let once = |all: &mut dyn Iterator<Item = &str>, key: &str| all.filter(|name| *name == key).count() == 1;
     let key = |i: usize| match names.get(i) {
@@ -40,7 +41,7 @@ fn keys(names: &[String], count: usize) -> Vec<String> {
     (0..count).map(key).collect()
 }
 
-/// Returns values by the names of their signals.
+/// Returns a JSON object of values with signal names as keys.
 fn named(names: &[String], signals: &[Signal], words: &[u16]) -> Value {
     let value =
         |i: usize, word: u16| signals.get(i).map_or_else(|| json!(word as i16), |signal| signal.json(word));

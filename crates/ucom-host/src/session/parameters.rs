@@ -1,4 +1,4 @@
-//! Parameters of boards: writes them with proof that they arrived, and reads them from parameter files.
+//! Parameters of boards: reads them from parameter files, and writes them with a check that they arrived.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::files::params::{
 use crate::master::io::Kind;
 use crate::master::{AdminChange, Error, Outcome, Request};
 
-/// Board, the words to write, and the words written before.
+/// A board, the words to write to it, and the words written before.
 #[derive(Debug)]
 pub struct Parameters {
     /// Board with its names.
@@ -28,7 +28,7 @@ pub struct Parameters {
     pub history: History,
 }
 
-/// Writes all words of all boards, and no word before every board is ready.
+/// Writes all words of all boards. Nothing is written until every board is ready.
 pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result<(), SessionError> {
     for board in all.iter().filter(|p| !p.words.is_empty()) {
         become_master(driver, board.known.board, force)?;
@@ -54,7 +54,7 @@ pub fn write(driver: &mut Driver, all: &mut [Parameters], force: bool) -> Result
     Ok(())
 }
 
-/// Listens for another PC before anything is sent (D-08), and returns whether the control loop runs.
+/// Listens for another PC before anything is sent (D-08). Returns `true` if the control loop runs.
 pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool, SessionError> {
     let change = AdminChange::default();
     match driver.run(Request::Admin { board, change, force })? {
@@ -63,8 +63,8 @@ pub fn become_master(driver: &mut Driver, board: u8, force: bool) -> Result<bool
     }
 }
 
-/// Sends queued frames, then checks that the application still runs and has taken them. Inputs and parameters themselves are not answered
-/// (D-35). Frames leave in their order, so the answer to a question comes after all of them.
+/// Sends the queued frames, then checks that the application still runs and has therefore received them. The board does not confirm inputs
+/// and parameters themselves (D-35). Frames are sent in order, so the answer to a question shows that all frames before it were sent.
 pub fn arrived(driver: &mut Driver, board: u8) -> Result<(), ValuesError> {
     let unknown = |why: String| Err(ValuesError::Unknown { board, why, written: None });
     match driver.seen(board) {
@@ -88,7 +88,7 @@ pub fn name_of(inventory: Option<&Inventory>, flash_number: u16) -> Option<&str>
     Some(board.name.as_str()).filter(|name| !name.is_empty())
 }
 
-/// Parameter file for the boards on the bus.
+/// A parameter file that is checked against the boards on the bus.
 #[derive(Debug)]
 pub struct ParameterFile {
     file: String,
@@ -96,11 +96,11 @@ pub struct ParameterFile {
     inventory: Option<Inventory>,
 }
 
-/// A board's words in a parameter file: first inputs, and parameters.
+/// The words for one board in a parameter file: initial inputs, then parameters.
 pub type FileWords = (Vec<Word>, Vec<Word>);
 
 impl ParameterFile {
-    /// Reads a file, and keeps the selected boards.
+    /// Reads a file, and keeps only the selected boards.
     pub fn read(path: &Path, inventory_file: &Path, meant: impl Fn(u8) -> bool) -> Result<Self, ValuesError> {
         let wrong = |message: String, hint| ValuesError::File { message, hint };
         let file =
@@ -116,7 +116,7 @@ impl ParameterFile {
         Ok(Self { file: path.display().to_string(), boards, inventory })
     }
 
-    /// Keeps only the selected boards, for a file that was read before the boards were known.
+    /// Keeps only the selected boards. For a file that was read before the boards were known.
     #[must_use]
     pub fn of_boards(mut self, meant: impl Fn(u8) -> bool) -> Self {
         self.boards.retain(|board| meant(board.number));
@@ -128,7 +128,7 @@ impl ParameterFile {
         self.boards.iter().map(|b| b.number).collect()
     }
 
-    /// Checks that the boards are those of the file. Sends only questions.
+    /// Checks that the boards on the bus are the boards in the file. Sends only questions.
     pub fn identities(&self, driver: &mut Driver) -> Result<(), SessionError> {
         let mut problems = Vec::new();
         for board in &self.boards {
@@ -147,7 +147,7 @@ impl ParameterFile {
         Ok(self.verdict(problems)?)
     }
 
-    /// Returns the words of all boards, or every mistake.
+    /// Returns the words for all boards. If there are errors, returns all of them.
     pub fn words<'a>(
         &self,
         known: impl Fn(u8) -> Option<&'a Known>,

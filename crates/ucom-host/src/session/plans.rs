@@ -1,4 +1,4 @@
-//! Inputs and parameters of each board for the start of a run.
+//! Inputs and parameters that each board gets at the start of a run.
 
 use super::cache::Cache;
 use super::driver::Driver;
@@ -11,7 +11,7 @@ use super::values::{Prepared, Word, note_rounded, words};
 use crate::master::io::Kind;
 use crate::master::{RunBoard, Setting};
 
-/// Returns the values for each board: those of the file, then the additional ones.
+/// Returns the values for each board: the values of the file, replaced or extended by `ci` and `par`.
 pub fn plans(
     driver: &Driver,
     prepared: &Prepared,
@@ -39,7 +39,7 @@ pub fn plans(
     prepared.known.values().map(plan).collect()
 }
 
-/// Stores the parameters that a run has written in the history.
+/// Stores the parameters that a run has written in the history of each board.
 pub fn remember(cache: &Cache, prepared: &Prepared, plans: &[RunBoard]) {
     for plan in plans.iter().filter(|plan| !plan.par.is_empty()) {
         let Some(known) = prepared.known.get(&plan.board) else { continue };

@@ -1,4 +1,4 @@
-//! A bus with a short receive timeout: its owner often checks for requests, and a stop does not wait for a frame.
+//! A bus with a short receive timeout. Its owner can check for requests often, so that a stop need not wait for a frame.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use can_link::{CanBus, CanError, CanFrame, ControllerState};
 /// Longest wait for a frame.
 const WAIT: Duration = Duration::from_millis(5);
 
-/// Bus wrapper with a receive timeout of at most 5 ms. Its owner can therefore check for requests that often.
+/// Wrapper of a bus with a receive timeout of at most 5 ms.
 pub struct Prompt(pub Box<dyn CanBus + Send>);
 
 impl CanBus for Prompt {

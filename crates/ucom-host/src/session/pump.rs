@@ -1,5 +1,5 @@
-//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout
-//! can end, and neither direction can block the other.
+//! Moves frames between the bus and the PC side, in the order that keeps times correct. Received frames are delivered before a timeout can
+//! end. Neither direction can block the other.
 
 use std::time::Duration;
 
@@ -8,36 +8,36 @@ use ucom::{Foreign, Frame};
 use super::error::SessionError;
 use crate::master::Master;
 
-/// Longest wait, and thus the interval at which Ctrl-C is checked.
+/// Longest wait. Ctrl-C is checked at this interval.
 pub const LOOK: Duration = Duration::from_millis(50);
-/// Limits of frames delivered, and of the time for this, before due frames are sent: a flooded bus must not stop heartbeats.
+/// Limits before the due frames are sent: number of delivered frames, and time. With these limits a flooded bus does not stop the
+/// heartbeats.
 const MOST_RECEIVED: usize = 2000;
 const LONGEST_US: u64 = 50_000;
-/// Limit of frames sent before received frames are handled.
+/// Limit of frames that are sent before received frames are handled.
 const MOST_SENT: usize = 64;
-/// Age from which frames count as delivered on a bus that is flooded without end, µs.
+/// On a bus that is flooded without end, frames older than this are assumed to be delivered, µs.
 const BEHIND_US: u64 = 1_000_000;
 
 /// A bus with a clock.
 pub trait Line {
-    /// Returns the time in µs from any start.
+    /// Returns the time in µs since any start.
     fn now_us(&self) -> u64;
-    /// Puts a frame on the bus.
+    /// Sends a frame.
     fn send(&mut self, frame: &Frame) -> Result<(), SessionError>;
-    /// Returns the next frame. Waits at most `timeout`, and not at all for zero.
+    /// Returns the next frame. Waits at most `timeout`; does not wait if it is zero.
     fn receive(&mut self, timeout: Duration) -> Result<Option<Result<Frame, Foreign>>, SessionError>;
 }
 
 /// State of the loop.
 #[derive(Debug, Default)]
 pub struct Pump {
-    /// Time up to which everything that arrived has been delivered, µs.
+    /// Time up to which all received frames have been delivered, µs.
     received_us: u64,
 }
 
 impl Pump {
-    /// Waits for a frame until an action is due, no longer than `patience`. Delivers all frames that have arrived, and sends the due
-    /// frames.
+    /// Waits for a frame until an action is due, at most `patience`. Delivers all received frames, then sends the due frames.
     pub fn turn(
         &mut self,
         master: &mut Master,
@@ -73,7 +73,7 @@ impl Pump {
                         break;
                     }
                 }
-                // No further frame had arrived at that time.
+                // At that time no further frame had arrived.
                 None if wait.is_zero() => {
                     self.received_us = asked;
                     return Ok(());
@@ -86,7 +86,7 @@ impl Pump {
         Ok(())
     }
 
-    /// Sends due frames; returns `true` if there may be more.
+    /// Sends due frames. Returns `true` if there may be more of them.
     fn send(&mut self, master: &mut Master, line: &mut impl Line) -> Result<bool, SessionError> {
         for _ in 0..MOST_SENT {
             let Some(frame) = master.poll_behind(line.now_us(), self.received_us) else { return Ok(false) };
@@ -105,12 +105,12 @@ mod tests {
 
     use super::*;
 
-    /// A bus in virtual time with board 1, which answers PC_INFO within a millisecond, and a process that loses the CPU now and then.
+    /// A simulated bus with board 1, which answers PC_INFO within a millisecond. The process on it loses the CPU now and then.
     struct Bench {
         now: u64,
-        /// Frames in transmission to the PC, by time.
+        /// Frames on their way to the PC, by time.
         coming: VecDeque<(u64, Frame)>,
-        /// Durations of CPU loss before and after each access to the bus, µs; each entry is used once.
+        /// CPU losses before and after each access to the bus, µs. Each entry is used once.
         lost: VecDeque<u64>,
         /// Period of frames from another member, µs.
         flood_us: Option<u64>,
@@ -200,8 +200,8 @@ mod tests {
         z ^ (z >> 27)
     }
 
-    /// The process may lose the CPU at any place, and for longer than an answer takes. A frame that arrived meanwhile does not count as
-    /// silence.
+    /// The process may lose the CPU at any place, for longer than an answer takes. A frame that arrived during that time is not mistaken
+    /// for silence.
     #[test]
     fn a_lost_cpu_is_no_silence() {
         let ask = |lost: Vec<u64>| {
@@ -220,11 +220,11 @@ mod tests {
         }
     }
 
-    /// D-50: a bus with more frames than can be delivered stops neither heartbeats nor timeouts.
+    /// D-50: heartbeats and timeouts continue on a bus with more frames than can be delivered.
     #[test]
     fn d50_a_flood_does_not_stop_heartbeats() {
         let mut bench = Bench::new([]);
-        // Each frame takes 5 µs here.
+        // In this test each frame takes 5 µs.
         bench.flood_us = Some(4);
         let mut master = Master::new(Profile::default());
         master.begin_session(0);

@@ -17,10 +17,10 @@ enum Sink {
     Stream(CandumpWriter<Box<dyn Write>>),
 }
 
-/// A recording in progress. Its master listens to the frames to learn the numbers of the boards.
+/// A recording in progress. It includes a master that only listens, to learn the numbers of the boards.
 pub struct Recorder {
     sink: Sink,
-    /// `true` if the format has no form for frames of other protocols.
+    /// `true` if the format cannot represent frames of other protocols.
     only_protocol: bool,
     channel: String,
     decoder: Decoder,
@@ -30,7 +30,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recording as a file, with the profile in it or next to it. `channel` is the name of the bus in the recording.
+    /// Creates a recording as a file. The profile is stored in the file or next to it; `channel` is the name of the bus in the recording.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -45,7 +45,7 @@ impl Recorder {
         Ok(Self { only_protocol, ..Self::new(sink, profile, channel) })
     }
 
-    /// Creates a recording as lines in candump's form.
+    /// Creates a recording as a stream of lines in candump's form.
     pub fn stream(out: impl Write + 'static, profile: Profile, channel: &str) -> Self {
         Self::new(Sink::Stream(CandumpWriter::new(Box::new(out))), profile, channel)
     }
@@ -55,7 +55,7 @@ impl Recorder {
         Self { sink, only_protocol: false, channel: channel.into(), decoder, master, frames: 0, left_out: 0 }
     }
 
-    /// Writes a frame that came at `now_us` of the session and at `time_ns` since 1970.
+    /// Writes a frame. It was received at `now_us` of the session and at `time_ns` since 1970.
     ///
     /// # Errors
     /// The frame cannot be written.
@@ -77,14 +77,14 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes all data to the disk, so that a recorder that is killed afterwards does not lose them.
+    /// Writes all data to the file, so that they are not lost if the recorder is killed afterwards.
     ///
     /// # Errors
-    /// The disk does not accept the data.
+    /// The data cannot be written.
     pub fn flush(&mut self) -> Result<(), RecordingError> {
         match &mut self.sink {
             Sink::File(writer) => writer.flush(),
-            // A stream is written line by line already.
+            // A stream is already written line by line.
             Sink::Stream(_) => Ok(()),
         }
     }
@@ -94,7 +94,7 @@ impl Recorder {
         self.frames
     }
 
-    /// Returns the number of frames of other protocols that the format cannot hold.
+    /// Returns the number of frames of other protocols that the format cannot represent.
     pub fn left_out(&self) -> u64 {
         self.left_out
     }
@@ -107,7 +107,7 @@ impl Recorder {
     /// Ends the recording.
     ///
     /// # Errors
-    /// The end cannot be written.
+    /// The end of the file cannot be written.
     pub fn finish(self) -> Result<(), RecordingError> {
         match self.sink {
             Sink::File(writer) => writer.finish(),

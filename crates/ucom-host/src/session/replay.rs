@@ -1,4 +1,4 @@
-//! Replay of a recording on a bus, and the frames in it that change boards.
+//! Replay of a recording on a bus, and detection of frames that change boards.
 
 use std::time::{Duration, Instant};
 
@@ -7,11 +7,11 @@ use super::error::SessionError;
 use super::link::{Link, protocol_frame, replayed};
 use crate::files::recording::{Record, RecordedFrame};
 
-/// Sends frames when they are due, at `speed` times the pace of the recording, until the operator requests an end. `done` is called after
-/// each frame. Returns the number of sent frames.
+/// Sends the frames of a recording at their times, `speed` times as fast as recorded, until the operator requests an end. Calls `done`
+/// after each frame. Returns the number of frames sent.
 ///
 /// # Errors
-/// The bus fails.
+/// The bus failed.
 pub fn replay(
     records: &[&Record],
     speed: f64,
@@ -30,7 +30,7 @@ pub fn replay(
             if rest.is_zero() {
                 break;
             }
-            // Received frames are discarded here so that they do not pile up.
+            // Discards received frames so that they do not pile up.
             bus.receive(rest.min(Duration::from_millis(100)))?;
             bus.news().into_iter().for_each(|news| operator.note(news));
         }

@@ -1,4 +1,4 @@
-//! Selection of boards, and values for their signals, as written by users.
+//! Selection of boards, and values for signals, in the form that users write.
 
 use std::str::FromStr;
 
@@ -12,7 +12,7 @@ pub enum Boards {
     All,
     /// No board.
     None,
-    /// These boards, ascending, each once.
+    /// These boards, in ascending order and without duplicates.
     Some(Vec<u8>),
 }
 
@@ -53,11 +53,11 @@ impl FromStr for Boards {
 /// `NAME=VALUE` or `BOARD.NAME=VALUE`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Assignment {
-    /// The board, if it is named.
+    /// The board; `None`: every selected board.
     pub board: Option<u8>,
     /// Name or index.
     pub name: String,
-    /// Value; the signal defines its word.
+    /// Value. Its word depends on the signal.
     pub value: SignalValue,
 }
 
@@ -79,12 +79,12 @@ impl FromStr for Assignment {
     }
 }
 
-/// Returns the values for a board: those that name it, and those that name no board.
+/// Returns the values for this board, including the values without a board.
 pub fn for_board(values: &[Assignment], board: u8) -> Vec<Assignment> {
     values.iter().filter(|a| a.board.is_none_or(|b| b == board)).cloned().collect()
 }
 
-/// Returns an error if a value names a board that is not selected.
+/// Returns an error if a value is for a board that is not selected.
 pub fn only(boards: &[u8], values: &[Assignment], to: &'static str) -> Result<(), ValuesError> {
     match values.iter().find(|a| a.board.is_some_and(|b| !boards.contains(&b))) {
         Some(a) => {

@@ -1,4 +1,4 @@
-//! Conversion of values to words of the boards; names and ranges are checked before anything is sent.
+//! Conversion of values to words of the boards. Names and ranges are checked before anything is sent.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use crate::master::{Error, Outcome, Request, SignalError, StopLevel};
 /// A word for a signal.
 pub type Word = ParamsWord;
 
-/// Returns the words of assignments for a board.
+/// Converts the assignments for a board to words.
 pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Word>, SessionError> {
     let board = known.board;
     let word = |a: &Assignment| {
@@ -42,7 +42,7 @@ pub fn words(known: &Known, kind: Kind, values: &[Assignment]) -> Result<Vec<Wor
     Ok(all)
 }
 
-/// Notes values between two words, which are sent as the nearer word.
+/// Shows values that lie between two words, because the nearer word is sent instead.
 pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     for word in words {
         if let Some(rounded) = &word.rounded {
@@ -51,7 +51,7 @@ pub fn note_rounded(driver: &Driver, board: u8, kind: Kind, words: &[Word]) {
     }
 }
 
-/// Runs an action by cached names. If a board has other names, runs the action once more with the names that the board sends.
+/// Runs an action with cached names. If a board has other names, reads the names from the boards and runs the action once more.
 pub fn with_names<T>(
     cache: &Cache,
     mut act: impl FnMut(&Cache) -> Result<T, SessionError>,
@@ -64,7 +64,7 @@ pub fn with_names<T>(
     }
 }
 
-/// Boards with their names. An application was started only if the board could not send the names otherwise.
+/// Boards with their names. Applications were started only on boards that could not send their names otherwise.
 #[derive(Default)]
 pub struct Prepared {
     /// Boards by number.
@@ -73,7 +73,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Reads the names of a board, and starts its application only if necessary. This moves no axis.
+    /// Reads the names of a board. Starts its application only if necessary; this does not move an axis.
     pub fn add(
         &mut self,
         driver: &mut Driver,
@@ -84,10 +84,10 @@ impl Prepared {
     ) -> Result<(), SessionError> {
         let known = match cache.known(driver, table, board) {
             Err(SessionError::Procedure(Error::Signal(SignalError::NoApplication { .. }))) => {
-                // Recorded before the command leaves, because a start that is cancelled may have reached the board.
+                // The board is recorded before the command is sent, because a cancelled start may still have reached it.
                 self.started.borrow_mut().push(board);
                 let started = driver.run(Request::Start { board, force }).inspect_err(|e| {
-                    // Refused means that nothing was sent. A stop would be a command on another PC's bus.
+                    // If the request was refused, nothing was sent. A stop would be a command on the bus of another PC.
                     if e.kind() == ErrorKind::Refused {
                         self.started.borrow_mut().pop();
                     }
@@ -103,8 +103,8 @@ impl Prepared {
         Ok(())
     }
 
-    /// Stops the applications that were started only to read names, so that a refusal leaves the boards as they were. Acts only once.
-    /// Failures are reported.
+    /// Stops the applications that were started only to read names, so that the boards are left as before if the action is refused. A
+    /// second call does nothing. Failures are shown to the operator.
     pub fn undo(&self, driver: &mut Driver) {
         for board in self.started.take().into_iter().rev() {
             if let Err(e) = driver.stop_board(board, StopLevel::Application) {

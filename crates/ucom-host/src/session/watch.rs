@@ -1,4 +1,4 @@
-//! Live view of a bus: load, events, problems with the next command, and the result of the last request.
+//! Live view of a bus: load, events, problems with the next command, and the message about the last request.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -13,20 +13,20 @@ use crate::master::{Boards, Event, Request, Statistics};
 /// Function and addressee of another PC's frame.
 pub type CompetingMaster = (Function, u8);
 
-/// Seconds of bus load that the curve shows.
+/// Length of the bus load curve in seconds.
 pub const HISTORY: usize = 120;
-/// Limit of lines in the log.
+/// Largest number of lines in the log.
 pub const LOG: usize = 200;
 
-/// Content of the view apart from the boards.
+/// Content of the view except the boards.
 pub struct Watch {
     /// The bus.
     pub url: String,
     /// Bus load in percent, one value per second.
     pub load: VecDeque<f64>,
-    /// Events, oldest first: time in s and text.
+    /// Events as time in s and text, oldest first.
     pub log: VecDeque<(f64, String)>,
-    /// Last frame of another PC that is master. While it is set, no question is sent.
+    /// Last frame of another PC that is master. If it is set, no question is sent.
     pub competing_master: Option<CompetingMaster>,
     /// `true` if nothing may be sent.
     pub listen_only: bool,
@@ -34,16 +34,16 @@ pub struct Watch {
     pub ask: bool,
     /// Profile of the boards.
     pub profile: Profile,
-    /// Result of the last request, until the next one.
+    /// Message about the last request, until the next request.
     pub message: String,
     loaded: Instant,
 }
 
-/// Time for an answer of the boards before silence is reported, µs.
+/// Time that boards have for an answer before silence is reported, µs.
 const QUIET_US: u64 = 2_000_000;
 
 impl Watch {
-    /// Creates a watch of the bus of this URL. With `listen_only` nothing is ever sent.
+    /// Creates the view of a bus. With `listen_only` nothing is ever sent.
     pub fn new(url: String, listen_only: bool, profile: Profile) -> Self {
         Self {
             url,
@@ -58,7 +58,7 @@ impl Watch {
         }
     }
 
-    /// Returns `true` if the boards have had time to answer.
+    /// Returns `true` if the boards have had enough time to answer.
     pub fn quiet_long(&self, now_us: u64) -> bool {
         now_us >= QUIET_US
     }
@@ -94,7 +94,7 @@ impl Watch {
         Ok(())
     }
 
-    /// Stops the control loops of all boards. This PC need not be the master for that.
+    /// Stops the control loops of all boards. This PC need not be the master.
     pub fn stop(&mut self, driver: &mut Driver) {
         if self.listen_only {
             self.message = "--listen-only: nothing was sent; `ucom stop all` stops the boards".into();
@@ -118,34 +118,34 @@ impl Watch {
         }
     }
 
-    /// Asks once, or when the user requests it again. Constant questions would look like a second master to other PCs (D-08), and changes
-    /// are received in any case.
+    /// Asks the boards once, and again if the user requests it. Constant questions would look like a second master to other PCs (D-08), and
+    /// changes are received without questions.
     fn question(&mut self, driver: &mut Driver) {
         if self.ask && !driver.master.is_busy() {
             self.ask = false;
-            // No other procedure runs, so this one cannot conflict with it.
+            // No other procedure runs, so the start cannot fail because of a conflict.
             let _ = driver.master.start(driver.now_us(), Request::Scan);
         }
     }
 }
 
-/// Content of a view at one time.
+/// Content of the view at one time.
 pub struct Picture<'a> {
     /// Boards as last seen.
     pub boards: &'a Boards,
     /// Traffic on the bus.
     pub statistics: &'a Statistics,
-    /// Numbers that two boards have, in words.
+    /// Numbers that two boards share, as text.
     pub shared: &'a [String],
     /// CAN adapter, if it reports its state.
     pub controller: Option<Controller>,
     /// Time, µs.
     pub now: u64,
-    /// Content apart from the boards.
+    /// Content of the view except the boards.
     pub watch: &'a Watch,
 }
 
-/// Problems, and the next command.
+/// Problems with the next command.
 #[derive(Clone, Debug, Default)]
 pub struct Problems {
     /// Problems that keep boards from working.
@@ -157,7 +157,7 @@ pub struct Problems {
 }
 
 impl Picture<'_> {
-    /// Returns the findings of a diagnosis of the received frames, and numbers that two boards have.
+    /// Returns the problems that the received frames show, and the numbers that two boards share.
     pub fn problems(&self) -> Problems {
         let Picture { boards, statistics, now, watch, .. } = self;
         let seen = Observation {
@@ -176,7 +176,7 @@ impl Picture<'_> {
             next.push("ucom doctor".into());
         }
         let all = findings(&seen).into_iter();
-        // Silence is reported below, together with the question.
+        // Silence is reported below, because its text depends on whether the boards were asked.
         for finding in all.filter(|f| f.severity != Severity::Good && !f.what.starts_with("no frame")) {
             let why = if finding.why.is_empty() { String::new() } else { format!(": {}", finding.why) };
             let text = format!("{}{why}", finding.what);
@@ -186,7 +186,7 @@ impl Picture<'_> {
                 &mut problems.warnings
             };
             list.push(text);
-            // The hint refers to this view.
+            // A hint that refers to this view itself is replaced.
             let helps = finding.next.to_string();
             let own = helps.is_empty() || helps.contains("ucom monitor");
             next.push(if own { "ucom doctor".into() } else { helps });

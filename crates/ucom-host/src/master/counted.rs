@@ -1,9 +1,9 @@
-//! Numbers followed by a noun.
+//! Numbers with a noun in singular or plural.
 
 use std::format;
 use std::string::String;
 
-/// Returns `1 board`, `3 boards`: for nouns whose plural takes an s.
+/// Returns `1 board`, `3 boards` and so on. For nouns whose plural is formed with an s.
 pub fn counted(number: usize, noun: &str) -> String {
     format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
 }

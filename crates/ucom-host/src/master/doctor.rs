@@ -1,4 +1,4 @@
-//! Findings about bus, chain and boards, with the next command.
+//! Findings about bus, chain and boards, each with the next command.
 use crate::master::engine::{Boards, Life, Statistics};
 use crate::master::error::SHARED_CAUSE;
 use crate::master::reports::{InitFinding, InitReport, ScanFinding, ScanReport};
@@ -13,7 +13,7 @@ use ucom::{Function, Profile};
 pub struct Controller {
     /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// Number of times it was bus-off during the observation; it may be active again.
+    /// Number of times that the controller was bus-off during the observation. It may be active again.
     pub times_bus_off: u64,
     /// `true` if the controller is error passive.
     pub passive: bool,
@@ -23,11 +23,11 @@ pub struct Controller {
     pub rec: Option<u16>,
     /// Frames without an acknowledgement.
     pub no_acknowledge: u64,
-    /// Stuff, form and check errors, as caused by a wrong bit rate or reflections.
+    /// Stuff, form and CRC errors. Typical causes are a wrong bit rate and reflections.
     pub protocol_errors: u64,
 }
 
-/// Observations; unknown values stay `None` or empty.
+/// Data for the diagnosis. Unknown values are `None` or empty.
 #[derive(Clone, Debug, Default)]
 pub struct Observation {
     /// Time of listening, µs.
@@ -40,11 +40,11 @@ pub struct Observation {
     pub boards: Boards,
     /// State of the adapter, if it reports one.
     pub controller: Option<Controller>,
-    /// A harmless scan.
+    /// Report of a scan, which changes nothing.
     pub scan: Option<ScanReport>,
-    /// Report of an init, if there was one.
+    /// Report of an init, if one was run.
     pub init: Option<InitReport>,
-    /// Another bit rate at which frames were received, bit/s.
+    /// Another bit rate at which frames were received, in bit/s.
     pub other_bitrate: Option<u32>,
     /// Last frame of another PC.
     pub competing_master: Option<(Function, u8)>,
@@ -211,7 +211,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
         f.problem(shared.to_string(), why, next);
     }
     if let Some(order) = scan.findings.iter().find(|x| matches!(x, ScanFinding::ByteOrder { .. })) {
-        // The other values of these boards were also read in the wrong order.
+        // The other values of these boards were read in the wrong byte order, so they give no findings.
         f.problem(order.to_string(), "", BYTE_ORDER);
         return;
     }
@@ -241,7 +241,7 @@ fn scanned(scan: &ScanReport, f: &mut Findings) {
     }
 }
 
-/// Adds a finding about the number of boards with a number.
+/// Adds a finding about how many boards have a number.
 fn numbers(scan: &ScanReport, f: &mut Findings) {
     let unnumbered = scan.findings.iter().filter(|x| matches!(x, ScanFinding::Unnumbered { .. })).count();
     if unnumbered > 0 && scan.boards.is_empty() {

@@ -1,4 +1,4 @@
-//! Body of the fuzz targets: random frames at any time during any procedure. A panic or an endless wait is a finding.
+//! Body of the fuzz targets: random frames are received at any time during any procedure. A panic or an endless wait is an error.
 use crate::master::engine::Event;
 use crate::master::interface::Master;
 use crate::master::reports::update::{UpdateImage, UpdateOptions, UpdateTarget};
@@ -7,7 +7,7 @@ use crate::master::reports::{
 };
 use ucom::{Format, Frame, Profile, Status};
 
-/// Longest virtual time that a procedure may take for any input, µs: attempts × blocks × the longest timeout.
+/// Longest virtual time that a procedure may take for any input, in µs. It is the number of attempts × blocks × the longest timeout.
 const LIMIT_US: u64 = 3_600_000_000;
 
 fn request(choice: u8) -> Request {
@@ -39,7 +39,7 @@ fn request(choice: u8) -> Request {
     }
 }
 
-/// Runs a procedure, chosen by the first byte. The remainder holds frames: pause in ms, identifier, length, data.
+/// Runs a procedure. The first byte selects it; the remaining bytes contain frames: pause in ms, identifier, length, data.
 pub fn frames(data: &[u8]) {
     let Some((&choice, mut rest)) = data.split_first() else { return };
     let mut master = Master::new(Profile::default());

@@ -1,4 +1,4 @@
-//! Interface for a driver: [`Master`].
+//! The interface for a driver: [`Master`].
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll, Waker};
@@ -19,12 +19,12 @@ pub struct Master {
 }
 
 impl Master {
-    /// Creates a master that listens and sends nothing by itself.
+    /// Creates a master that only listens until it is told to do more.
     pub fn new(profile: Profile) -> Self {
         Self { core: Arc::new(Mutex::new(Core::new(profile))), work: BTreeMap::new(), next_id: 1 }
     }
 
-    /// Starts a procedure; its end is reported as [`Event::Done`]. Refused while another procedure works with the same board.
+    /// Starts a procedure. Its end is reported as [`Event::Done`]. Refused while another procedure works with the same board.
     pub fn start(&mut self, now: u64, request: Request) -> Result<ProcedureId, Error> {
         let (id, name, claims) = (ProcedureId(self.next_id), request.name(), request.claims());
         {
@@ -45,7 +45,7 @@ impl Master {
         Ok(id)
     }
 
-    /// Cancels a procedure. The procedure still undoes its changes on the boards before [`Event::Done`] comes.
+    /// Cancels a procedure. Before [`Event::Done`] is reported, the procedure still undoes its changes on the boards.
     pub fn cancel(&mut self, id: ProcedureId) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.cancel = true;
@@ -53,8 +53,8 @@ impl Master {
         self.run();
     }
 
-    /// Ends a procedure without another frame, because the bus is lost. [`Event::Done`] comes at once. For an update it has the known
-    /// state of each board, for conformance tests the finished tests, for all others [`MasterError::Bus`].
+    /// Ends a procedure without sending another frame, because the bus is lost. [`Event::Done`] is reported at once. For an update it
+    /// contains the known state of each board, for conformance tests the finished tests, and for all other procedures [`MasterError::Bus`].
     pub fn abandon(&mut self, id: ProcedureId, reason: &str) {
         if let Some(mailbox) = lock(&self.core).mailboxes.get_mut(&id) {
             mailbox.bus_gone = Some(reason.into());
@@ -62,7 +62,7 @@ impl Master {
         self.run();
     }
 
-    /// Takes a received frame; see [`Frame::received`].
+    /// Handles a received frame; see [`Frame::received`].
     pub fn handle(&mut self, now: u64, received: Result<Frame, Foreign>) {
         {
             let mut core = lock(&self.core);
@@ -72,13 +72,13 @@ impl Master {
         self.run();
     }
 
-    /// Returns the next frame to send; call it until it returns `None`.
+    /// Returns the next frame to send. Call it until it returns `None`.
     pub fn poll(&mut self, now: u64) -> Option<Frame> {
         self.poll_behind(now, now)
     }
 
-    /// Like `poll`, for a driver that has delivered the frames up to `received`, but not those between that time and `now`. No wait ends
-    /// after `received`, but heartbeats are sent.
+    /// Like `poll`, for a driver that has delivered only the frames received before the time `received`, not those between `received` and
+    /// `now`. Waits do not end later than `received`, but heartbeats are sent up to `now`.
     pub fn poll_behind(&mut self, now: u64, received: u64) -> Option<Frame> {
         {
             let mut core = lock(&self.core);
@@ -90,7 +90,8 @@ impl Master {
         lock(&self.core).pop()
     }
 
-    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives before. `None`: only when a frame arrives.
+    /// Returns the time at which [`Master::poll`] must be called next, unless a frame arrives earlier. `None`: the call is needed only when
+    /// a frame arrives.
     pub fn next_deadline(&self) -> Option<u64> {
         let core = lock(&self.core);
         if !core.idle() {
@@ -100,7 +101,7 @@ impl Master {
         waiting.chain(core.duties_deadline()).min()
     }
 
-    /// Takes the oldest event.
+    /// Removes and returns the oldest event.
     pub fn take_event(&mut self) -> Option<Event> {
         lock(&self.core).take_event()
     }
@@ -136,24 +137,24 @@ impl Master {
         lock(&self.core).session != Session::Quiet
     }
 
-    /// Returns another PC's last frame (D-08): its time, its function, and its number.
+    /// Returns the last frame of another PC (D-08): its time, its function, and the number that it was sent to.
     pub fn competing_master(&self) -> Option<(u64, Function, u8)> {
         lock(&self.core).competing_master
     }
 
-    /// Ends heartbeats and repeated inputs: running boards become safe by themselves (D-50).
+    /// Ends the heartbeats and the repeated inputs. Running boards then become safe by themselves (D-50).
     pub fn end_session(&mut self) {
         let mut core = lock(&self.core);
         core.session = Session::Quiet;
         core.stops.clear();
     }
 
-    /// Returns the boards as last seen.
+    /// Returns the last known state of the boards.
     pub fn boards(&self) -> Boards {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards have, each as the error of procedures that end for that reason.
+    /// Returns the numbers that two boards share, each as the error with which procedures end for this reason.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }
@@ -163,7 +164,7 @@ impl Master {
         lock(&self.core).statistics.clone()
     }
 
-    /// Sets an input of a described board. The input is sent at once, and repeated while the board runs (D-34).
+    /// Sets an input of a board whose description is known. The input is sent at once, and repeated while the board runs (D-34).
     pub fn set_input(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Ci, name)?;
         let mut core = lock(&self.core);
@@ -177,7 +178,8 @@ impl Master {
         Ok(index)
     }
 
-    /// Writes a parameter of a described board. The board does not answer, so the shadow marks the value as assumed (D-35).
+    /// Writes a parameter of a board whose description is known. The board does not answer, so the shadow stores the value as assumed
+    /// (D-35).
     pub fn set_parameter(&mut self, now: u64, board: u8, name: &str, value: u16) -> Result<u16, SignalError> {
         let index = self.signal(now, board, Kind::Par, name)?;
         lock(&self.core).send_parameter(board, index, value);
@@ -197,7 +199,7 @@ impl Master {
         core.descriptions.get(&key).cloned()
     }
 
-    /// Returns all known descriptions, to be stored for the next session.
+    /// Returns all known descriptions. The caller can store them for the next session.
     pub fn descriptions(&self) -> BTreeMap<DescriptionKey, IoDescription> {
         lock(&self.core).descriptions.clone()
     }
@@ -207,22 +209,24 @@ impl Master {
         lock(&self.core).descriptions.insert(key, description);
     }
 
-    /// Returns `true` if the inputs of a board are sent cyclically, so that a lost frame is followed by others (D-34).
+    /// Returns `true` if the inputs of a board are sent cyclically, so that a lost frame does not matter (D-34).
     pub fn repeats_inputs(&self, board: u8) -> bool {
         lock(&self.core).data.get(&board).is_some_and(|data| data.repeat.is_some())
     }
 
-    /// Returns the inputs of a board as last set, or its own initial inputs; `None`: neither is known since its application started.
+    /// Returns the inputs of a board: the values that were set last, or the board's initial values. `None`: neither is known since the
+    /// application started.
     pub fn inputs(&self, board: u8) -> Vec<Option<u16>> {
         lock(&self.core).data.get(&board).map(ProcessData::inputs).unwrap_or_default()
     }
 
-    /// Returns the parameters of a board as this PC assumes them.
+    /// Returns the parameters that this PC assumes for a board.
     pub fn parameters(&self, board: u8) -> Vec<ParValue> {
         lock(&self.core).data.get(&board).map(|d| d.par.values().to_vec()).unwrap_or_default()
     }
 
-    /// Reports a board's sensor outputs as [`Event::Snapshot`]; `dimension` is needed if the board is not described yet.
+    /// Begins or stops reporting the sensor outputs of a board as [`Event::Snapshot`]. `dimension` is needed if the board's description is
+    /// not known.
     pub fn watch(&mut self, board: u8, dimension: Option<u16>, on: bool) {
         let mut core = lock(&self.core);
         let data = core.data.entry(board & 31).or_default();
@@ -232,15 +236,16 @@ impl Master {
         }
     }
 
-    /// Makes this PC the master without a procedure: heartbeats from now on.
+    /// Makes this PC the master without a procedure. Heartbeats are sent from now on.
     pub fn begin_session(&mut self, now: u64) {
         let mut core = lock(&self.core);
         core.advance(now);
         core.start_session();
     }
 
-    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly after. The stop goes to
-    /// these boards, the last one first, or to all by broadcast. Waits for no answer; [`Request::Stop`] checks each board.
+    /// Stops control loops (ADMIN_DATA, all 0) ahead of all queued frames, and sends the stop twice more shortly afterwards. The stop is
+    /// sent to these boards, the last one first, or to all boards by broadcast. Does not wait for an answer; [`Request::Stop`] checks each
+    /// board.
     pub fn stop_at_once(&mut self, now: u64, boards: Option<&[u8]>) {
         let mut core = lock(&self.core);
         core.advance(now);

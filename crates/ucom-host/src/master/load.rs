@@ -1,27 +1,28 @@
-//! Bus load: worst-case length of frames, and the forecast before boards are started (P-19).
+//! Bus load: worst-case frame lengths, and the forecast before boards are started (P-19).
 
 use core::fmt;
 
 use ucom::{Dimensions, Profile};
 
-/// Returns the bits of a classic frame with worst-case stuffing and the pause after it: DLC 0 = 55, 2 = 75, 8 = 135.
+/// Returns the length of a classic frame in bits, with worst-case stuffing and the pause after it: 55 for DLC 0, 75 for DLC 2, 135 for DLC
+/// 8.
 pub const fn frame_bits(dlc: u8) -> u64 {
     let data = 8 * if dlc > 8 { 8 } else { dlc as u64 };
-    // 34 of the 44 bits outside the data can be stuffed, and three more bits separate frames.
+    // Stuff bits can occur in 34 of the 44 bits outside the data. Three more bits separate frames.
     let stuffed = 34 + data;
     44 + data + 3 + (stuffed - 1) / 4
 }
 
-/// Bus load that the control loops of some boards will cause.
+/// Forecast of the bus load that the control loops of some boards will cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LoadForecast {
     /// Number of running boards.
     pub boards: u32,
-    /// Bits per second of all boards and the PC.
+    /// Bits per second from all boards and the PC.
     pub bits_per_s: u64,
-    /// Bit rate, bit/s.
+    /// Bit rate in bit/s.
     pub bitrate: u32,
-    /// `load.limit`, percent.
+    /// `load.limit` in percent.
     pub limit: u32,
 }
 
@@ -42,7 +43,7 @@ impl LoadForecast {
         Self { boards, bits_per_s: bits as u64, bitrate: profile.bitrate, limit: profile.load_limit }
     }
 
-    /// Returns the percentage of the bit rate.
+    /// Returns the load as a percentage of the bit rate.
     pub fn percent(&self) -> f64 {
         100.0 * self.bits_per_s as f64 / f64::from(self.bitrate.max(1))
     }
@@ -69,13 +70,13 @@ impl fmt::Display for LoadForecast {
 mod tests {
     use super::*;
 
-    /// The frame lengths in the requirements.
+    /// The frame lengths that the requirements list.
     #[test]
     fn worst_case_lengths() {
         assert_eq!([frame_bits(0), frame_bits(2), frame_bits(8)], [55, 75, 135]);
     }
 
-    /// Loads of 7 and 16 boards with given words of SO and CI at 10 ms, and at 1 ms.
+    /// Loads of 7 and 16 boards with certain numbers of outputs and inputs, at periods of 10 ms and 1 ms.
     #[test]
     fn p19_forecasts_of_the_requirements() {
         let forecast = |boards: usize, so: u16, ci: u16, period: u32| {

@@ -1,15 +1,15 @@
 //! The PC side: procedures as state machines without I/O.
 //!
-//! A [`Master`] takes frames and the time and returns frames. The master never waits, and has no clock and no thread. A driver is a loop
-//! of a few lines:
+//! A [`Master`] gets received frames and the time, and returns frames to send. It never waits, and has no clock and no thread. A driver is
+//! a loop of a few lines:
 //!
 //! 1. deliver every frame that has arrived: [`Master::handle`];
 //! 2. send while [`Master::poll`] returns frames;
 //! 3. handle [`Master::take_event`];
 //! 4. wait for the next frame, at most until [`Master::next_deadline`].
 //!
-//! Deliver all received frames before `poll` is called. Waits end only in `poll`, so a late driver never mistakes an answer for silence
-//! ([`Master::poll_behind`] covers frames that came during the delivery). Time is in microseconds from any start and must not go back (a
+//! Deliver all received frames before you call `poll`. Waits end only in `poll`, so a late driver never mistakes an answer for silence.
+//! [`Master::poll_behind`] is for frames that arrive during the delivery. Time is in microseconds since any start and must not go back (a
 //! monotonic clock).
 //!
 //! ```
@@ -31,8 +31,9 @@
 //! assert!(report.boards.is_empty());
 //! ```
 //!
-//! A procedure that changes something first makes this PC the master of the bus. The procedure listens for another master (D-08); after
-//! that, heartbeats are sent until [`Master::end_session`]. Scan, information and descriptions change nothing and send no heartbeats.
+//! A procedure that changes something first makes this PC the master of the bus. It listens for another master (D-08); then heartbeats are
+//! sent until [`Master::end_session`]. Procedures that only scan or read information and descriptions change nothing and send no
+//! heartbeats.
 
 mod counted;
 pub mod doctor;
@@ -55,7 +56,7 @@ pub mod conformance {
     };
 }
 
-/// Measurement of properties in which boards differ from the defaults: options and report.
+/// Measurement of properties in which boards may differ from the defaults: options and report.
 pub mod probe {
     pub use crate::master::reports::{ProbeOptions, ProbeReport, ProbeRow};
 }

@@ -1,4 +1,4 @@
-//! The boards as last seen, and their supervision by heartbeats (D-51).
+//! The last known state of the boards, and their supervision by heartbeats (D-51).
 
 use std::collections::BTreeMap;
 use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, Status, StringAssembler};
@@ -6,10 +6,10 @@ use ucom::{Admin, Assembled, BoardInfo, ErrorCode, Function, Payload, Profile, S
 /// State of a board's heartbeats.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Life {
-    /// No heartbeat yet, or the application was stopped on purpose.
+    /// No heartbeat was received yet, or the application was stopped by a command.
     #[default]
     Unarmed,
-    /// The heartbeats come in time.
+    /// The heartbeats arrive in time.
     Alive,
     /// A single heartbeat is missing.
     Late,
@@ -17,7 +17,7 @@ pub enum Life {
     Lost,
 }
 
-/// Time for which a board's last heartbeat may still arrive after its application has ended, µs.
+/// Time for which a last heartbeat of a board may still arrive after its application has ended, µs.
 const UNDER_WAY: u64 = 100_000;
 
 /// State of a board as last received.
@@ -25,37 +25,37 @@ const UNDER_WAY: u64 = 100_000;
 pub struct Board {
     /// Last answer to PC_INFO.
     pub info: Option<BoardInfo>,
-    /// Description; `None` until it was received completely.
+    /// Description; `None` until it has been received completely.
     pub description: Option<String>,
-    /// Flags, as last sent by the board.
+    /// Flags that the board sent last.
     pub admin: Option<Admin>,
-    /// Supervision.
+    /// State of the supervision.
     pub life: Life,
-    /// Last heartbeat, µs.
+    /// Time of the last heartbeat, µs.
     pub alive_at: Option<u64>,
     /// Time of the last frame of any kind, µs, and its function.
     pub last: Option<(u64, Function)>,
-    /// Time of the last sensor output, µs: the control loop was running then.
+    /// Time of the last sensor outputs, µs. The control loop was running at that time.
     pub so_at: Option<u64>,
     /// `true` if the board has rebooted since it got its number.
     pub rebooted: bool,
-    /// Errors reported by the board, newest last, at most 16: time in µs and code.
+    /// The last errors reported by the board, at most 16, newest last: time in µs and code.
     pub errors: Vec<(u64, ErrorCode)>,
     /// Number of reported errors.
     pub error_count: u64,
-    /// Strings of the board that could not be reassembled.
+    /// Number of strings of the board that could not be reassembled.
     pub bad_strings: u64,
     /// Number of MCA_DSP_READY frames, requested or not.
     pub ready_count: u64,
-    /// Time since which its application is known to be stopped, without a pending automatic start.
+    /// Time since when the application is known to be stopped, with no automatic start pending.
     pub(crate) stopped_at: Option<u64>,
-    /// Time of the last start command, until the board shows that it has started.
+    /// Time of the last start command. Cleared when the board shows that it has started.
     pub(crate) starting_since: Option<u64>,
     pub(crate) debug: Option<Box<StringAssembler>>,
 }
 
 impl Life {
-    /// Returns the name as screens show it, in one word.
+    /// Returns the displayed name, which is one word.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Unarmed => "-",
@@ -80,12 +80,12 @@ pub const fn state_name(status: Status) -> &'static str {
 }
 
 impl Board {
-    /// Returns `true` if the last received state still holds: the board is not lost and has not rebooted.
+    /// Returns `true` if the last received state is still valid: the board is not lost and has not rebooted.
     pub fn is_known(&self) -> bool {
         self.life != Life::Lost && !self.rebooted
     }
 
-    /// Returns the state in one word. Frames that the board sends by itself override an old answer.
+    /// Returns the state in one word. Unsolicited frames of the board have priority over an older answer.
     pub fn state_name(&self, now_us: u64) -> &'static str {
         match (self.life, self.status()) {
             _ if self.rebooted => "rebooted",
@@ -97,28 +97,28 @@ impl Board {
         }
     }
 
-    /// Returns the time since the last heartbeat, s.
+    /// Returns the time since the last heartbeat in s.
     pub fn alive_age_s(&self, now_us: u64) -> Option<f64> {
         self.alive_at.map(|at| now_us.saturating_sub(at) as f64 * 1e-6)
     }
 
-    /// Returns the status as last read.
+    /// Returns the last status that was read.
     pub fn status(&self) -> Option<Status> {
         self.info.map(|info| info.status)
     }
 
-    /// Returns `true` if the board sends its outputs: its control loop then runs now, even if its last answer said otherwise.
+    /// Returns `true` if the board sends its outputs. Its control loop then runs now, even if its last answer showed another state.
     pub fn sends_outputs(&self, now: u64) -> bool {
         self.so_at.is_some_and(|at| now.saturating_sub(at) < 500_000)
     }
 
-    /// Returns `true` if the control loop runs, according to the frames received last.
+    /// Returns `true` if the control loop runs, according to the last frames of the board.
     pub fn running(&self, now: u64) -> bool {
         self.sends_outputs(now)
             || self.admin.map_or_else(|| self.status().is_some_and(|s| s.has(Status::MCARUN)), |a| a.run)
     }
 
-    /// Takes a package of a text of the board; returns the text when it is complete. `passed_us` is the time between frames.
+    /// Handles a package of a text of the board. Returns the text when it is complete. `passed_us` is the sum of the times between frames.
     pub(crate) fn debug_text(
         &mut self,
         passed_us: u64,
@@ -144,12 +144,12 @@ impl Board {
         self.errors.push((at, code));
     }
 
-    /// Returns `true` if a heartbeat under its number cannot be its own (D-08).
+    /// Returns `true` if a heartbeat with the number of this board cannot be from the board itself (D-08).
     pub(crate) fn cannot_be_alive(&self, now: u64) -> bool {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// Records that the application has ended or is about to end. Its heartbeats are no longer expected, and its state is unknown.
+    /// Records that the application has ended or will end now. Its heartbeats are no longer expected, and its state is unknown.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;
@@ -165,7 +165,7 @@ pub struct Boards {
 }
 
 impl Boards {
-    /// Returns a board with a known state.
+    /// Returns the board with this number, if something is known about it.
     pub fn get(&self, number: u8) -> Option<&Board> {
         self.boards.get(&number)
     }
@@ -183,7 +183,7 @@ impl Boards {
         self.boards.iter_mut().map(|(n, board)| (*n, board))
     }
 
-    /// Forgets all boards, because all numbers are void.
+    /// Removes all boards, because all numbers have become invalid.
     pub(crate) fn clear(&mut self) {
         self.boards.clear();
     }

@@ -1,4 +1,4 @@
-//! Events: unsolicited reports of the master to its user.
+//! Events: reports of the master that its user has not requested.
 use crate::master::error::Error;
 use crate::master::io::Snapshot;
 use crate::master::reports::update::Progress;
@@ -23,15 +23,15 @@ pub enum Event {
         /// Progress.
         progress: Progress,
     },
-    /// An update is about to reset this board for programming, so its flash record no longer holds (D-62). The board's memory is not
-    /// erased before the board has answered the reset.
+    /// An update is about to reset this board for programming, so its flash record is no longer valid (D-62). The board's memory is erased
+    /// only after the board has answered the reset.
     FlashBegins {
         /// Procedure.
         id: ProcedureId,
         /// Flash number of the board.
         flash_number: u16,
     },
-    /// A board showed the program that an update wrote (D-62).
+    /// A board reported the program that an update has written (D-62).
     FlashVerified {
         /// Procedure.
         id: ProcedureId,
@@ -65,48 +65,49 @@ pub enum Event {
         board: u8,
         /// The code.
         code: ErrorCode,
-        /// Procedure that worked with the board; `None`: unsolicited.
+        /// Procedure that works with the board; `None` if there is none.
         during: Option<ProcedureId>,
     },
-    /// A board's flags, sent without a request.
+    /// A board sent its flags without a request.
     Admin {
         /// Board number.
         board: u8,
         /// The flags.
         admin: Admin,
     },
-    /// A text of a board.
+    /// A board sent a text.
     Debug {
         /// Board number.
         board: u8,
         /// The text.
         text: String,
     },
-    /// All sensor outputs of a board at one time (only for boards that [`Master::watch`](crate::master::Master::watch) names).
+    /// All sensor outputs of a board at one time. Reported only for boards that [`Master::watch`](crate::master::Master::watch) has
+    /// selected.
     Snapshot {
         /// Board number.
         board: u8,
         /// The words.
         snapshot: Snapshot,
     },
-    /// A frame that is not of this protocol (D-02). Only the first of each kind is reported; all are counted.
+    /// A frame is not of this protocol (D-02). Only the first frame of each kind is reported, but all are counted.
     Foreign(Foreign),
-    /// A competing master: another PC sends on the bus (D-08), after a pause of at least one second without its frames.
-    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that keeps sending.
+    /// A competing master: another PC sent a frame (D-08), after at least one second without frames of another PC.
+    /// [`Master::competing_master`](crate::master::Master::competing_master) also shows a master that sends all the time.
     CompetingMaster {
-        /// Function that it sent.
+        /// Function of the frame.
         function: Function,
         /// Number that the frame was sent to.
         to: u8,
     },
-    /// Two boards have the same number (D-24); reported once, until numbers are assigned again.
+    /// Two boards have the same number (D-24). This is reported once until numbers are assigned again.
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of these boards; the same number twice if the boards cannot be distinguished.
+        /// Flash numbers of these boards. The list has the same number twice if the boards cannot be distinguished.
         found: Vec<u16>,
     },
-    /// Events were dropped because no caller took them.
+    /// Events were dropped because the caller did not take them.
     Overflow {
         /// Number of dropped events.
         dropped: u64,
@@ -118,16 +119,16 @@ pub enum Event {
 pub enum Supervision {
     /// A heartbeat is missing.
     Late,
-    /// Three heartbeats are missing; the frames of the policy follow at once.
+    /// Three heartbeats are missing. The frames that the policy requires are sent at once.
     Lost,
     /// The heartbeats have returned.
     Back,
-    /// An unsolicited report came: the board has rebooted and no longer has a number (D-26).
+    /// The board sent a report without a request: it has rebooted and has lost its number (D-26).
     Rebooted {
         /// Low byte of its flash number.
         ucom_id: u8,
     },
-    /// An unsolicited report of an unknown board came.
+    /// An unknown board sent a report without a request.
     UnknownRebooted {
         /// Low byte of its flash number.
         ucom_id: u8,

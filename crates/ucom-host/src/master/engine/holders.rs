@@ -1,20 +1,21 @@
-//! Detection of shared numbers: the master checks every answer to PC_INFO, for any procedure.
+//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, whatever procedure has asked.
 //!
-//! Two boards with one number both carry out every command to it: both are flashed, both move. A board cannot detect this, but the PC
-//! can, because one PC_INFO is answered twice. Answers to questions are compared all the time ([`Holders::received`]). Before a procedure
-//! changes something, it waits until no other board answers (`one_board_each`).
+//! If two boards have the same number, both carry out every command to it: both are flashed, both move. A board cannot detect this, but the
+//! PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before a procedure changes something,
+//! it waits until no other board can answer (`one_board_each`).
 
 use crate::master::error::IdentityError;
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Function, Payload, Profile, Sequence, Status};
 
-/// Number of consecutive questions that one flash number must answer twice, because a gateway may double a frame now and then.
+/// Number of consecutive questions that the same flash number must answer twice. A single double answer is not enough, because a gateway
+/// may double a frame now and then.
 const TWICE: u32 = 3;
-/// Limit of flash numbers stored per number, because damaged answers may contain any.
+/// Limit of flash numbers stored per number. Damaged answers may contain any flash number.
 const MOST: usize = 8;
 
-/// Returns the first frame of DSP_INFO under a number. A package of its description differs: it does not have the board's own number and
-/// a possible status at these places.
+/// Returns the contents of a first frame of DSP_INFO; `None` for other frames. A package of the description has neither the board's number
+/// nor a possible status at these places.
 pub(crate) fn head(number: u8, payload: &Payload, profile: &Profile) -> Option<BoardInfo> {
     let info = BoardInfo::parse(payload, profile.endian)?;
     let possible = info.status.contradiction().is_none() && info.status.has(Status::INIT);
@@ -27,27 +28,28 @@ pub(crate) struct Holders {
     numbers: BTreeMap<u8, Holder>,
 }
 
-/// Boards that answered to a number since it was assigned.
+/// Boards that have answered to a number since it was assigned.
 #[derive(Debug, Default)]
 struct Holder {
     /// Time of the last PC_INFO, µs.
     asked_at: Option<u64>,
-    /// Answers to it: heads by flash number, other frames, and the number of other frames in one answer.
+    /// Answers to the last PC_INFO: number of first frames by flash number, number of other frames, and number of other frames that one
+    /// answer has.
     heads: BTreeMap<u16, u32>,
     packages: u32,
     of_one: Option<u32>,
-    /// Consecutive earlier questions that one flash number answered twice.
+    /// Number of consecutive earlier questions that one flash number answered twice.
     twice: u32,
-    /// Number of questions that each flash number answered, the last to answer, and the number of changes between them.
+    /// Number of questions that each flash number answered, the flash number that answered last, and how often this changed.
     seen: BTreeMap<u16, u32>,
     last: Option<u16>,
     changes: u32,
-    /// Flash numbers of the boards that share it, once that is certain.
+    /// Flash numbers of the boards that share the number, once this is certain.
     shared: Vec<u16>,
 }
 
 impl Holder {
-    /// Returns `true` if one flash number answered the last question twice, from the first frame to the last.
+    /// Returns `true` if one flash number sent two complete answers to the last question.
     fn answered_twice(&self) -> bool {
         let two = self.heads.len() == 1 && self.heads.values().all(|count| *count > 1);
         two && self.of_one.is_some_and(|of_one| self.packages >= 2 * of_one)
@@ -86,10 +88,11 @@ impl Holder {
         }
     }
 
-    /// Returns the flash numbers of the boards that share the number, by the answers received so far; otherwise an empty list.
+    /// Returns the flash numbers of the boards that share the number, according to the answers received so far. The list is empty if no
+    /// boards share it.
     ///
-    /// A single damaged answer does not count as another board, nor does a board that replaced another one. Flash numbers that came in
-    /// answer to different questions must come repeatedly, in turns.
+    /// A single damaged answer is not mistaken for another board, and neither is a board that has replaced another one. If flash numbers
+    /// answer different questions, each must answer repeatedly, and they must alternate.
     fn sharing(&self) -> Vec<u16> {
         if self.heads.len() > 1 {
             return self.heads.keys().copied().collect();
@@ -106,14 +109,14 @@ impl Holder {
     }
 }
 
-/// Steps that remain before a number is known to belong to one board.
+/// Step that is missing to be sure that a number belongs to one board.
 pub(crate) enum Open {
     Nothing,
-    /// A board may still answer until then.
+    /// Another board may still answer until this time.
     Wait(u64),
     /// No board has answered.
     Ask,
-    /// A flash number answered twice: check once more.
+    /// A flash number answered twice, so one more question is needed.
     AskAgain,
 }
 
@@ -123,7 +126,7 @@ impl Holders {
         self.numbers.entry(number.number()).or_default().ask(now);
     }
 
-    /// Takes a frame of DSP_INFO. Returns the flash numbers of the boards that share the number, when this is detected.
+    /// Handles a frame of DSP_INFO. If this frame shows that boards share the number, returns their flash numbers.
     pub(crate) fn received(&mut self, number: u8, payload: &Payload, profile: &Profile) -> Option<Vec<u16>> {
         let holder = self.numbers.entry(number).or_default();
         holder.answer(number, payload, profile);
@@ -134,7 +137,7 @@ impl Holders {
         (!holder.shared.is_empty()).then(|| holder.shared.clone())
     }
 
-    /// Handles a frame of this PC, or of another one, that may change the holder of a number.
+    /// Handles a frame of this PC, or of another PC, that may change which board has a number.
     pub(crate) fn may_change(
         &mut self,
         function: Function,
@@ -153,7 +156,7 @@ impl Holders {
             _ => false,
         };
         match (forgets, function) {
-            // A reset reaches all boards under the number that belongs to no board, for any `addr.broadcast`.
+            // For any `addr.broadcast`, a reset to the number for boards without a number reaches all boards.
             (true, _) if broadcast || to == profile.unnumbered() => self.clear(),
             (true, _) => self.forget(to.number()),
             (false, Function::Info) if broadcast => {
@@ -164,23 +167,23 @@ impl Holders {
         }
     }
 
-    /// Returns the time of the last PC_INFO to one of these boards (by bit), µs.
+    /// Returns the time of the last PC_INFO to one of these boards, µs. Each bit of `boards` is a board.
     pub(crate) fn last_asked(&self, boards: u32) -> Option<u64> {
         let mine = self.numbers.iter().filter(|(number, _)| boards >> **number & 1 == 1);
         mine.filter_map(|(_, holder)| holder.asked_at).max()
     }
 
-    /// Forgets a number whose holder may have changed: it was assigned or withdrawn, or its board has rebooted.
+    /// Removes a number that another board may have now: the number was assigned or withdrawn, or its board has rebooted.
     pub(crate) fn forget(&mut self, number: u8) {
         self.numbers.remove(&number);
     }
 
-    /// Forgets all boards, because all numbers are void.
+    /// Removes all numbers, because all of them have become invalid.
     fn clear(&mut self) {
         self.numbers.clear();
     }
 
-    /// Returns the lowest of these numbers (by bit) that boards share.
+    /// Returns the lowest of these numbers that boards share. Each bit of `numbers` is a number.
     pub(crate) fn shared(&self, numbers: u32) -> Option<IdentityError> {
         let mine =
             |(number, holder): &(&u8, &Holder)| numbers >> **number & 1 == 1 && !holder.shared.is_empty();
@@ -193,14 +196,14 @@ impl Holders {
         self.numbers.keys().filter_map(|number| self.shared(1 << number)).collect()
     }
 
-    /// Numbers that one flash number has answered twice, but not often enough to be sure.
+    /// Returns the numbers that one flash number has answered twice, but not often enough to be certain.
     pub(crate) fn doubtful(&self) -> Vec<u8> {
         let doubtful = |holder: &Holder| holder.shared.is_empty() && holder.answered_twice();
         self.numbers.iter().filter(|(_, holder)| doubtful(holder)).map(|(number, _)| *number).collect()
     }
 
-    /// Returns the step that remains for a number. `received` is the time up to which all frames were delivered, `oldest` the largest
-    /// accepted age of an answer, µs.
+    /// Returns the step that is missing for a number. All frames up to the time `received` have been delivered. Answers to questions older
+    /// than `oldest` µs are not accepted.
     pub(crate) fn open(&self, number: u8, received: u64, patience: u64, oldest: u64) -> Open {
         let Some(holder) = self.numbers.get(&number) else { return Open::Ask };
         match holder.asked_at.filter(|at| received.saturating_sub(*at) <= oldest) {
@@ -217,7 +220,7 @@ impl Holders {
 mod tests {
     use super::*;
 
-    /// Sends one PC_INFO per set of answers.
+    /// For each set of answers, sends one PC_INFO and delivers the answers.
     fn question(holders: &mut Holders, answers: &[&[u16]]) -> Option<Vec<u16>> {
         let profile = Profile::default();
         let mut news = None;

@@ -5,14 +5,14 @@ use crate::master::io::process_data::ProcessData;
 use crate::master::load::frame_bits;
 use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
-/// Percent of the bus that repeated inputs may take.
+/// Percentage of the bus that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest time that repetitions may fall behind that share and catch up later, µs.
+/// Longest time by which repetitions may fall behind this limit and catch up later, µs.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {
-    /// Ends the repetition of a board's inputs and drops queued inputs. Inputs of a board that is still being started do not count as a
-    /// repetition.
+    /// Ends the repetition of a board's inputs and drops the queued inputs. If the board is still being started, its inputs are not
+    /// repeated yet, so they stay queued.
     pub(crate) fn stop_inputs(&mut self, board: u8) {
         if self.data.get_mut(&board).is_some_and(|data| data.repeat.take().is_some()) {
             self.forget_inputs(board);
@@ -24,11 +24,11 @@ impl Core {
         all.into_iter().for_each(|number| self.stop_inputs(number));
     }
 
-    /// Sends CI again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The board that has waited longest
-    /// comes first.
+    /// Sends the controller inputs again every `ci.period`, so that the loss of a frame has no lasting effect (D-34). The board that has
+    /// waited longest is first.
     ///
-    /// All repetitions together leave a part of the bus time to other frames, even for boards started with force. Answers and heartbeats
-    /// have a lower priority than inputs on the bus, and a socket accepts more frames than the bus carries.
+    /// The repetitions leave a part of the bus time to other frames, even if boards were started with force. On the bus, answers and
+    /// heartbeats have a lower priority than inputs, and a socket accepts more frames than the bus can carry.
     pub(crate) fn repeat_inputs(&mut self) {
         if self.session == Session::Quiet {
             return;
@@ -49,7 +49,7 @@ impl Core {
         }
     }
 
-    /// Queues all CI of a board, and sets the time of the next repetition.
+    /// Queues all inputs of a board, and sets the time of the next repetition.
     pub(crate) fn send_inputs(&mut self, board: u8) {
         let Some(data) = self.data.get_mut(&board) else { return };
         if let Some(at) = data.repeat {
@@ -60,8 +60,8 @@ impl Core {
         offsets.into_iter().for_each(|offset| self.queue_inputs(board, offset));
     }
 
-    /// Sends a changed input at once. If this PC sends all inputs, it sends the whole package (which is atomic, D-34). Otherwise it sends
-    /// the word alone (DLC 4, D-15), because it does not know the other words.
+    /// Sends a changed input at once. If this PC repeats the inputs, it sends the complete package, which takes effect as a whole (D-34).
+    /// Otherwise it sends only the word (DLC 4, D-15), because it does not know the other words.
     pub(crate) fn send_input(&mut self, board: u8, index: u16) {
         let (Some(to), Some(data)) = (Sequence::new(board), self.data.get(&board)) else { return };
         if data.repeat.is_some() {
@@ -74,21 +74,20 @@ impl Core {
         self.queue_frame(None, frame, Forget::Nothing);
     }
 
-    /// Forgets a board's parameters (D-35) and inputs after a restart of its application.
+    /// Invalidates the parameters (D-35) and inputs of a board whose application was restarted.
     pub(crate) fn forget_parameters(&mut self, board: u8) {
         self.stop_inputs(board);
         if let Some(data) = self.data.get_mut(&board) {
             data.par.forget();
             data.ci_known.clear();
-            // Another application may have started.
+            // The application may be another one now.
             data.sent = false;
         }
     }
 
-    /// Writes one parameter. The shadow stores it as assumed (D-35).
+    /// Writes one parameter. The shadow stores the value as assumed (D-35).
     ///
-    /// The package holds this word alone (DLC 4, which every receiver accepts), because the other words may be unknown here and must not
-    /// change.
+    /// The package contains only this word (DLC 4, which every receiver accepts). The other words may be unknown here and must not change.
     pub(crate) fn send_parameter(&mut self, board: u8, index: u16, value: u16) -> bool {
         let Some(to) = Sequence::new(board) else { return false };
         let Some(data) = self.data.get_mut(&board) else { return false };

@@ -1,8 +1,8 @@
-//! Actions of a procedure: send, wait for frames, sleep.
+//! Actions of a procedure: sending, waiting for frames, sleeping.
 //!
 //! Procedures are `async` functions without an executor: the compiler turns each into a state machine, and
-//! [`Master`](crate::master::Master) advances it when a frame arrives or its time has come. Procedures read as a sequence of
-//! steps. No lock is ever held during a wait.
+//! [`Master`](crate::master::Master) advances it when a frame arrives or its time has come. A procedure can therefore be read as a sequence
+//! of steps. No lock is ever held during a wait.
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use core::future::{Future, poll_fn};
@@ -24,7 +24,7 @@ pub(crate) struct Link {
     pub(crate) id: ProcedureId,
 }
 
-/// Locks the core. A panic in another thread leaves it usable.
+/// Locks the core. The core stays usable after a panic in another thread.
 pub(crate) fn lock(core: &Mutex<Core>) -> MutexGuard<'_, Core> {
     core.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -67,21 +67,21 @@ impl Link {
         self.left(serial).await;
     }
 
-    /// Like [`Link::ask`], but keeps errors. Used for program data, because an error may arrive in the middle of a block. Returns the
-    /// time at which the frame left.
+    /// Like [`Link::ask`], but keeps errors. This is for program data, because a board may report an error in the middle of a block.
+    /// Returns the time at which the frame left.
     pub(crate) async fn feed(&self, to: Sequence, message: ToBoard) -> u64 {
         let serial = self.with(|core| core.queue(Some(self.id), to, message, Forget::Answers));
         self.left(serial).await;
         self.with(|core| core.sent_at)
     }
 
-    /// Like [`Link::send`] with a frame of any form.
+    /// Like [`Link::send`], but for a frame of any form.
     pub(crate) async fn send_frame(&self, frame: Frame) {
         let serial = self.with(|core| core.queue_frame(Some(self.id), frame, Forget::Nothing));
         self.left(serial).await;
     }
 
-    /// Waits until all frames queued so far, by any procedure, have left.
+    /// Waits until all frames that any procedure has queued so far have left.
     pub(crate) async fn flush(&self) {
         let serial = self.with(|core| core.queued());
         self.left(serial).await;
@@ -91,7 +91,7 @@ impl Link {
         poll_fn(|_| if self.with(|core| core.left(serial)) { Poll::Ready(()) } else { Poll::Pending }).await;
     }
 
-    /// Receives these functions of these boards, and their errors, from now on.
+    /// From now on, receives frames with these functions from these boards, and errors of these boards.
     pub(crate) fn listen(&self, boards: u32, functions: &[Function]) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -101,12 +101,12 @@ impl Link {
         });
     }
 
-    /// Returns the next frame of the mailbox; `None` at the time `until`.
+    /// Returns the next frame in the mailbox; `None` if there is none until `until`.
     pub(crate) async fn next(&self, until: u64) -> Option<Received> {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
-    /// Returns the result of `take` on the mailbox, or `None` at the time `until`.
+    /// Applies `take` to the mailbox until it returns a result; `None` if there is none until `until`.
     pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
@@ -127,12 +127,12 @@ impl Link {
         .await
     }
 
-    /// Returns the next unparsed frame; `None` at the time `until`.
+    /// Returns the next unparsed frame; `None` if there is none until `until`.
     pub(crate) async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }
 
-    /// Begins or ends to keep every unparsed frame for [`Link::next_raw`].
+    /// Begins or stops storing every unparsed frame for [`Link::next_raw`].
     pub(crate) fn tap(&self, on: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -141,12 +141,12 @@ impl Link {
         });
     }
 
-    /// Sleeps for a time; frames received meanwhile stay in the mailbox.
+    /// Sleeps for `us` µs. Frames that are received meanwhile stay in the mailbox.
     pub(crate) async fn sleep(&self, us: u64) {
         self.sleep_until(self.now() + us).await;
     }
 
-    /// Sleeps until a time.
+    /// Sleeps until the time `until`.
     pub(crate) async fn sleep_until(&self, until: u64) {
         poll_fn(|_| {
             self.with(|core| {
@@ -163,7 +163,7 @@ impl Link {
         .await;
     }
 
-    /// Waits until no frame that the procedure listens to has come for `us`, at most 20 times as long.
+    /// Waits until no frame for this procedure has arrived for `us` µs, but at most 20 times as long.
     pub(crate) async fn quiet(&self, us: u64) {
         let limit = self.now() + 20 * us;
         while self.next((self.now() + us).min(limit)).await.is_some() {
@@ -173,9 +173,9 @@ impl Link {
         }
     }
 
-    /// Ends `work` early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller reports that
-    /// the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared), once: two boards with one number appear, and the
-    /// procedure does not tolerate that. The procedure's queued frames are then dropped.
+    /// Runs `work`, and ends it early in three cases. [`MasterError::Cancelled`]: the caller cancels it. [`MasterError::Bus`]: the caller
+    /// reports that the bus is lost. [`NumberShared`](crate::master::IdentityError::NumberShared): two boards with the same number appear,
+    /// and the procedure does not tolerate this; reported only once. The queued frames of the procedure are then dropped.
     pub(crate) async fn or_cancel<T>(
         &self,
         work: impl Future<Output = Result<T, Error>>,
@@ -190,7 +190,7 @@ impl Link {
                 let mut ended = gone.or(cancelled);
                 if ended.is_none() && !mailbox.bears_shared_numbers {
                     ended = core.holders.shared(mailbox.claims).map(Error::from);
-                    // The steps that follow undo changes.
+                    // The procedure now undoes its changes, which must not be ended for the same reason.
                     mailbox.bears_shared_numbers = ended.is_some();
                 }
                 if ended.is_some() {
@@ -206,7 +206,7 @@ impl Link {
         .await
     }
 
-    /// Sets whether two boards with one number are tolerated from now on, or end this procedure.
+    /// Sets whether the procedure tolerates two boards with the same number from now on, or is ended.
     pub(crate) fn bear_shared_numbers(&self, bears: bool) {
         self.with(|core| {
             if let Some(mailbox) = core.mailboxes.get_mut(&self.id) {
@@ -215,14 +215,14 @@ impl Link {
         });
     }
 
-    /// Returns the board's number, checked against the profile.
+    /// Returns a board number after checking it against the profile.
     pub(crate) fn board(&self, number: u8) -> Result<Sequence, ExchangeError> {
         let profile = self.profile();
         let wrong = ExchangeError::NoBoard { number, first: profile.addr_first };
         Sequence::new(number).filter(|n| profile.is_board(*n)).ok_or(wrong)
     }
 
-    /// Converts a board's error to the error of the procedure.
+    /// Converts an error that a board reports to an error of the procedure.
     pub(crate) fn device(board: u8, message: &FromBoard, during: &'static str) -> Option<ExchangeError> {
         match message {
             FromBoard::Error(code) => Some(ExchangeError::Device { board, code: *code, during }),

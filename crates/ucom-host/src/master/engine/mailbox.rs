@@ -1,33 +1,33 @@
-//! Mailbox of a procedure: its filter and its received frames.
+//! Mailbox of a procedure: a filter and the received frames.
 use std::collections::VecDeque;
 
 use ucom::{Frame, FromBoard, Function};
 
-/// Limit of frames that wait for a procedure.
+/// Limit of frames that wait in a mailbox.
 pub(crate) const MAX_RECEIVED: usize = 16_384;
 
-/// A frame of a board for a procedure.
+/// A frame of a board that a procedure receives.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Received {
-    /// Time that has certainly passed between frames, µs.
+    /// Time in µs that has certainly passed between frames so far.
     pub at: u64,
     pub from: u8,
     pub message: FromBoard,
 }
 
-/// Frames that a procedure receives.
+/// Selection of the frames that a procedure receives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
-    /// Boards by bit.
+    /// Boards; bit n is board n.
     pub boards: u32,
-    /// Functions by bit.
+    /// Functions; bit n is function n.
     pub functions: u32,
 }
 
 impl Filter {
     pub(crate) fn new(boards: u32, functions: &[Function]) -> Self {
         let functions = functions.iter().fold(0, |bits, f| bits | 1 << f.number());
-        // An error of a board may answer any request.
+        // Errors are always included, because a board may answer any request with an error.
         Self { boards, functions: functions | 1 << Function::Error.number() }
     }
 
@@ -44,18 +44,18 @@ pub(crate) struct Mailbox {
     pub claims: u32,
     pub filter: Filter,
     pub received: VecDeque<Received>,
-    /// Every unparsed frame, for a procedure that evaluates the frames themselves.
+    /// Every unparsed frame, for a procedure that evaluates frames itself.
     pub raw: Option<VecDeque<(u64, Frame)>>,
     pub wake: Option<u64>,
     pub cancel: bool,
-    /// `true` if two boards with one number do not end the procedure: a stop, a step that undoes changes, or a procedure that checks
-    /// numbers itself.
+    /// `true` if two boards with the same number do not end the procedure. This is the case for a stop, for a step that undoes changes, and
+    /// for a procedure that checks numbers itself.
     pub bears_shared_numbers: bool,
-    /// Reason why no frame can be sent or received any more.
+    /// Reason why frames can no longer be sent or received.
     pub bus_gone: Option<String>,
 }
 
-/// Frames that a procedure discards when one of its frames leaves, because they cannot be answers to it.
+/// Received frames that a procedure discards when one of its frames leaves, because they cannot be answers to that frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Forget {
     Nothing,

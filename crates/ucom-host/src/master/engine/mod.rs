@@ -1,7 +1,7 @@
-//! Base of all procedures: the clock, queued frames, mailboxes, the boards as last seen and their supervision.
+//! Base of all procedures: clock, queued frames, mailboxes, last known state of the boards, and their supervision.
 //!
-//! Files import only files below them. From the lowest: times, statistics, boards, holders, event, mailbox, shared, inputs, supervise,
-//! link.
+//! Each file imports only files that come before it in this list: times, statistics, boards, holders, event, mailbox, shared, inputs,
+//! supervise, link.
 mod boards;
 mod event;
 mod holders;

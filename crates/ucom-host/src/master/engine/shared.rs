@@ -1,4 +1,4 @@
-//! State that all procedures share: the clock, queued frames, mailboxes, the boards as last seen.
+//! State that all procedures share: clock, queued frames, mailboxes, and the last known state of the boards.
 
 use crate::master::engine::boards::Boards;
 use crate::master::engine::event::Event;
@@ -13,21 +13,21 @@ use crate::master::reports::ProcedureId;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use ucom::{BufferPackage, Foreign, Frame, FromBoard, Function, Profile, Sequence, Status, ToBoard};
 
-/// Limit of events that wait for their user.
+/// Limit of events that the user has not taken yet.
 const MAX_EVENTS: usize = 4096;
 
 struct Outgoing {
     serial: u64,
     owner: Option<ProcedureId>,
-    /// Received frames of the owner to discard when this frame leaves.
+    /// Received frames that the owner discards when this frame leaves.
     forget: Forget,
     what: What,
 }
 
 enum What {
     Frame(Frame),
-    /// Package of a board's inputs that begins with this word. The values are taken at the time of sending, so queued inputs are never
-    /// stale.
+    /// Package of a board's inputs that begins with this word. The values are read when the package is sent, so queued inputs are never
+    /// outdated.
     Inputs {
         board: u8,
         offset: u16,
@@ -37,9 +37,9 @@ enum What {
 /// Role of this PC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Session {
-    /// Listens and asks only.
+    /// The PC only listens and asks questions.
     Quiet,
-    /// Sends ALIVE.
+    /// The PC sends heartbeats.
     Master { next_alive: u64 },
 }
 
@@ -48,27 +48,27 @@ pub(crate) struct Core {
     pub times: Times,
     /// Time of the last call.
     pub now: u64,
-    /// Time at which waits end: that of the last `poll`. By then the caller has delivered all received frames. A late caller has not
-    /// delivered those up to `now`.
+    /// Time at which waits end: the time of the last `poll`. The caller has then delivered all frames received before. If the caller is
+    /// late, frames received between this time and `now` are not delivered yet.
     pub fired: u64,
-    /// Time that has certainly passed between received frames: from the last frame to the next `poll`. A caller that delivers
-    /// simultaneous frames late adds no time, so it causes no gap in a string.
+    /// Time that has certainly passed between received frames: the sum of the times from a last frame to the next `poll`. If the caller
+    /// delivers simultaneous frames late, this adds no time, so it causes no gap in a string.
     pub passed: u64,
     /// Time at which the last frame was delivered.
     handed_over: u64,
-    /// Time since which this PC has listened to the bus.
+    /// Time since when this PC has listened to the bus.
     pub since: Option<u64>,
     pub session: Session,
     /// Last frame of another PC.
     pub competing_master: Option<(u64, Function, u8)>,
-    /// Time until which reports count as answers.
+    /// Reports until this time are considered to be answers.
     pub report_until: u64,
-    /// Stops of the policy to send again, and their times, because one frame can be lost.
+    /// Stop commands of the policy that will be repeated, and their times. They are repeated because a frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
-    /// Time from which inputs may be repeated again.
+    /// Earliest time at which inputs may be repeated again.
     pub inputs_from: u64,
     pub boards: Boards,
-    /// Boards that answer, by number.
+    /// Boards that have answered, by number.
     pub holders: Holders,
     pub data: BTreeMap<u8, ProcessData>,
     pub descriptions: BTreeMap<DescriptionKey, IoDescription>,
@@ -76,7 +76,7 @@ pub(crate) struct Core {
     pub mailboxes: BTreeMap<ProcedureId, Mailbox>,
     urgent: VecDeque<Frame>,
     normal: VecDeque<Outgoing>,
-    /// Packages of inputs in `normal`, each once. The queue therefore stays short if the bus cannot carry all inputs.
+    /// Packages of inputs in `normal`. Each package is queued only once, so the queue stays short if the bus cannot carry all inputs.
     waiting_inputs: BTreeSet<(u8, u16)>,
     queued: u64,
     sent: u64,
@@ -118,14 +118,14 @@ impl Core {
         }
     }
 
-    /// Advances the time, which never goes back.
+    /// Advances the time, but never backwards.
     pub(crate) fn advance(&mut self, now: u64) {
         self.now = self.now.max(now);
         self.since.get_or_insert(self.now);
     }
 
     pub(crate) fn event(&mut self, event: Event) {
-        // The end of a procedure must arrive, even if other events are dropped.
+        // The end of a procedure must be reported, even if other events are dropped.
         if self.events.len() >= MAX_EVENTS && !matches!(event, Event::Done { .. }) {
             self.dropped += 1;
         } else {
@@ -141,12 +141,12 @@ impl Core {
         event
     }
 
-    /// Queues a frame ahead of all others: heartbeats and stops.
+    /// Queues a frame ahead of all others. For heartbeats and stops.
     pub(crate) fn urgent(&mut self, to: Sequence, message: ToBoard) {
         self.urgent.push_back(message.encode(to, &self.profile));
     }
 
-    /// Queues a frame; returns its serial number for [`Core::left`].
+    /// Queues a frame. Returns its serial number for [`Core::left`].
     pub(crate) fn queue(
         &mut self,
         owner: Option<ProcedureId>,
@@ -161,7 +161,7 @@ impl Core {
         self.push(owner, forget, What::Frame(frame))
     }
 
-    /// Queues the package of a board's inputs that begins with word `offset`, unless it already waits.
+    /// Queues the package of a board's inputs that begins with word `offset`, unless this package is already queued.
     pub(crate) fn queue_inputs(&mut self, board: u8, offset: u16) {
         if self.waiting_inputs.insert((board, offset)) {
             self.push(None, Forget::Nothing, What::Inputs { board, offset });
@@ -179,7 +179,7 @@ impl Core {
         self.queued
     }
 
-    /// Returns `true` if a frame has left.
+    /// Returns `true` if the frame with this serial number has left.
     pub(crate) fn left(&self, serial: u64) -> bool {
         self.sent >= serial
     }
@@ -210,7 +210,7 @@ impl Core {
                 What::Frame(frame) => Some(frame),
                 What::Inputs { board, offset } => self.inputs_frame(board, offset),
             };
-            // An entry that is no longer valid needs no frame.
+            // A package that no longer exists is skipped.
             if frame.is_some() {
                 return frame;
             }
@@ -242,7 +242,7 @@ impl Core {
         }
     }
 
-    /// Records that a start of the application was sent to a board or broadcast.
+    /// Records that a command to start the application was sent to a board, or to all boards by broadcast.
     fn may_start(&mut self, to: Sequence) {
         let broadcast = self.profile.broadcast_number() == Some(to);
         let addressed = self.boards.iter_mut().filter(|(number, _)| broadcast || *number == to.number());
@@ -262,7 +262,7 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait for a frame in front of the first remaining one; it must not wait for ever.
+        // A procedure may wait for a removed frame before the first remaining one. It must not wait for ever.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -277,7 +277,7 @@ impl Core {
         self.handed_over = self.now;
     }
 
-    /// Delivers a board's message to the procedures that receive it.
+    /// Delivers a board's message to the procedures whose filter accepts it.
     pub(crate) fn deliver(&mut self, from: u8, message: FromBoard) {
         let at = self.passed;
         for mailbox in self.mailboxes.values_mut() {
@@ -287,7 +287,7 @@ impl Core {
         }
     }
 
-    /// Delivers the unparsed frame to the procedures that request it.
+    /// Delivers the unparsed frame to the procedures that request unparsed frames.
     pub(crate) fn deliver_raw(&mut self, frame: &Frame) {
         let at = self.now;
         for raw in self.mailboxes.values_mut().filter_map(|mailbox| mailbox.raw.as_mut()) {
@@ -326,10 +326,10 @@ impl Core {
             self.may_start(to);
         }
         if function == Function::AskReport {
-            // The reports that follow answer the other PC: no board has rebooted.
+            // The reports that follow are answers to the other PC. They do not mean that a board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
-        // Reports an event only after a pause of at least 1 s.
+        // An event is reported only after a pause of at least 1 s.
         let news = self.competing_master.is_none_or(|(at, ..)| self.now.saturating_sub(at) >= 1_000_000);
         self.competing_master = Some((self.now, function, to));
         if news {

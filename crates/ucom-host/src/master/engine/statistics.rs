@@ -1,18 +1,18 @@
-//! Values for a monitor: rates of each board, load of the bus, foreign frames.
+//! Values for a monitor: frame rate of each board, bus load, foreign frames.
 
 use crate::master::load::frame_bits;
 use std::collections::{BTreeMap, VecDeque};
 use ucom::{Foreign, Frame};
 
-/// Window for rates, µs.
+/// Time window of the rates, µs.
 pub const WINDOW_US: u64 = 1_000_000;
 const SLOTS: usize = 10;
 const SLOT_US: u64 = WINDOW_US / SLOTS as u64;
 
-/// Rate per second over the last second.
+/// Rate: the sum of the amounts in the last second.
 #[derive(Clone, Debug, Default)]
 pub struct Rate {
-    /// Number and sum of each slot.
+    /// Slots with their number and sum.
     slots: VecDeque<(u64, u64)>,
 }
 
@@ -40,17 +40,17 @@ impl Rate {
 pub struct Statistics {
     bitrate: u32,
     bits: Rate,
-    /// Frames received from boards, by number. Reports of boards without a number count under the number in their identifier.
+    /// Frames received from boards, by board number. Reports of boards without a number are counted under the number in their identifier.
     boards: BTreeMap<u8, Rate>,
-    /// Received frames, foreign frames excluded.
+    /// Number of received frames without foreign frames.
     pub received: u64,
-    /// Sent frames.
+    /// Number of sent frames.
     pub sent: u64,
-    /// Foreign frames by kind.
+    /// Number of foreign frames of each kind.
     pub foreign: Vec<(Foreign, u64)>,
-    /// Frames that only a PC sends.
+    /// Number of received frames that only a PC sends.
     pub competing_master: u64,
-    /// Frames of boards that are too short or have impossible contents.
+    /// Number of frames of boards that are too short or have impossible contents.
     pub undecodable: u64,
 }
 
@@ -71,7 +71,7 @@ impl Statistics {
         self.boards.entry(number).or_default().add(now, 1);
     }
 
-    /// Counts a foreign frame; returns `true` for the first of its kind.
+    /// Counts a foreign frame. Returns `true` if it is the first of its kind.
     pub(crate) fn foreign(&mut self, now: u64, foreign: Foreign) -> bool {
         self.bits.add(now, frame_bits(8));
         if let Some((_, count)) = self.foreign.iter_mut().find(|(kind, _)| *kind == foreign) {
@@ -82,12 +82,12 @@ impl Statistics {
         true
     }
 
-    /// Returns the frames per second of a board.
+    /// Returns the number of frames per second from a board.
     pub fn frames_per_s(&self, board: u8, now: u64) -> u64 {
         self.boards.get(&board).map_or(0, |rate| rate.per_second(now))
     }
 
-    /// Returns the bus load by worst-case stuffing over the last second, percent.
+    /// Returns the bus load of the last second in percent, assuming worst-case bit stuffing.
     pub fn load_percent(&self, now: u64) -> f64 {
         100.0 * self.bits.per_second(now) as f64 / f64::from(self.bitrate.max(1))
     }

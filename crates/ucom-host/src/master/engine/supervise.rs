@@ -1,4 +1,4 @@
-//! Background duties of the master: heartbeats of both sides, policies, repeated inputs.
+//! Background tasks of the master: heartbeats in both directions, policies, repeated inputs.
 use crate::master::engine::boards::Life;
 use crate::master::engine::event::{Event, Supervision};
 use crate::master::engine::shared::{Core, Session};
@@ -17,7 +17,7 @@ impl Core {
         }
     }
 
-    /// Performs the duties that are due at `now`, with or without a running procedure.
+    /// Performs the tasks that are due at `now`, whether or not a procedure is running.
     pub(crate) fn duties(&mut self) {
         let now = self.now;
         if let Session::Master { next_alive } = self.session
@@ -25,7 +25,7 @@ impl Core {
         {
             self.send_alive();
             let period = self.times.alive_pc;
-            // After a long pause of the caller the rhythm restarts instead of catching up.
+            // If the caller paused for a long time, the period begins again; missed heartbeats are not sent.
             let next = if now - next_alive >= period { now + period } else { next_alive + period };
             self.session = Session::Master { next_alive: next };
         }
@@ -33,7 +33,7 @@ impl Core {
         let mut events = Vec::new();
         for (number, board) in self.boards.iter_mut() {
             let Some(at) = board.alive_at.filter(|_| board.life != Life::Unarmed) else { continue };
-            // Not up to `now`: the heartbeat may be among the frames that the caller has not delivered yet.
+            // The age is not computed up to `now`, because the caller may not have delivered the heartbeat yet.
             let age = self.fired.saturating_sub(at);
             if age >= self.times.alive_lost && board.life != Life::Lost {
                 board.life = Life::Lost;
@@ -71,7 +71,7 @@ impl Core {
         }
     }
 
-    /// Applies the policy for boards whose heartbeats have stopped. Only a master stops boards.
+    /// Applies the policy to boards whose heartbeats have stopped. Only a master stops boards.
     fn on_lost(&mut self, lost: &[u8]) {
         lost.iter().for_each(|board| self.stop_inputs(*board));
         if self.session == Session::Quiet {
@@ -102,7 +102,7 @@ impl Core {
         due.into_iter().for_each(|to| self.urgent(to, ToBoard::Admin(Admin::default())));
     }
 
-    /// Returns the time of the next duty.
+    /// Returns the time of the next task.
     pub(crate) fn duties_deadline(&self) -> Option<u64> {
         let alive = match self.session {
             Session::Quiet => None,
@@ -146,7 +146,7 @@ impl Core {
         }
     }
 
-    /// Returns `true` if only a PC can have sent the frame (D-08, D-12).
+    /// Returns `true` if only a PC can have sent this frame (D-08, D-12).
     fn is_pc(&self, function: Function, number: Sequence, frame: &Frame) -> bool {
         let broadcast = number == self.profile.unnumbered();
         match function {
@@ -191,7 +191,7 @@ impl Core {
         }
     }
 
-    /// Handles a frame of a board without a number, which can only report errors (D-06).
+    /// Handles a frame of a board without a number. Such a board can only report errors (D-06).
     fn unnumbered_message(&mut self, from: u8, message: FromBoard) {
         if let FromBoard::Error(code) = message {
             let during = self.mailboxes.keys().next().copied();
@@ -199,7 +199,7 @@ impl Core {
         } else {
             self.statistics.undecodable += 1;
         }
-        // A probe must detect boards that answer under the number that belongs to no board.
+        // A probe must detect boards that answer to the number for boards without a number.
         self.deliver(from, message);
     }
 
@@ -252,7 +252,7 @@ impl Core {
                     self.event(Event::Debug { board: from, text });
                 }
             }
-            // After PC_START the frame is an answer; otherwise it has no meaning by itself (D-30).
+            // After PC_START this frame is an answer. Otherwise it does not mean anything (D-30).
             FromBoard::McaReady => {
                 let board = self.boards.of(from);
                 board.ready_count += 1;

@@ -2,7 +2,7 @@
 
 use ucom::Profile;
 
-/// Microseconds of a millisecond.
+/// Microseconds per millisecond.
 pub(crate) const MS: u64 = 1000;
 
 /// Timeouts of the procedures, µs.

@@ -1,12 +1,12 @@
-//! Address assignment that was refused.
+//! Errors of an address assignment that was refused.
 use crate::master::error::identity::OTHER_PROTOCOL;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Reasons why boards did not get their numbers.
+/// Reasons why boards did not get numbers.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AddressError {
-    /// DSP_INITACK whose identifier and data have different numbers (D-24).
+    /// DSP_INITACK has different numbers in identifier and data (D-24).
     #[error("DSP_INITACK under number {id} contains number {data}: the board is refused")]
     AckMismatch {
         /// Number in the identifier.
@@ -14,7 +14,7 @@ pub enum AddressError {
         /// Number in the data.
         data: u8,
     },
-    /// The first board of the chain could take the number.
+    /// The first board of the chain does not answer and could take the number.
     #[error("board {other} does not answer: without a number it would take number {board}")]
     MayTakeNumber {
         /// Number to be assigned.
@@ -22,14 +22,14 @@ pub enum AddressError {
         /// The first board.
         other: u8,
     },
-    /// The reporting boards are not those with a number. A new address assignment could give numbers to other boards than before.
+    /// The boards that report are not the boards that have a number. A new address assignment could give boards other numbers than before.
     #[error(
         "boards that report: {reports}, with a number: {boards}, or two share a flash id: not as `ucom init` leaves a chain"
     )]
     NotNumbered {
-        /// Different reports.
+        /// Number of different reports.
         reports: u32,
-        /// Boards with a number.
+        /// Number of boards with a number.
         boards: u32,
     },
 }

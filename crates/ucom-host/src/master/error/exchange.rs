@@ -1,4 +1,4 @@
-//! An exchange with a board that failed.
+//! Errors of an exchange of frames with a board.
 use core::fmt;
 
 use crate::master::error::words::MEASURE_ORDER;
@@ -9,7 +9,7 @@ use ucom::{ErrorCode, Function};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ExchangeError {
-    /// A number that no board can have.
+    /// No board can have this number.
     #[error("{number} is no board number (1 to 31, and {first} is the first here)")]
     NoBoard {
         /// The number.
@@ -26,7 +26,7 @@ pub enum ExchangeError {
         asked: Function,
         /// Number of tries.
         tries: u32,
-        /// Time from the first request to giving up, ms.
+        /// Time from the first request until the end of the last wait, ms.
         waited_ms: u64,
         /// Last frame that was received from the board.
         last: Option<LastReceived>,
@@ -113,11 +113,11 @@ impl Diagnose for ExchangeError {
 pub struct LastReceived {
     /// Function of the frame.
     pub function: Function,
-    /// Time before the error, ms.
+    /// Time between the frame and the error, ms.
     pub ago_ms: u64,
 }
 
-/// Prints `last received: MCA_ALIVE 120 ms ago`, or that no frame was received.
+/// Prints the last frame as `last received: MCA_ALIVE 120 ms ago`, or that no frame was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Received(pub Option<LastReceived>);
 
@@ -138,26 +138,26 @@ pub enum Incomplete {
     /// The first frame is not valid.
     #[error("it began with {len} bytes instead of {need}")]
     Start {
-        /// Bytes that came.
+        /// Number of bytes received.
         len: u8,
-        /// Bytes of the first frame.
+        /// Number of bytes that the first frame must have.
         need: u8,
     },
-    /// The board went silent in the middle of its answer.
+    /// The board stopped sending in the middle of its answer.
     #[error("{complete} of {of} strings came, then silence")]
     Silence {
-        /// Complete strings.
+        /// Number of complete strings.
         complete: u32,
         /// Number of announced strings.
         of: u32,
     },
-    /// A frame that fits no string.
+    /// A frame cannot belong to a string.
     #[error("a frame of string {string} fits nowhere")]
     Misfit {
         /// Number of the string, from 0.
         string: u32,
     },
-    /// Frames beyond the end.
+    /// There are more frames than the announced totals.
     #[error("more frames came than the totals allow")]
     Surplus,
     /// The answer announces more strings than possible.

@@ -1,4 +1,4 @@
-//! Errors about a board that is not the intended one.
+//! Errors that occur when a board is not the intended one.
 use core::fmt;
 
 use crate::master::error::words::{MEASURE_ORDER, other_order};
@@ -9,7 +9,7 @@ use ucom::profile::Endian;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentityError {
-    /// DSP_INFO whose identifier and data have different numbers.
+    /// DSP_INFO has different numbers in identifier and data.
     #[error("board {board} reports that its number is {reported}: it is refused")]
     WrongSequence {
         /// Number in the identifier.
@@ -17,23 +17,23 @@ pub enum IdentityError {
         /// Number in the data.
         reported: u8,
     },
-    /// A board with another flash number than the named one.
+    /// The board has another flash number than expected.
     #[error("board {board} has flash number 0x{found:04X}, not 0x{wanted:04X}")]
     WrongBoard {
         /// Board number.
         board: u8,
-        /// Flash number that was named.
+        /// Expected flash number.
         wanted: u16,
         /// Flash number of the board.
         found: u16,
     },
-    /// The flash numbers of boards fit their reports only after a swap of their bytes (D-10).
+    /// The flash numbers of boards match their reports only if their bytes are swapped (D-10).
     #[error("{}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
         endian: Endian,
     },
-    /// Two boards have one number: both carry out every command to it.
+    /// Two boards have the same number, so both carry out every command to it.
     #[error(
         "two boards answer to number {board}: {}{}",
         Sharing(found),
@@ -42,9 +42,9 @@ pub enum IdentityError {
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash numbers of the boards that answered to it; the same number twice if the boards cannot be distinguished.
+        /// Flash numbers of the boards that answered to it. The list has the same number twice if the boards cannot be distinguished.
         found: Vec<u16>,
-        /// `true` if no board answers to the number any more.
+        /// `true` if the number was withdrawn and no board answers to it any more.
         given_back: bool,
     },
 }
@@ -77,7 +77,7 @@ impl Diagnose for IdentityError {
     }
 }
 
-/// `flash numbers 0x0021 and 0x0042`, or `both with flash number 0x0021`.
+/// Prints `flash numbers 0x0021 and 0x0042`, or `both with flash number 0x0021`.
 struct Sharing<'a>(&'a [u16]);
 
 impl fmt::Display for Sharing<'_> {
@@ -94,13 +94,13 @@ impl fmt::Display for Sharing<'_> {
     }
 }
 
-/// Cause of a shared number, and the remedy.
+/// Cause of a number that two boards share, and the remedy.
 pub(crate) const SHARED_CAUSE: (&str, &str) = (
     "both took it from one PC_INIT: an init pin is strapped or shorted, or a PC repeated it blindly",
     "`ucom stop all` if anything runs, then `ucom init` numbers all anew; if it comes again, power one of them down and \
      check the init wires",
 );
 
-/// Remedy if the data contain another number.
+/// Remedy if identifier and data contain different numbers.
 pub(crate) const OTHER_PROTOCOL: &str =
     "two boards may share a number, or the board reads the protocol otherwise: `ucom reset`, `ucom probe`";

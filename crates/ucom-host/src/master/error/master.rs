@@ -1,23 +1,23 @@
-//! Errors of procedures that this PC refused to begin, or ended.
+//! Errors of procedures that this PC did not begin, or that it ended early.
 use crate::master::error::words::Boards;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Function;
 
-/// Reasons why this PC did not begin a procedure, or ended it.
+/// Reasons why this PC did not begin a procedure, or ended it early.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MasterError {
     /// A competing master: another PC is on the bus (D-08).
     #[error("another PC is on the bus: {} to {to} was received {ago_ms} ms ago", function.name())]
     CompetingMaster {
-        /// Function that it sent.
+        /// Function of the frame.
         function: Function,
         /// Number that the frame was sent to.
         to: u8,
-        /// Time since that frame, ms.
+        /// Time since this frame, ms.
         ago_ms: u64,
     },
-    /// Another procedure works with a board that this one needs.
+    /// Another procedure works with a board that this procedure needs.
     #[error("{} busy with {with}", Boards(boards))]
     Busy {
         /// The boards.
@@ -28,7 +28,7 @@ pub enum MasterError {
     /// The caller reports that the bus is lost, see [`Master::abandon`](crate::master::Master::abandon).
     #[error("the bus failed: {reason}")]
     Bus {
-        /// The driver's error.
+        /// Error of the driver.
         reason: String,
     },
     /// The caller cancelled the procedure.

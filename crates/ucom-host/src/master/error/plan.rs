@@ -2,13 +2,13 @@
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::profile::Plan;
 
-/// Reasons why the boards of an update are not determined.
+/// Reasons why it is not clear which boards an update is for.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TargetError {
-    /// No board is named.
+    /// No board is selected.
     #[error("no board is named")]
     None,
-    /// A board is named twice.
+    /// A board is selected twice.
     #[error("board {board} is named twice")]
     Twice {
         /// Board number.
@@ -31,21 +31,21 @@ pub enum PlanError {
     /// The image ends with half a word.
     #[error("the image has {bytes} bytes: not whole words")]
     HalfWord {
-        /// Length.
+        /// Length in bytes.
         bytes: usize,
     },
-    /// The image has another Program ID than the user named.
+    /// The image has another Program ID than the user expects.
     #[error("the image has Program ID 0x{image:04X}, not 0x{expected:04X}")]
     OtherProgram {
         /// Program ID of the image.
         image: u16,
-        /// Program ID that was named.
+        /// Program ID that the user expects.
         expected: u16,
     },
-    /// Program ID and date that mean "no application".
+    /// Program ID and date have the values that mean "no application".
     #[error("Program ID 0xFFFF with date 0xFFFF means `no application`: choose another date")]
     Void,
-    /// The plan and the second image do not fit.
+    /// The plan and the second image do not match.
     #[error(transparent)]
     Second(#[from] SecondImageError),
 }
@@ -66,7 +66,7 @@ impl Diagnose for PlanError {
     }
 }
 
-/// Reasons why `prog.plan` and a second image do not fit.
+/// Reasons why `prog.plan` and a second image do not match.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SecondImageError {
     /// The plan needs a second image.

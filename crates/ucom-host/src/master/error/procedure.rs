@@ -9,29 +9,29 @@ use crate::master::error::signal::SignalError;
 use crate::master::error::status::StatusError;
 use host_kit::{Diagnose, Diagnosis, Facts};
 
-/// Reasons why a procedure failed. The kind of a failed update is that of its report, see
+/// Reasons why a procedure failed. A failed update gives a report instead; its kind of failure is
 /// [`UpdateReport::failure`](crate::master::update::UpdateReport::failure).
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(transparent)]
 #[non_exhaustive]
 pub enum Error {
-    /// A board did not answer correctly.
+    /// A board did not answer, or its answer was not valid.
     Exchange(#[from] ExchangeError),
     /// A board is not the intended one.
     Identity(#[from] IdentityError),
     /// Boards did not get their numbers.
     Address(#[from] AddressError),
-    /// A board did not reach a state.
+    /// A board did not reach the requested state.
     Status(#[from] StatusError),
-    /// Control loops run, or cannot run.
+    /// Control loops are running, or cannot run.
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// The boards for an update are not determined.
+    /// It is not clear which boards the update is for.
     Target(#[from] TargetError),
     /// An update cannot be planned.
     Plan(#[from] PlanError),
-    /// This PC did not begin the procedure, or it ended the procedure.
+    /// This PC did not begin the procedure, or ended it early.
     Master(#[from] MasterError),
 }
 
@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts of several boards. Sets the board if there is exactly one.
+/// Returns the facts about some boards. They contain the board if there is exactly one.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

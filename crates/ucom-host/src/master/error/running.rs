@@ -1,19 +1,19 @@
-//! Errors of control loops that run, or that cannot run.
+//! Errors that occur because control loops run or cannot run.
 use crate::master::error::words::Boards;
 use crate::master::load::LoadForecast;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 
-/// Reasons why control loops prevent an action, or cannot run.
+/// Reasons why control loops prevent an action or cannot run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunningError {
-    /// Boards run their control loop.
+    /// The control loops of boards are running.
     #[error("{} running: program data would outrank their process data", Boards(boards))]
     Running {
         /// Numbers of the boards.
         boards: Vec<u8>,
     },
-    /// Control loops run, and the request could stop the boards in any position, or worse.
+    /// Control loops are running, and the request could stop the boards in any position or have worse effects.
     #[error("{} running its control loop", Boards(boards))]
     LoopRuns {
         /// Numbers of the boards.
@@ -22,7 +22,7 @@ pub enum RunningError {
     /// The bus load would be too high.
     #[error("{0}")]
     Load(LoadForecast),
-    /// A board was lost while boards were started; `on_lost` required a stop of all boards (D-51).
+    /// A board was lost while boards were started, and `on_lost` required a stop of all boards (D-51).
     #[error("board {board} was lost while boards were started: all are stopped")]
     Lost {
         /// Board number.

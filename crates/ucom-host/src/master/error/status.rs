@@ -1,4 +1,4 @@
-//! Errors of a state that a board did not reach.
+//! Errors that occur when a board does not reach a state.
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
 use ucom::Status;
 
@@ -6,7 +6,7 @@ use ucom::Status;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StatusError {
-    /// The status that was read back differs from the one that was set.
+    /// The status that was read back differs from the requested status.
     #[error(
         "board {board}: status is {} after {tries} tries, wanted {} of the bits {}",
         status,
@@ -20,12 +20,12 @@ pub enum StatusError {
         mask: Status,
         /// Requested values of these bits.
         wanted: Status,
-        /// The status that was read.
+        /// Status that was read back.
         status: Status,
         /// Number of tries.
         tries: u32,
     },
-    /// A state was not reached.
+    /// The board did not reach a state in time.
     #[error("board {board}: {what} not within {waited_ms} ms; status {status}")]
     NotReached {
         /// Board number.
@@ -37,14 +37,14 @@ pub enum StatusError {
         /// The last status.
         status: Status,
     },
-    /// The board confirmed other flags than were sent.
+    /// The board confirmed other flags than those that were sent.
     #[error("board {board} answers MCA_ADMIN_DATA with `{is}` instead of `{wanted}`")]
     AdminRefused {
         /// Board number.
         board: u8,
         /// Flags that were sent.
         wanted: ucom::Admin,
-        /// Flags that came back.
+        /// Flags in the answer.
         is: ucom::Admin,
     },
 }

@@ -1,4 +1,4 @@
-//! Words used by several errors and findings.
+//! Texts that several errors and findings use.
 use core::fmt;
 
 use ucom::profile::Endian;
@@ -7,7 +7,7 @@ use ucom::profile::Endian;
 pub(crate) const MEASURE_ORDER: &str =
     "`ucom probe --out FILE` measures it and writes a profile for --profile";
 
-/// Returns the words for boards that send the bytes of a word in the other order than the profile has.
+/// Returns the text about boards whose byte order differs from the profile.
 pub(crate) fn other_order(endian: Endian) -> String {
     let (here, there) = match endian {
         Endian::Little => ("little", "big"),
@@ -19,7 +19,7 @@ pub(crate) fn other_order(endian: Endian) -> String {
     )
 }
 
-/// `board 1 is`, `boards 1, 2 are`.
+/// Prints `board 1 is` or `boards 1, 2 are`.
 pub(crate) struct Boards<'a>(pub &'a [u8]);
 
 impl fmt::Display for Boards<'_> {

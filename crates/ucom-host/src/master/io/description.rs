@@ -27,7 +27,7 @@ impl Kind {
     }
 }
 
-/// Key of a description: Program ID and flash date (D-36), and the board, because one image can serve boards with
+/// Key of a description. It contains Program ID and flash date (D-36), and also the board, because boards with the same image can have
 /// different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
@@ -35,7 +35,7 @@ pub struct DescriptionKey {
     pub flash_number: u16,
     /// Checksum of its program.
     pub program_id: u16,
-    /// Date of that program, encoded.
+    /// Date of the program in its 16-bit form.
     pub date: u16,
 }
 
@@ -46,10 +46,10 @@ impl DescriptionKey {
     }
 }
 
-/// The application's description of itself and of every signal, stored under a [`DescriptionKey`].
+/// The description that an application sends of itself and of every signal. It is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
-    /// The application; may differ from the board's own description in DSP_INFO.
+    /// Text about the application. It may differ from the board's own description in DSP_INFO.
     pub description: String,
     /// Controller inputs.
     pub ci: Vec<String>,
@@ -66,7 +66,7 @@ impl IoDescription {
         Dimensions { ci: count(&self.ci), so: count(&self.so), par: count(&self.par) }
     }
 
-    /// Returns the texts of a buffer.
+    /// Returns the texts of the signals in a buffer.
     pub fn names(&self, kind: Kind) -> &[String] {
         match kind {
             Kind::Ci => &self.ci,
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the place of a signal. A signal is found by its number (`#3` or `3`) or by its text, with or without the unit in brackets
-    /// at its end. Letter case is ignored if only one signal fits.
+    /// Returns the index of a signal. It is found by its text, with or without the unit in brackets at its end, or by its index (`#3` or
+    /// `3`). The letter case is ignored if only one signal matches then.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {
@@ -90,7 +90,7 @@ impl IoDescription {
         if let Some(index) = index.and_then(|i| u16::try_from(i).ok()) {
             return Ok(index);
         }
-        // The similarity of names does not depend on units in brackets.
+        // Units in brackets do not make names less similar.
         let like = |n: &str| likeness(n, name).max(likeness(short(n), name));
         let mut near: Vec<(f64, &String)> = names.iter().map(|n| (like(n), n)).collect();
         near.retain(|(likeness, _)| *likeness > 0.6);

@@ -1,4 +1,4 @@
-//! Inputs, outputs and parameters of a board: their descriptions, values and snapshots.
+//! Inputs, outputs and parameters of a board: descriptions, values and snapshots.
 
 pub(crate) mod description;
 pub(crate) mod process_data;

@@ -1,4 +1,4 @@
-//! Buffers of a board, as far as known.
+//! The known contents of a board's buffers.
 
 use std::collections::BTreeSet;
 
@@ -6,18 +6,18 @@ use crate::master::io::description::DescriptionKey;
 use crate::master::io::shadow::Shadow;
 use crate::master::io::snapshot::SnapshotAssembler;
 
-/// Process data of a known board.
+/// Process data of a board.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ProcessData {
     /// Key of the board's description.
     pub description: Option<DescriptionKey>,
-    /// `true` if the board has sent that description since its application started.
+    /// `true` if the board has sent this description since its application started.
     pub sent: bool,
-    /// Inputs as last set.
+    /// Values of the inputs that were set last.
     pub ci: Vec<u16>,
-    /// Places in `ci` that were set or read since the application started; other places are not known.
+    /// Indices in `ci` that were set or read since the application started. The other values are not known.
     pub ci_known: BTreeSet<u16>,
-    /// Time of the next repetition; `None`: no repetition.
+    /// Time of the next repetition; `None` if the inputs are not repeated.
     pub repeat: Option<u64>,
     pub par: Shadow,
     pub so: SnapshotAssembler,
@@ -26,13 +26,13 @@ pub(crate) struct ProcessData {
 }
 
 impl ProcessData {
-    /// Stores all inputs.
+    /// Stores the values of all inputs.
     pub(crate) fn know_inputs(&mut self, ci: Vec<u16>) {
         self.ci_known = (0..).zip(&ci).map(|(place, _)| place).collect();
         self.ci = ci;
     }
 
-    /// Returns the inputs as last set or read; `None`: not known.
+    /// Returns the inputs that were set or read last; `None` for inputs that are not known.
     pub(crate) fn inputs(&self) -> Vec<Option<u16>> {
         (0..)
             .zip(&self.ci)

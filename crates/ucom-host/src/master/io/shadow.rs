@@ -1,11 +1,11 @@
-//! Parameters as this PC assumes them: the protocol has no way to read them back (D-35).
+//! Parameters that this PC assumes for a board. The protocol has no way to read them back (D-35).
 /// A parameter's value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ParValue {
-    /// Never written since the application started.
+    /// The parameter was not written since the application started.
     #[default]
     Unknown,
-    /// Written; the protocol has no confirmation.
+    /// The parameter was written; the protocol has no confirmation.
     Assumed(u16),
 }
 

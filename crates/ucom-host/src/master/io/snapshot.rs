@@ -1,4 +1,4 @@
-//! Sensor outputs of one moment, reassembled from their packages (D-33).
+//! Sensor outputs of one period, reassembled from their packages (D-33).
 use ucom::BufferPackage;
 
 /// All sensor outputs of one period.
@@ -8,22 +8,22 @@ pub struct Snapshot {
     pub time_us: u64,
     /// Words in the order of the buffer.
     pub words: Vec<u16>,
-    /// Snapshots with gaps since the last complete one.
+    /// Number of incomplete snapshots since the previous complete one.
     pub incomplete_before: u64,
 }
 
-/// Reassembles snapshots, from offset 0 up to the package with the last word. A snapshot with a gap is counted and dropped.
+/// Reassembles snapshots, from offset 0 to the package with the last word. An incomplete snapshot is counted and dropped.
 #[derive(Clone, Debug, Default)]
 pub struct SnapshotAssembler {
     words: Vec<u16>,
-    /// Offset of the package that must come next; `None`: the next package must have offset 0.
+    /// Offset of the next expected package; `None`: a package with offset 0 is expected.
     next: Option<u16>,
     incomplete_now: u64,
-    /// Snapshots with a gap.
+    /// Number of incomplete snapshots.
     pub incomplete: u64,
-    /// Complete snapshots.
+    /// Number of complete snapshots.
     pub complete: u64,
-    /// Packages that start at or beyond the dimension.
+    /// Number of packages that start at or beyond the end of the buffer.
     pub beyond: u64,
 }
 
@@ -38,7 +38,7 @@ impl SnapshotAssembler {
         self.words.len()
     }
 
-    /// Takes a package; returns the snapshot that it completes.
+    /// Handles a package. Returns the snapshot if the package completes it.
     pub fn push(&mut self, now: u64, package: &BufferPackage) -> Option<Snapshot> {
         if usize::from(package.offset) >= self.words.len() {
             self.beyond += 1;
@@ -63,7 +63,7 @@ impl SnapshotAssembler {
             return Some(Snapshot { time_us: now, words: self.words.clone(), incomplete_before });
         }
         if package.count < 3 {
-            // Only the last package may be short.
+            // Only the last package may have fewer than three words.
             self.next = None;
             self.gap();
             return None;
@@ -88,7 +88,7 @@ mod tests {
         Packages::new(&words).collect()
     }
 
-    /// D-33: incomplete snapshots are not reported, but counted in the next complete one.
+    /// D-33: incomplete snapshots are not reported. The next complete snapshot contains their number.
     #[test]
     fn d33_gaps_are_counted_and_never_shown() {
         for lost in 0..3 {

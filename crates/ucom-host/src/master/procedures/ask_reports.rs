@@ -1,9 +1,9 @@
-//! PC_REPORT, and the boards that report.
+//! Sends PC_REPORT and collects the reports of the boards.
 use crate::master::engine::Link;
 use crate::master::reports::Reports;
 use ucom::{FromBoard, Function, ToBoard};
 
-/// The four functions of reports.
+/// The four functions with which boards report.
 pub(crate) const REPORTS: [Function; 4] =
     [Function::Report0, Function::Report1, Function::Report2, Function::Report3];
 
@@ -14,7 +14,7 @@ pub(crate) async fn ask_reports(link: &Link, reports: &mut Reports) {
     collect_reports(link, link.times().report_ask, reports).await;
 }
 
-/// Collects the reports that come within `window` µs.
+/// Collects the reports that arrive within `window` µs.
 pub(crate) async fn collect_reports(link: &Link, window: u64, reports: &mut Reports) {
     let until = link.now() + window;
     while let Some(received) = link.next(until).await {

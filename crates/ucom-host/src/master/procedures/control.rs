@@ -18,7 +18,7 @@ pub(crate) async fn info_procedure(link: Link, board: u8) -> Result<Outcome, Err
     Ok(Outcome::Info(seen))
 }
 
-/// Sends PC_SETSTATUS and reads it back. Waits for changes that take longer than one answer.
+/// Sends PC_SETSTATUS and reads the status back. If a change takes longer than one answer, waits for it.
 pub(crate) async fn set_status_procedure(
     link: Link,
     board: u8,
@@ -34,7 +34,7 @@ pub(crate) async fn set_status_procedure(
         return forget_number(&link, board, mask, value).await;
     }
     if mask.has(Status::MSTART) && value.has(Status::MSTART) {
-        // As after PC_START, the application needs time to start.
+        // The application needs time to start, as after PC_START.
         let before = numbers(&link, board).await?;
         link.send(to, ToBoard::SetStatus { mask: mask.0, value: value.0 }).await;
         if !before.status.has(Status::MSTART) {
@@ -47,7 +47,7 @@ pub(crate) async fn set_status_procedure(
     Ok(Outcome::Status { board, info: now })
 }
 
-/// Clears INIT: the board forgets its number, so its silence confirms the change.
+/// Clears INIT. The board then forgets its number, so its silence confirms the change.
 async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> Result<Outcome, Error> {
     let to = link.board(board)?;
     let before = numbers(link, board).await?;
@@ -56,7 +56,7 @@ async fn forget_number(link: &Link, board: u8, mask: Status, value: Status) -> R
         match numbers(link, board).await {
             Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
                 link.with(|core| *core.boards.of(board) = Default::default());
-                // The board can no longer answer, so this returns the state that the rules require (D-22).
+                // The board can no longer answer, so the returned status is the one that the rules require (D-22).
                 let status = expected_status(&before, mask.0, value.0);
                 return Ok(Outcome::Status { board, info: BoardInfo { status, ..before } });
             }
@@ -98,14 +98,14 @@ pub(crate) async fn wait_status(
     }
 }
 
-/// Sends PC_RESET to one board or to all, and returns the reports. Never repeated: the user decides.
+/// Sends PC_RESET to one board or to all boards, and returns the reports. The command is never repeated; the user decides about that.
 pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<Outcome, Error> {
     let to = match board {
         Some(board) => link.board(board)?,
         None => link.broadcast_number(),
     };
     link.become_master(force).await?;
-    // Checks that the board exists: without a board the frame would look like a reset without an answer.
+    // Checks that the board exists. Without this check, a reset of a board that does not exist would look like a reset without an answer.
     let before = match board {
         Some(board) => {
             let before = confirmed(&link, board).await?.info;
@@ -137,7 +137,7 @@ pub(crate) async fn reset(link: Link, board: Option<u8>, force: bool) -> Result<
     Ok(Outcome::Reset(reports))
 }
 
-/// Checks that a board was reset: it has reported and has no number any more. If only its report was lost, this asks for another.
+/// Checks that a board was reset: it has reported and has no number any more. If its report was lost, asks for another report.
 async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Reports) -> Result<(), Error> {
     let since = link.now().saturating_sub(link.times().report_window);
     let ucom_id = before.flash_number as u8;
@@ -170,7 +170,7 @@ async fn was_reset(link: &Link, board: u8, before: BoardInfo, reports: &mut Repo
     }
 }
 
-/// Sends PC_XRESET; then the board is in its exloader with programming enabled (D-23).
+/// Sends PC_XRESET. Afterwards the board is in its exloader with programming enabled (D-23).
 pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome, Error> {
     link.board(board)?;
     link.become_master(force).await?;
@@ -179,9 +179,9 @@ pub(crate) async fn xreset(link: Link, board: u8, force: bool) -> Result<Outcome
     Ok(Outcome::Status { board, info })
 }
 
-/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is then off, sets it with PC_SETSTATUS (U-4).
+/// Sends PC_XRESET, waits, and polls PC_INFO until the exloader runs. If PROG is then not set, sets it with PC_SETSTATUS (U-4).
 ///
-/// A board that does not answer any more is repaired if its flash number is known. Another board that answers in its place is refused.
+/// If the board no longer answers and its flash number is known, the board is repaired. If another board answers instead, it is refused.
 pub(crate) async fn enter_exloader(
     link: &Link,
     board: u8,
@@ -196,7 +196,7 @@ pub(crate) async fn enter_exloader(
         (result, _) => result?,
     };
     if let Some(wanted) = flash_number.filter(|wanted| *wanted != info.flash_number) {
-        // A single damaged answer does not count as another board.
+        // A single damaged answer must not be mistaken for another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -216,8 +216,8 @@ async fn exloader_runs(link: &Link, board: u8, limit: u64) -> Result<BoardInfo, 
     wait_status(link, board, Status::EXLRUN, Status::EXLRUN, limit, what).await
 }
 
-/// Sends PC_XRESET until the board takes it. The command has no answer: a board that answers PC_INFO and has not left its application did
-/// not receive it. A silent board is rebooting or has lost its number, and gets no further PC_XRESET.
+/// Sends PC_XRESET until the board executes it. The command has no answer. If a board answers PC_INFO from its application, it did not
+/// receive the command. If it is silent, it is rebooting or has lost its number, and gets no further PC_XRESET.
 async fn xreset_taken(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     let to = link.board(board)?;
     let soon = EXLOADER_WAIT / 3;
@@ -244,7 +244,7 @@ async fn send_xreset(link: &Link, to: Sequence) {
     link.sleep(link.times().xreset_wait).await;
 }
 
-/// Sends PC_START and waits until the application is up: MCA_DSP_READY, or PC_INFO that shows MSTART (D-30).
+/// Sends PC_START and waits until the application is up. This is shown by MCA_DSP_READY, or by MSTART in the answer to PC_INFO (D-30).
 pub(crate) async fn start_application(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let before = info(link, board).await?;
     start_from(link, before).await
@@ -263,7 +263,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
     let mut error = None;
     for _ in 0..TRIES {
         link.listen(1 << board, &[Function::McaReady]);
-        // Set before the frame leaves, so that a cancel takes it into account.
+        // This is set before the frame leaves, so that a cancel takes the start into account.
         link.with(|core| core.boards.of(board).starting_since = Some(core.now));
         link.ask(to, ToBoard::Start).await;
         let until = link.now() + link.times().start;
@@ -279,7 +279,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors of a bad bus are only logged, and reported if all attempts fail.
+                // Errors caused by a bad bus are only stored. They are returned if all attempts fail.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -307,10 +307,11 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags that a change starts from: those that the board sent last, otherwise those of its status with outputs off (D-37).
+/// Returns the flags before a change: those that the board sent last. If there are none, derives them from the status, with the outputs off
+/// (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
-    // A command that ends something does not wait for an answer.
+    // A command that ends something must not wait for answers.
     if !ends {
         one_board_each(link, &[board]).await?;
     }
@@ -319,7 +320,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin));
     let run = known.status.has(Status::MCARUN);
-    // The board's flags may have been lost, but the status byte shows whether the loop runs.
+    // The last flags of the board may have been lost. The status byte shows whether the loop runs.
     Ok(flags.map_or(Admin { run, ..Admin::default() }, |flags| Admin {
         run,
         active: flags.active && run,
@@ -327,7 +328,7 @@ async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     }))
 }
 
-/// Changes the flags by read-modify-write.
+/// Changes the flags: reads, modifies and writes them.
 pub(crate) async fn change_flags(link: &Link, board: u8, change: AdminChange) -> Result<Admin, Error> {
     let wanted = change.apply(flags(link, board, change.only_ends()).await?);
     admin(link, board, wanted).await

@@ -1,4 +1,5 @@
-//! Reading descriptions and initial inputs: idempotent, at most three tries, accepted only if the totals fit (D-14).
+//! Reading of descriptions and initial inputs. A request has no side effect and is sent at most three times. An answer is accepted only if
+//! its totals are right (D-14).
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, Incomplete, SignalError};
 use crate::master::io::{DescriptionKey, IoDescription, SnapshotAssembler};
@@ -9,10 +10,10 @@ use ucom::{
     Assembled, BoardInfo, Dimensions, FromBoard, Function, Payload, Status, StringAssembler, ToBoard,
 };
 
-/// Limit of strings that a description may announce: more words would not fit on any bus.
+/// Limit of strings that a description may announce. A bus could not carry more signals.
 const MAX_STRINGS: u32 = 4096;
 
-/// Collected parts of one answer.
+/// The received parts of one answer.
 struct Collector {
     dimensions: Option<Dimensions>,
     strings: Vec<String>,
@@ -24,7 +25,8 @@ impl Collector {
         let profile = link.profile();
         let Some(dimensions) = self.dimensions else {
             let need = 6;
-            // Strings begin with 2 bytes and have packages of 1 to 8. Only at the start are 6 bytes the dimensions.
+            // Strings begin with a package of 2 bytes, followed by packages of 1 to 8 bytes. Only the first frame is different: its 6 bytes
+            // are the dimensions.
             let start = Incomplete::Start { len: payload.len(), need };
             let dimensions = Dimensions::parse(payload, profile.endian).ok_or(start)?;
             self.dimensions = Some(dimensions);
@@ -60,7 +62,7 @@ impl Collector {
         Incomplete::Silence { complete: self.strings.len() as u32, of }
     }
 
-    /// Returns the problem of the answer, which may only be a wrong byte order.
+    /// Returns the problem of the answer. If the byte order is probably wrong, returns that as the problem.
     fn problem(&self, problem: Incomplete) -> Incomplete {
         let exchanged = |d: &Dimensions| {
             let all = [d.ci, d.so, d.par];
@@ -81,7 +83,7 @@ impl Collector {
     }
 }
 
-/// Tries once; `None`: no frame came.
+/// Sends the request once. `None`: no frame arrived.
 async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescription, Incomplete>>, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::DumpIo).await;
@@ -100,7 +102,7 @@ async fn try_describe(link: &Link, board: u8) -> Result<Option<Result<IoDescript
                 if let Err(problem) = collector.push(received.at, &payload, link) {
                     return Ok(Some(Err(collector.problem(problem))));
                 }
-                // A surplus frame would come at once.
+                // A surplus frame would follow immediately.
                 until = link.now() + if collector.done() { times.quiet } else { times.gap };
             }
             message => {
@@ -134,10 +136,10 @@ async fn read_description(link: &Link, board: u8) -> Result<IoDescription, Error
     }
 }
 
-/// Returns the description of a board whose application runs, as the board has sent it since that start.
+/// Returns the description of a board whose application runs. The board must have sent it since the application started.
 ///
-/// A description that is only stored under Program ID and date (D-36) may be of another application. Its names are not used to write
-/// values.
+/// A description that is only stored for this Program ID and date (D-36) may belong to another application, so its names are not used to
+/// write values.
 pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Result<IoDescription, Error> {
     let key = DescriptionKey::of(known);
     let kept = link.with(|core| {
@@ -153,7 +155,7 @@ pub(crate) async fn describe(link: &Link, board: u8, known: &BoardInfo) -> Resul
     Ok(description)
 }
 
-/// Sizes the buffers for the description.
+/// Sets the sizes of the buffers according to the description.
 fn take_over(link: &Link, board: u8, key: DescriptionKey, description: &IoDescription) {
     let d = description.dimensions();
     link.with(|core| {
@@ -183,11 +185,11 @@ pub(crate) async fn read_initial_inputs(link: &Link, board: u8, dimension: u16) 
         if tries > 0 {
             link.quiet(times.gap).await;
         }
-        // The attempts are independent, because a board may change its values.
+        // The attempts are independent of each other, because a board may change its values.
         let mut words = vec![0; dimension.into()];
         let mut seen = vec![false; packages as usize];
         link.ask(to, ToBoard::DumpCi).await;
-        // The time is limited, even if a board repeats itself for ever.
+        // The time is limited, even if a board repeats its frames for ever.
         let limit = link.now() + times.gap * u64::from(packages + 1);
         while missing_packages(&seen) > 0
             && let Some(received) = link.next((link.now() + times.gap).min(limit)).await

@@ -1,20 +1,20 @@
-//! Requests that procedures consist of, with their limited repetition.
+//! The requests that procedures use, each with a limited number of repetitions.
 use crate::master::engine::Link;
 use crate::master::error::{Error, ExchangeError, IdentityError, Incomplete, StatusError};
 use crate::master::reports::BoardSeen;
 use ucom::{Admin, Assembled, BoardInfo, FromBoard, Function, Payload, Status, StringAssembler, ToBoard};
 
-/// A request whose repetition has no further effect is sent once and repeated twice.
+/// Number of times that a request is sent at most. Only requests whose repetition has no further effect are repeated.
 pub(crate) const TRIES: u32 = 3;
 
 /// Result of one PC_INFO.
 #[derive(Debug)]
 pub(crate) enum Answer {
-    /// No frame came.
+    /// No frame arrived.
     Silence,
-    /// Frames that are not a valid answer.
+    /// The frames were not a valid answer.
     Broken(Incomplete),
-    /// Numbers; the description only if it was complete.
+    /// The values of the first frame. The description is included only if it was complete.
     Info(BoardInfo, Option<String>),
 }
 
@@ -28,7 +28,7 @@ pub(crate) struct InfoCollector {
 }
 
 impl InfoCollector {
-    /// Takes a frame; `Err`: the frame is not an answer.
+    /// Handles a frame. `Err`: the frame does not belong to an answer.
     pub(crate) fn push(&mut self, at: u64, payload: &Payload, link: &Link) -> Result<(), Incomplete> {
         let profile = link.profile();
         if self.info.is_none() {
@@ -58,7 +58,7 @@ impl InfoCollector {
     }
 }
 
-/// Sends one PC_INFO without repetition. The mailbox must listen to DSP_INFO.
+/// Sends a single PC_INFO. The mailbox must listen to DSP_INFO.
 pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     let (to, times) = (link.board(board)?, link.times());
     link.ask(to, ToBoard::Info).await;
@@ -78,7 +78,8 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     }
     let answer = collector.answer();
     if let Answer::Info(info, text) = &answer {
-        // A string's package could be taken for the first frame, but does not have the board's number and a possible status.
+        // A package of a string could be mistaken for the first frame. Such a package contains neither the board's number nor a possible
+        // status.
         if info.status.contradiction().is_some() || !info.status.has(Status::INIT) {
             return Ok(Answer::Broken(Incomplete::Misfit { string: 0 }));
         }
@@ -90,7 +91,7 @@ pub(crate) async fn ask_info(link: &Link, board: u8) -> Result<Answer, Error> {
     Ok(answer)
 }
 
-/// Stores a board's report.
+/// Stores a board's answer to PC_INFO.
 pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&str>) {
     link.with(|core| {
         let now = core.now;
@@ -118,15 +119,15 @@ pub(crate) fn remember(link: &Link, board: u8, info: &BoardInfo, text: Option<&s
     });
 }
 
-/// Sends PC_INFO with the description, up to three times.
+/// Sends PC_INFO and reads the answer with the description. Tries up to three times.
 ///
-/// If the description is never complete, the numbers are still valid: they are returned without it. A number other than the board's own
-/// is an error at once (D-24).
+/// If the description is never complete, the values of the first frame are returned without it. If an answer contains another number, the
+/// board is asked again; the same wrong number in two answers in a row is an error (D-24).
 pub(crate) async fn info(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     info_for(link, board, true).await
 }
 
-/// Reads only the numbers with PC_INFO.
+/// Sends PC_INFO and reads only the first frame of the answer.
 pub(crate) async fn numbers(link: &Link, board: u8) -> Result<BoardInfo, Error> {
     info_for(link, board, false).await.map(|seen| seen.info)
 }
@@ -148,7 +149,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
             Ok(Answer::Info(info, _)) => numbers = Some(info),
             Ok(Answer::Broken(p)) => problem = Some(p),
             Ok(Answer::Silence) => {}
-            // A single damaged frame may contain anything. The next answer of the board has the data again.
+            // A single damaged frame may contain anything, so the board is asked again.
             Err(e @ Error::Identity(IdentityError::WrongSequence { .. }))
                 if mismatch.as_ref() != Some(&e) =>
             {
@@ -170,7 +171,7 @@ async fn info_for(link: &Link, board: u8, description: bool) -> Result<BoardSeen
     }
 }
 
-/// Reads the numbers of a board until two answers agree: one damaged answer never counts as another board.
+/// Reads a board until two consecutive answers agree, so that one damaged answer is never mistaken for another board.
 pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error> {
     let mut first = info(link, board).await?;
     for _ in 0..TRIES {
@@ -185,12 +186,12 @@ pub(crate) async fn confirmed(link: &Link, board: u8) -> Result<BoardSeen, Error
     Err(ExchangeError::Contradiction { board, tries: TRIES + 1 }.into())
 }
 
-/// Returns the fields that do not change from one answer to the next.
+/// Returns the fields that are the same in all answers of a board.
 pub(crate) fn identity(info: &BoardInfo) -> (u16, u16, u16) {
     (info.flash_number, info.program_id, info.date)
 }
 
-/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats both if the board did not take the command (D-22). Value bits
+/// Sends PC_SETSTATUS and reads the status back with PC_INFO. Repeats both if the board did not execute the command (D-22). Value bits
 /// outside the mask are never sent.
 pub(crate) async fn set_status(
     link: &Link,
@@ -212,22 +213,22 @@ pub(crate) async fn set_status(
     Err(StatusError::StatusNotTaken { board, mask, wanted: value, status, tries: TRIES }.into())
 }
 
-/// Sends MCA_ADMIN_DATA, which the board answers with its state.
+/// Sends MCA_ADMIN_DATA. The board answers with its flags.
 pub(crate) async fn admin(link: &Link, board: u8, wanted: Admin) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { active: wanted.active && wanted.run, ..wanted };
     ask_admin(link, board, ToBoard::Admin(wanted), to, |is| is == wanted, wanted).await
 }
 
-/// Sends MCA_PC_START, which the board answers with its state.
+/// Sends MCA_PC_START. The board answers with its flags.
 pub(crate) async fn mca_start(link: &Link, board: u8) -> Result<Admin, Error> {
     let to = link.board(board)?;
     let wanted = Admin { run: true, ..Admin::default() };
     ask_admin(link, board, ToBoard::McaStart, to, |is| is.run, wanted).await
 }
 
-/// Sends a request for flags. An error of the board does not end the exchange: errors of a bad bus are only logged, and often come when
-/// the request itself was lost. The error is reported if all attempts fail.
+/// Sends a request that is answered with flags. An error from the board does not end the exchange: errors caused by a bad bus are only
+/// stored, and often mean that the request was lost. The error is returned if all attempts fail.
 async fn ask_admin(
     link: &Link,
     board: u8,
@@ -245,7 +246,7 @@ async fn ask_admin(
         while let Some(received) = link.next(until).await {
             match received.message {
                 FromBoard::Admin(is) if taken(is) => return Ok(is),
-                // Flags that the board sent by itself before the request reached it.
+                // The board sent these flags by itself before it received the request.
                 FromBoard::Admin(is) => other = Some(is),
                 message => error = Link::device(board, &message, "MCA_ADMIN_DATA").or(error),
             }

@@ -1,8 +1,8 @@
-//! Numbers for the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
+//! Assigns numbers to the boards of a chain, in the order of the wire (section on initialisation: D-21, D-24).
 //!
-//! The board without a number whose incoming pin is active takes PC_INIT(n). After this PC has confirmed the number, it raises the
-//! board's outgoing pin, which enables the next board. PC_INIT is never repeated without PC_INFO before. Otherwise a board that raises
-//! its pin by itself would let its neighbour take the same number.
+//! PC_INIT(n) is taken by the board that has no number and whose incoming pin is active. After this PC has confirmed the number, it raises
+//! the board's outgoing pin, which enables the next board. PC_INIT is repeated only after a PC_INFO. Otherwise, if a board raises its pin
+//! by itself, the next board would take the same number.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -17,7 +17,7 @@ use crate::master::reports::{BoardSeen, InitFinding, InitOptions, InitReport, Ou
 use std::collections::BTreeSet;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Numbers all boards of the chain.
+/// Assigns numbers to all boards of the chain.
 pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Error> {
     link.become_master(options.force).await?;
     let mut report = InitReport::default();
@@ -41,7 +41,8 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// Stops boards that did not receive the reset. Such a board has kept its number, and continues to run without repeated inputs.
+/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but its inputs are no longer
+/// repeated.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;
@@ -52,13 +53,14 @@ async fn stop_unreset(link: &Link, report: &mut InitReport) {
     }
 }
 
-/// Returns `true` if the board continues to run after a reset. A board starts only its application by itself, if ASTART is set, never its
-/// control loop.
+/// Returns `true` if the board has continued to run despite the reset. After a reset, a board with ASTART starts its application by itself,
+/// but never its control loop.
 fn runs_on(status: Status) -> bool {
     status.has(Status::MCARUN) || (status.has(Status::MSTART) && !status.has(Status::ASTART))
 }
 
-/// Sends PC_RESET to all and collects their reports. If boards are present but none reports, the reset was lost and is repeated.
+/// Sends PC_RESET to all boards and collects their reports. If boards are present but none has reported, the reset was lost and is
+/// repeated.
 async fn reset_all(link: &Link, reports: &mut Reports) {
     for _ in 0..2 {
         link.listen(0, &REPORTS);
@@ -80,17 +82,17 @@ async fn reset_all(link: &Link, reports: &mut Reports) {
     }
 }
 
-/// Gives a number to the next board of the chain; `None`: no board took it.
+/// Assigns a number to the next board of the chain; `None` if no board took it.
 async fn next_board(link: &Link, number: u8) -> Result<Option<BoardSeen>, Error> {
     if !take_number(link, number, false).await? {
         return Ok(None);
     }
     let seen = info(link, number).await?;
     one_board_each(link, &[number]).await?;
-    // Also raised if the board reports that it did so itself. This is harmless, and the read-back is needed in any case.
+    // The pin is also raised if the board reports that it has already done so. This is harmless, and the status must be read back anyway.
     let raised = set_status(link, number, Status::OPINIT, Status::OPINIT).await?;
     if raised.flash_number != seen.info.flash_number {
-        // An answer was damaged, or two boards have this number.
+        // Either an answer was damaged, or two boards have this number.
         return confirmed(link, number).await.map(Some);
     }
     Ok(Some(BoardSeen { info: raised, ..seen }))
@@ -101,11 +103,11 @@ async fn verify(link: &Link, options: &InitOptions, report: &mut InitReport) {
     let low = |seen: &BoardSeen| seen.info.flash_number as u8;
     let reached: BTreeSet<u8> = report.boards.iter().map(low).collect();
     if reached != report.reports.ids {
-        // A report may have been lost.
+        // A report may have been lost, so the boards are asked again.
         ask_reports(link, &mut report.reports).await;
     }
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // Any further comparison would use numbers that were read in the wrong order.
+        // The numbers were read in the wrong byte order, so further comparisons are not possible.
         report.findings.push(InitFinding::ByteOrder { endian: link.profile().endian });
         return;
     }

@@ -5,7 +5,8 @@ use crate::master::procedures::exchange::numbers;
 use ucom::Function;
 
 impl Link {
-    /// Becomes master before the first intrusive command (D-08): looks for another master, then sends ALIVE until the session ends.
+    /// Becomes master before the first command that changes something (D-08). Listens for another master, then sends ALIVE until the
+    /// session ends.
     pub(crate) async fn become_master(&self, force: bool) -> Result<(), Error> {
         self.look_for_master(force).await?;
         self.with(|core| {
@@ -21,14 +22,14 @@ impl Link {
         self.with(|core| core.session != Session::Quiet)
     }
 
-    /// Listens until `master.listen` has passed. Refuses if a frame of another PC was received in that time (D-08). Does nothing if this
-    /// PC already is the master, or if forced.
+    /// Waits until this PC has listened to the bus for `master.listen`. Returns an error if it received a frame of another PC in that time
+    /// (D-08). Does nothing if this PC already is the master or if `force` is set.
     pub(crate) async fn look_for_master(&self, force: bool) -> Result<(), Error> {
         let already = self.with(|core| core.session != Session::Quiet);
         if !already && !force {
             let (since, listen, now) =
                 self.with(|core| (core.since.unwrap_or(core.now), core.times.listen, core.now));
-            // Time before the command counts if the bus was listened to.
+            // Time before the command is included if this PC has listened to the bus.
             if now < since + listen {
                 self.sleep(since + listen - now).await;
             }
@@ -39,7 +40,7 @@ impl Link {
         Ok(())
     }
 
-    /// Refuses if a frame of another PC was received within the last `window` µs.
+    /// Returns an error if a frame of another PC was received within the last `window` µs.
     fn no_competing_master(&self, window: u64) -> Result<(), MasterError> {
         let (now, received) = self.with(|core| (core.now, core.competing_master));
         match received.filter(|(at, ..)| now.saturating_sub(*at) <= window) {
@@ -50,9 +51,9 @@ impl Link {
         }
     }
 
-    /// Reports heartbeats of another PC. A heartbeat under the number of a board may come from the board, or from another PC for that
-    /// board alone. The board's status decides: a board that is not started sends no heartbeats. Without an answer the heartbeat counts
-    /// as the board's.
+    /// Reports heartbeats of another PC. A heartbeat with the number of a board may come from the board, or from another PC that sends it
+    /// only to this board. The status of the board decides: a board that is not started sends no heartbeats. If the board does not answer,
+    /// the heartbeat is assumed to be its own.
     async fn whose_heartbeats(&self, window: u64) {
         let recent =
             |core: &Core, at: Option<u64>| at.is_some_and(|at| core.now.saturating_sub(at) <= window);

@@ -1,6 +1,6 @@
-//! The procedures as `async` functions over a [`Link`](crate::master::engine::Link).
+//! The procedures. They are `async` functions that use a [`Link`](crate::master::engine::Link).
 //!
-//! Files import only files below them. From the lowest: exchange, mastership, one_board, ask_reports, byte_order, survey, scan,
+//! Each file imports only files that come before it in this list: exchange, mastership, one_board, ask_reports, byte_order, survey, scan,
 //! take_number, repair, init, control, stop, raw_status, describe, run, update, probe, conformance, work.
 pub(crate) mod ask_reports;
 pub(crate) mod byte_order;

@@ -1,4 +1,4 @@
-//! Check that each number belongs to one board, before a change (D-24).
+//! Checks before a change that each number belongs to only one board (D-24).
 use std::collections::BTreeMap;
 
 use crate::master::engine::{Link, MS, Open};
@@ -6,24 +6,24 @@ use crate::master::error::IdentityError;
 use crate::master::procedures::exchange::TRIES;
 use ucom::{Function, ToBoard};
 
-/// Age up to which an answer to PC_INFO shows the board that has a number, µs.
+/// Maximum age of an answer to PC_INFO that still shows which board has a number, µs.
 const FRESH: u64 = 2_000 * MS;
-/// Time between two questions, µs, so that the answers of 31 boards do not come as one burst.
+/// Time between two questions in µs. It keeps the answers of 31 boards from arriving as one burst.
 const SPACING: u64 = 2 * MS;
 
-/// Checks that each of these numbers belongs to one board: no other board answers PC_INFO within the permitted time. A number without an
-/// answer is not refused.
+/// Checks that each of these numbers belongs to only one board: no other board answers PC_INFO within the allowed time. A number to which
+/// no board answers is not an error.
 pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), IdentityError> {
     let mask = boards.iter().fold(0, |mask, board| mask | 1_u32.checked_shl((*board).into()).unwrap_or(0));
     let (mut silent, mut round) = (BTreeMap::<u8, u32>::new(), 0);
     loop {
         let patience = link.times().info;
-        // After the first wait answers of any age count, because they are only as old as the driver is late.
+        // After the first wait, answers of any age are accepted: an old answer then only means that the driver is late.
         let oldest = if round == 0 { FRESH } else { u64::MAX };
         let mut until = None;
         let mut ask = Vec::new();
         for board in boards {
-            // Numbers that no board can have are skipped.
+            // Numbers that a board cannot have are skipped.
             let Ok(to) = link.board(*board) else { continue };
             match link.with(|core| core.holders.open(*board, core.fired, patience, oldest)) {
                 Open::Nothing => {}
@@ -55,7 +55,7 @@ pub(crate) async fn one_board_each(link: &Link, boards: &[u8]) -> Result<(), Ide
     }
 }
 
-/// Checks every number.
+/// Checks all numbers of boards.
 pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), IdentityError> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let asked = match link.profile().broadcast_number() {
@@ -72,8 +72,8 @@ pub(crate) async fn one_board_for_each_number(link: &Link) -> Result<(), Identit
     link.with(|core| core.holders.shared(u32::MAX)).map_or(Ok(()), Err)
 }
 
-/// Waits until the last questions to these boards (by bit) can no longer be answered. A board that shares a number with one of them may
-/// answer late.
+/// Waits until the last questions to these boards can no longer be answered, because a board that shares a number may answer late. Each bit
+/// of `boards` is a board.
 pub(crate) async fn last_answers(link: &Link, boards: u32) {
     let patience = link.times().info;
     if let Some(asked_at) = link.with(|core| core.holders.last_asked(boards)) {
@@ -81,7 +81,7 @@ pub(crate) async fn last_answers(link: &Link, boards: u32) {
     }
 }
 
-/// Waits until the given time, and until an answer in progress has ended.
+/// Waits until the time `until`, and until an answer in progress has ended.
 async fn out_of_words(link: &Link, mut until: u64) {
     let (gap, limit) = (link.times().gap, until + 20 * link.times().gap);
     while link.next(until).await.is_some() && link.now() < limit {

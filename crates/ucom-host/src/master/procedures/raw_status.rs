@@ -1,4 +1,4 @@
-//! PC_SETSTATUS exactly by the formula, including value bits outside the mask (D-22): for experts.
+//! Sends PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask (D-22). For experts.
 use crate::master::engine::{Link, MS};
 use crate::master::error::{Error, ExchangeError, RunningError};
 use crate::master::procedures::exchange::numbers;
@@ -6,7 +6,7 @@ use crate::master::procedures::one_board::one_board_each;
 use crate::master::reports::{Outcome, RawStatus, expected_status};
 use ucom::{Status, ToBoard};
 
-/// Sends one frame to one board or to all and reports its effect. `seen` are the boards to read.
+/// Sends one frame to one board or to all boards, and reports the effect. `seen` lists the boards to read.
 pub(crate) async fn raw_status(
     link: Link,
     to: Option<u8>,
@@ -29,7 +29,7 @@ pub(crate) async fn raw_status(
     }
     link.become_master(force).await?;
     one_board_each(&link, &seen).await?;
-    // Never repeated: the frame must take effect once.
+    // The frame is never repeated, because it must take effect only once.
     link.send(address, ToBoard::SetStatus { mask, value }).await;
     let limit = link.now() + link.times().start;
     let mut boards = Vec::new();
@@ -42,7 +42,7 @@ pub(crate) async fn raw_status(
                 Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => None,
                 Err(e) => return Err(e),
             };
-            // Applications need time to start.
+            // Applications need time to start, so the status is read again.
             if result.as_expected() || link.now() >= limit {
                 break;
             }

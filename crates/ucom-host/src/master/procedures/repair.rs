@@ -1,8 +1,8 @@
-//! Gives a lost number back to one board while the other boards keep theirs (section on initialisation: D-21, D-24).
+//! Gives a board its lost number back while the other boards keep theirs (section on initialisation: D-21, D-24).
 //!
-//! *Every* board without a number whose incoming pin is active takes PC_INIT(n). At that moment only the outgoing pin of the board before
-//! n may be on. The first board, whose incoming pin is always active, must have its number. Pins that stay low, as after a cancel, do no
-//! harm: they matter only to PC_INIT, and a repair raises the pin that it needs.
+//! PC_INIT(n) is taken by *every* board that has no number and whose incoming pin is active. At that moment only the outgoing pin of the
+//! board before n may be on. The incoming pin of the first board is always active, so the first board must have its number. Other pins may
+//! stay low, for example after a cancel. This does no harm: only PC_INIT depends on them, and a repair raises the pin that it needs.
 
 use crate::master::engine::{Link, MS, head};
 use crate::master::error::{AddressError, Error, IdentityError};
@@ -14,15 +14,15 @@ use crate::master::reports::{BoardSeen, Outcome};
 use std::collections::BTreeMap;
 use ucom::{FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Limit of rounds of PC_INFO that determine the boards with a number.
+/// Limit of rounds in which PC_INFO is sent to find the boards with a number.
 const ROUNDS: u32 = 6;
 
-/// Gives board `number` its number back if it no longer answers. The flash number must be the expected one, and no other board may have
-/// taken the number as well.
+/// Gives board `number` its number back if the board no longer answers. Returns an error if the board has another flash number, or if
+/// another board has taken the number as well.
 pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result<BoardSeen, Error> {
     link.board(number)?;
     let mut lowered = Vec::new();
-    // The steps below detect two boards that take the number, and take it back from both.
+    // If two boards take the number, the steps below detect this and take the number from both.
     link.bear_shared_numbers(true);
     let given = give(link, number, flash_number, &mut lowered).await;
     for board in lowered {
@@ -36,7 +36,7 @@ pub(crate) async fn repair(link: &Link, number: u8, flash_number: u16) -> Result
     Ok(BoardSeen { info: raised, ..seen })
 }
 
-/// Gives the number to the intended board only. `lowered`: boards whose pin was on and is off now.
+/// Gives the number to the intended board only. Boards whose pin was on and is switched off here are added to `lowered`.
 async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>) -> Result<BoardSeen, Error> {
     let since = link.now();
     only_its_pin(link, number, lowered).await?;
@@ -50,7 +50,7 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
             Err(shared) => Err(given_back(link, number, shared.into()).await?),
         },
         [] => Err(link.no_answer(number, Function::Info, ROUNDS, since).into()),
-        // A wrong board must not keep the number, or the next command would reach it.
+        // A wrong board must not keep the number. Otherwise the next command would reach that board.
         [other] => {
             if !take_back(link, number).await? {
                 link.note(format!("board 0x{other:04X} does not give number {number} back"));
@@ -65,17 +65,17 @@ async fn give(link: &Link, number: u8, flash_number: u16, lowered: &mut Vec<u8>)
     }
 }
 
-/// Switches off all outgoing pins except that of the board before `number`, which must be on.
+/// Switches off all outgoing pins except the pin of the board before `number`, which must be on.
 ///
-/// Every number gets the command three times, with or without an answer: a board may work although its answers are lost. Boards that
-/// answer are read back.
+/// The command is sent to every number three times, even if no board answers, because a board may work although its answers are lost. The
+/// status of boards that answer is read back.
 async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<(), Error> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let before = statuses(link, &numbers).await;
     let first = numbers.first().map_or(number, |n| n.number());
     let feeder = (number > first).then(|| number - 1);
     if let Some(feeder) = feeder {
-        // Only a board with a number keeps its pin on; without that pin no board could take this number.
+        // The board before keeps its pin on only if it has a number. Without that pin no board could take this number.
         set_status(link, feeder, Status::OPINIT, Status::OPINIT).await?;
         if !before.contains_key(&first) && feeder != first {
             return Err(AddressError::MayTakeNumber { board: number, other: first }.into());
@@ -92,14 +92,15 @@ async fn only_its_pin(link: &Link, number: u8, lowered: &mut Vec<u8>) -> Result<
     }
     for (board, status) in statuses(link, &others).await {
         if !status.is_ok_and(|status| !status.has(Status::OPINIT)) {
-            // Three more attempts, each read back; then the repair is refused.
+            // This makes three more attempts and reads the status back each time. If they fail, the repair ends.
             set_status(link, board, Status::OPINIT, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Returns the flash numbers of all boards that answer to this number. A flash number seen only once counts as a damaged answer.
+/// Returns the flash numbers of all boards that answer to this number. A flash number that is received only once is considered to be a
+/// damaged answer.
 async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let mut seen: BTreeMap<u16, u32> = BTreeMap::new();
     for round in 1..=ROUNDS {
@@ -114,7 +115,7 @@ async fn holders(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(seen.into_iter().filter(|(_, times)| *times > 1).map(|(flash_number, _)| flash_number).collect())
 }
 
-/// Sends one PC_INFO and returns the flash numbers of all answers to it, not only of the first.
+/// Sends one PC_INFO. Returns the flash numbers of all answers to it, not only of the first one.
 async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     let (to, times, profile) = (link.board(number)?, link.times(), link.profile());
     link.listen(1 << number, &[Function::DspInfo]);
@@ -136,14 +137,14 @@ async fn answers(link: &Link, number: u8) -> Result<Vec<u16>, Error> {
     Ok(found)
 }
 
-/// Withdraws a number from both boards that took it.
+/// Takes a number from both boards that have it.
 pub(crate) async fn given_back(link: &Link, number: u8, error: Error) -> Result<Error, Error> {
     let Error::Identity(IdentityError::NumberShared { board, found, .. }) = error else { return Ok(error) };
     let given_back = take_back(link, number).await?;
     Ok(Error::Identity(IdentityError::NumberShared { board, found, given_back }))
 }
 
-/// Takes a number from its board; returns `true` if no board answers to it any more.
+/// Takes a number from its board. Returns `true` if no board answers to the number afterwards.
 async fn take_back(link: &Link, number: u8) -> Result<bool, Error> {
     let to = link.board(number)?;
     for _ in 0..TRIES {
@@ -170,7 +171,7 @@ pub(crate) async fn repair_procedure(
     link.become_master(force).await?;
     match holders(&link, number).await?.as_slice() {
         [] => repair(&link, number, flash_number).await.map(Outcome::Repaired),
-        // The board works: only its pin is set, which must be on.
+        // The board works. Only its outgoing pin must be on, so only the pin is set.
         [found] if *found == flash_number => {
             one_board_each(&link, &[number]).await?;
             let seen = confirmed(&link, number).await?;

@@ -1,5 +1,5 @@
-//! From a started board to a running control loop, in the order of the protocol: description, initial inputs, inputs,
-//! parameters, heartbeats, loop, outputs.
+//! Brings a board to a running control loop, in the order of the protocol: description, initial inputs, inputs, parameters, heartbeats,
+//! loop, outputs.
 
 use crate::master::engine::{Core, Life, Link};
 use crate::master::error::{Error, MasterError, RunningError, SignalError};
@@ -15,8 +15,8 @@ use std::collections::BTreeMap;
 use ucom::profile::OnLost;
 use ucom::{Admin, BoardInfo, Dimensions, Status};
 
-/// Runs boards. The run ends with every board running, or with every board in its previous state: idle, started, or running. A board that
-/// was running before keeps its previous values, except for inputs and parameters that the user sets.
+/// Runs boards. At the end either all boards run, or all boards are in their previous state again: idle, started or running. A board that
+/// was running before keeps its values, except for inputs and parameters that the user sets.
 pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Error> {
     let mut begun = Vec::new();
     let result = link.or_cancel(start_all(&link, &options, &mut begun)).await;
@@ -35,10 +35,10 @@ pub(crate) async fn run(link: Link, options: RunOptions) -> Result<Outcome, Erro
     result.map(Outcome::Running)
 }
 
-/// Record of a board that a run has started; the start is undone if the run fails.
+/// Record of a board that a run has started. If the run fails, the start is undone.
 struct Begun {
     board: u8,
-    /// Level of the stop that returns the board to its previous state.
+    /// Level of the stop that returns the board to its previous state; `None` if nothing must be undone.
     back: Option<StopLevel>,
     /// `true` if the loop was running already.
     ran: bool,
@@ -59,7 +59,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         link.board(plan.board)?;
     }
     link.become_master(options.force).await?;
-    // First come all checks that can refuse the run, if their data are known before anything is started: names, load.
+    // Checks that can refuse the run (names, load) come first, if their data are known before a board is started.
     let mut found = Vec::new();
     let mut described = BTreeMap::new();
     for plan in &options.boards {
@@ -71,7 +71,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
     }
     one_board_each(link, &options.boards.iter().map(|plan| plan.board).collect::<Vec<_>>()).await?;
     for (plan, seen) in options.boards.iter().zip(found) {
-        // A board that did not run is stopped to its previous state. A running board is not stopped.
+        // If the run fails, a board that did not run before is stopped to its previous state. A board that was running is not stopped.
         let status = seen.info.status;
         let back = match (status.has(Status::MSTART), status.has(Status::MCARUN)) {
             (false, _) => Some(StopLevel::Application),
@@ -81,7 +81,7 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
         begun.push(Begun { board: plan.board, back, ran: back.is_none() });
         let seen = start_from(link, seen).await?;
         let description = describe(link, plan.board, &seen.info).await?;
-        // The user chose the values to write by the known names.
+        // The user has chosen the values by the names that were known before.
         if described.get(&plan.board).is_some_and(|known| *known != description) {
             return Err(SignalError::StaleNames { board: plan.board }.into());
         }
@@ -97,13 +97,13 @@ async fn start_all(link: &Link, options: &RunOptions, begun: &mut Vec<Begun>) ->
     Ok(RunReport { boards, load: forecast(link, &described) })
 }
 
-/// Returns the description of the program on a board, if it is already known.
+/// Returns the description of a board's program, if it is already known.
 fn known_description(link: &Link, info: &BoardInfo) -> Option<IoDescription> {
     let key = DescriptionKey::of(info);
     link.with(|core| core.descriptions.get(&key).filter(|_| info.has_application()).cloned())
 }
 
-/// Adds a described board: checks its names and the bus load.
+/// Adds a board with its description. Checks the names of its values, and the bus load.
 fn add(
     link: &Link,
     options: &RunOptions,
@@ -121,7 +121,7 @@ fn add(
     if load.exceeds() && !options.force { Err(RunningError::Load(load).into()) } else { Ok(()) }
 }
 
-/// Sends inputs and parameters, starts the loop, and enables the outputs if requested.
+/// Sends inputs and parameters, starts the loop, and enables the outputs if the options require it.
 async fn start_loop(
     link: &Link,
     options: &RunOptions,
@@ -130,8 +130,8 @@ async fn start_loop(
     begun: &mut Begun,
 ) -> Result<Admin, Error> {
     let board = plan.board;
-    // Only this PC itself knows the values that it sent to a running board. Initial values do not overwrite the values of another PC
-    // unless requested.
+    // If the board was running, only the values that this PC itself sent to it are known. Initial values must not replace the values of
+    // another PC unless the user requests it.
     let given = link.with(|core| core.data.get(&board).filter(|d| d.repeat.is_some()).map(|d| d.ci.clone()));
     let give = !begun.ran || given.is_some() || !plan.ci.is_empty();
     let initial = read_initial_inputs(link, board, description.dimensions().ci).await?;
@@ -154,7 +154,7 @@ async fn start_loop(
         let index = description.find(board, Kind::Par, &setting.name)?;
         link.with(|core| core.send_parameter(board, index, setting.value));
     }
-    // No board may start before its values have left.
+    // The board must not start before its values have left.
     link.flush().await;
     let flags = mca_start(link, board).await?;
     if begun.back.is_none() && !flags.active && options.active {
@@ -171,7 +171,7 @@ async fn start_loop(
     change_flags(link, board, AdminChange { active: Some(true), ..running }).await
 }
 
-/// Returns an error if a board was lost and `on_lost` stops all boards: no further board is then started.
+/// Returns an error if a board was lost and `on_lost` stops all boards. Then no further board is started.
 fn nobody_lost(link: &Link, options: &RunOptions) -> Result<(), Error> {
     let lost = |core: &mut Core, number: u8| {
         core.boards.get(number).is_some_and(|b| b.life == Life::Lost || b.rebooted)
@@ -192,7 +192,7 @@ fn repeat_inputs(link: &Link, board: u8) {
     });
 }
 
-/// Returns the forecast, including boards that already run (P-19).
+/// Returns the load forecast, which includes boards that already run (P-19).
 fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecast {
     link.with(|core| {
         let now = core.now;
@@ -204,7 +204,7 @@ fn forecast(link: &Link, described: &BTreeMap<u8, IoDescription>) -> LoadForecas
                 let known = Dimensions { ci: data.ci.len() as u16, so, par: 0 };
                 all.entry(number).or_insert(known);
             } else if board.so_at.is_some() {
-                // The dimensions of the board are not known here: assume at least one package in each direction.
+                // The dimensions of this board are not known. The forecast assumes one package in each direction, which is the minimum.
                 all.entry(number).or_insert(Dimensions { ci: 1, so: 1, par: 0 });
             }
         }

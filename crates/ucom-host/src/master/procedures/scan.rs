@@ -1,4 +1,4 @@
-//! Scan without any change: PC_REPORT to all, and PC_INFO to each number, no reset (5.4).
+//! Scan that changes nothing: PC_REPORT to all boards and PC_INFO to each number, without a reset (5.4).
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError};
@@ -18,10 +18,10 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
     ask_reports(&link, &mut report.reports).await;
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let slots = ask_all(&link, &numbers).await;
-    // Doubtful numbers are asked again. Confirmed shared numbers are reported below.
+    // Numbers that may be shared are asked again. Numbers that are certainly shared are reported below.
     let doubtful = link.with(|core| core.holders.doubtful());
     let _ = one_board_each(&link, &doubtful).await;
-    // The report of a board that answered may have been missed.
+    // If a board has answered but did not report, its report may have been lost.
     let missing = |boards: &[BoardSeen], reports: &Reports| {
         boards.iter().any(|b| !reports.ids.contains(&(b.info.flash_number as u8)))
     };
@@ -62,7 +62,7 @@ pub(crate) async fn scan(link: Link) -> Result<Outcome, Error> {
 
 fn judge(report: &mut ScanReport, endian: Endian) {
     if exchanged(&report.reports, &flash_numbers(&report.boards)) {
-        // Findings that result from the byte order are not faults of the chain.
+        // Findings that the wrong byte order causes are not problems of the chain.
         report.findings.retain(|finding| !matches!(finding, ScanFinding::NoDescription { .. }));
         report.findings.push(ScanFinding::ByteOrder { endian });
         return;

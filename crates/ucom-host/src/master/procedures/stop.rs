@@ -1,4 +1,4 @@
-//! Stop of a board, even if it does not answer: outputs, control loop, application.
+//! Stops a board, even if it does not answer: outputs, control loop, application.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::control::change_flags;
@@ -12,13 +12,13 @@ pub(crate) async fn stop(link: Link, board: u8, level: StopLevel, force: bool) -
     link.board(board)?;
     link.become_master(force).await?;
     let info = stop_board(&link, board, level).await;
-    // The shared number is only reported, by its event, and only now: both boards were commanded to stop.
+    // A shared number is only reported as an event, after both boards have received the stop.
     let _ = one_board_each(&link, &[board]).await;
     Ok(Outcome::Status { board, info: info? })
 }
 
-/// Switches the outputs off, then stops the loop, then the application: the start order in reverse. A step without an answer does not
-/// prevent the next steps. The first failure is reported.
+/// Switches off the outputs, then stops the loop, then the application, which is the reverse order of a start. If a step is not answered,
+/// the next steps are still taken. The first failure is returned.
 pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Result<BoardInfo, Error> {
     let mut known = match info(link, board).await {
         Ok(seen) => seen.info,
@@ -48,8 +48,8 @@ pub(crate) async fn stop_board(link: &Link, board: u8, level: StopLevel) -> Resu
     Ok(info(link, board).await?.info)
 }
 
-/// Stops a board that was commanded to start and does not show it yet. Such a board may start at any time until `start.timeout` has
-/// passed. The procedure commands it to stop in any state, and reads it again after that time.
+/// Stops a board that was commanded to start and does not show this yet. Such a board may start at any time until `start.timeout` has
+/// passed. Therefore it gets the stop command in any state, and is read again after that time.
 async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<BoardInfo, Error> {
     let Some(since) = link.with(|core| core.boards.of(board).starting_since) else { return Ok(known) };
     let answer = set_status(link, board, Status::MSTART, Status(0)).await;
@@ -62,13 +62,13 @@ async fn stop_starting(link: &Link, board: u8, known: BoardInfo) -> Result<Board
     Ok(now)
 }
 
-/// Stops a board that does not answer PC_INFO, because it may run nevertheless. Does not read its flags first.
+/// Stops a board that does not answer PC_INFO, because it may still be running. Does not read its flags first.
 async fn stop_silent(link: &Link, board: u8, level: StopLevel) -> Result<(), Error> {
     let to = link.board(board)?;
     let flags = link.with(|core| core.boards.get(board).and_then(|b| b.admin)).unwrap_or_default();
     let run = flags.run && level == StopLevel::Outputs;
     link.with(|core| core.stop_inputs(board));
-    // No answer is expected here.
+    // An answer is not expected here.
     let _ = admin(link, board, Admin { run, active: false, ..flags }).await;
     for _ in 0..TRIES {
         link.send(to, ToBoard::Admin(Admin { run, active: false, ..flags })).await;

@@ -1,4 +1,4 @@
-//! PC_INFO to many numbers at once, and the result for each.
+//! Sends PC_INFO to many numbers at once and collects the result for each number.
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::master::engine::{Link, Received};
@@ -7,13 +7,13 @@ use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Time between two requests of a round, µs, so that the answers of 31 boards do not come as one burst.
+/// Time between two requests of a round in µs. It keeps the answers of 31 boards from arriving as one burst.
 const SPACING: u64 = 2_000;
 
-/// Knowledge about one number.
+/// The answers to one number.
 #[derive(Default)]
 pub(crate) struct Slot {
-    /// Answers with the same identity so far.
+    /// Answers so far. They may differ in their identity.
     pub answers: Vec<(BoardInfo, Option<String>)>,
     pub confirmed: bool,
     pub contradicts: bool,
@@ -40,7 +40,7 @@ impl Slot {
 
     pub(crate) fn seen(&self, number: u8) -> Option<BoardSeen> {
         let (info, _) = self.answers.last()?;
-        // The latest status of the answers that agree.
+        // Uses the latest answer whose identity another answer confirms.
         let agreed =
             |i: &BoardInfo| self.answers.iter().filter(|(o, _)| identity(o) == identity(i)).count() > 1;
         let info = self.answers.iter().rev().map(|(i, _)| i).find(|i| agreed(i)).unwrap_or(info);
@@ -50,7 +50,8 @@ impl Slot {
     }
 }
 
-/// Sends PC_INFO to all numbers, in rounds, until each board gave two answers that agree or was silent three times.
+/// Sends PC_INFO to all these numbers in at most four rounds. A number is asked again until its board has given two answers that agree and
+/// a complete description, or was silent three times.
 pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, Slot> {
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());
     let times = link.times();
@@ -97,12 +98,12 @@ pub(crate) async fn ask_all(link: &Link, numbers: &[Sequence]) -> BTreeMap<u8, S
 fn collect(link: &Link, collectors: &mut BTreeMap<u8, InfoCollector>, received: &Received) {
     if let FromBoard::Info(payload) = received.message {
         let collector = collectors.entry(received.from).or_default();
-        // A frame other than a first frame leaves the collector empty, and the next round asks again.
+        // If this is not a first frame, the collector stays empty and the number is asked again in the next round.
         let _ = collector.push(received.at, &payload, link);
     }
 }
 
-/// Returns the last status of each of these numbers; an error if the answers of a board contradict each other.
+/// Returns the last status for each of these numbers, or an error if the answers of a board contradict each other.
 pub(crate) async fn statuses(
     link: &Link,
     numbers: &[Sequence],
@@ -118,8 +119,8 @@ pub(crate) async fn statuses(
     slots.into_iter().map(status).collect()
 }
 
-/// Returns the status of every board that answers. Asks all at once, and twice, because a frame can be lost. A board that sends sensor
-/// outputs counts as running, with any status.
+/// Returns the status of every board that answers. All boards are asked at once, and twice, because a frame can be lost. A board that sends
+/// sensor outputs is considered to be running, whatever its status is.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());

@@ -1,4 +1,4 @@
-//! Tests that start the application and its control loop; outputs are never enabled.
+//! Tests that start the application and its control loop. The outputs are never enabled.
 use crate::master::engine::MS;
 use crate::master::error::Error;
 use crate::master::procedures::conformance::ask::dimensions;
@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::{Bench, list, verdict};
 use crate::master::reports::Verdict;
 use ucom::{Frame, Function, Status};
 
-/// Ends a test early.
+/// Ends the test early if a step did not succeed.
 macro_rules! need {
     ($result:expr) => {
         if let Err(verdict) = $result {
@@ -19,7 +19,7 @@ fn is(frame: &Frame, function: Function, board: u8) -> bool {
     frame.address().is_ok_and(|(f, n)| f == function && n.number() == board)
 }
 
-/// Stops the loop. The stop is sent three times, and its answers are discarded.
+/// Stops the loop. The stop is sent three times, and the answers are discarded.
 async fn halt(bench: &mut Bench<'_>, board: u8) {
     for _ in 0..3 {
         bench.send(Function::Admin, board, &[0; 4]).await;
@@ -86,7 +86,7 @@ pub(super) async fn inputs(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, 
         return Ok(Verdict::Fail(format!("at the dimension {}: {}", d.ci, list(&came))));
     }
     if let Some(last) = d.ci.checked_sub(1) {
-        // Zeros, because the loop does not run and takes the initial inputs when it starts.
+        // Sending zeros is harmless: the loop does not run, and it begins with the initial inputs.
         bench.send(Function::Ci, board, &package(last)).await;
         let came = bench.receive(100 * MS).await;
         if !came.is_empty() {
@@ -125,7 +125,7 @@ async fn judge_alone(
         return Verdict::Fail("no flags came: it runs on without a PC".into());
     };
     let after = (at - start) / MS;
-    // A tolerance of 20 %, as for all times of the acceptance tests.
+    // The tolerance is 20 %, as for all times in the acceptance tests.
     if flags.data().get(..2) != Some(&[0, 0]) || after * MS < lost * 4 / 5 || after * MS > lost * 6 / 5 {
         return Verdict::Fail(format!("{flags} came after {after} ms"));
     }
@@ -160,11 +160,11 @@ pub(super) async fn alive(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, E
     Ok(result)
 }
 
-/// Sends a last heartbeat, then none for `us` µs.
+/// Sends a last heartbeat and then no heartbeats for `us` µs.
 async fn pause(bench: &mut Bench<'_>, us: u64) {
     bench.heartbeats(false);
     bench.heartbeats(true);
-    // Time for the last heartbeat to leave.
+    // Gives the last heartbeat time to leave.
     bench.link.sleep(5 * MS).await;
     bench.heartbeats(false);
     bench.link.sleep(us - 5 * MS).await;

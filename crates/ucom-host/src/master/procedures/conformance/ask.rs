@@ -1,4 +1,4 @@
-//! Tests that change nothing.
+//! Tests that do not change anything.
 use crate::master::engine::MS;
 use crate::master::error::{Error, MasterError};
 use crate::master::procedures::conformance::bench::{Bench, list, verdict};
@@ -6,7 +6,7 @@ use crate::master::reports::{BoardSeen, Verdict};
 use ucom::profile::{Endian, ReportMode};
 use ucom::{Dimensions, Frame, FromBoard, Function, Report, Status, package_count};
 
-/// Returns the report functions among frames, in order.
+/// Returns the reports among the frames, sorted.
 pub(super) fn only_reports(frames: &[Frame]) -> Vec<Frame> {
     let report = |f: &&Frame| f.address().is_ok_and(|(function, _)| (16..20).contains(&function.number()));
     let mut all: Vec<Frame> = frames.iter().filter(report).copied().collect();
@@ -41,7 +41,7 @@ pub(super) async fn reports(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Err
     if first != second {
         return Ok(Verdict::Fail(format!("first {}; then {}", list(first), list(second))));
     }
-    // A board of the chain may be excluded from the test, so there may be more reports.
+    // There may be more reports, because a board of the chain may be excluded from the test.
     if let Some(missing) = expected_reports(bench)
         .and_then(|all| all.into_iter().find(|f| first.iter().filter(|x| *x == f).count() != 1))
     {
@@ -67,7 +67,7 @@ pub(super) async fn init_again(bench: &mut Bench<'_>, board: u8) -> Result<Verdi
         }
         other => other?,
     }
-    // A board that has rebooted since would take any number.
+    // If a board has rebooted since, it would take any number.
     if bench.info(board).await.is_none() {
         return Ok(Verdict::Fail("PC_INFO is not answered: has it rebooted? `ucom scan`".into()));
     }
@@ -94,8 +94,8 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     let answers = move |all: Vec<Frame>| -> Vec<Frame> {
         all.into_iter().filter(|f| f.id() == u16::from(id) << 6 | u16::from(board)).collect()
     };
-    // With data the frame is a board's answer, never a request (D-12). Only the board itself may send it under its number, so the board
-    // must not have a pending answer.
+    // A frame of this function with data is always a board's answer, never a request (D-12). Only the board itself may send it with its
+    // number. An answer of the board must therefore not be pending now.
     bench.send(Function::DumpIo, board, &[0]).await;
     let came = answers(bench.receive(150 * MS).await);
     if !came.is_empty() {
@@ -116,7 +116,7 @@ pub(super) async fn description(bench: &mut Bench<'_>, board: u8) -> Result<Verd
     })
 }
 
-/// Counts the strings of a description by their headers only.
+/// Counts the strings of a description, using only their headers.
 fn strings(bench: &Bench<'_>, came: &[Frame]) -> Result<(), String> {
     let profile = bench.profile();
     let Some((head, rest)) = came.split_first() else { return Err("silence".into()) };
@@ -176,7 +176,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
             continue;
         };
         wrong |= usize::from(profile.endian.word([*a, *b])) != first;
-        // With pd.short_last a package may end with its last word.
+        // With pd.short_last a package may end with the last word.
         let surplus = 2 * usize::from(dimensions.ci).saturating_sub(first).min(3);
         wrong |= words.len() < surplus || words.iter().skip(surplus).any(|byte| *byte != 0);
     }
@@ -187,7 +187,7 @@ pub(super) async fn initial_inputs(bench: &mut Bench<'_>, board: u8) -> Result<V
 pub(super) async fn dimensions(bench: &mut Bench<'_>, board: u8) -> Option<Dimensions> {
     bench.send(Function::DumpIo, board, &[]).await;
     let first = bench.wait(Function::DumpIo, board, bench.link.times().info).await;
-    // The remainder of the answer must not be taken for another answer.
+    // The remainder of this answer must not be mistaken for another answer.
     while !bench.receive(bench.link.times().gap).await.is_empty() {}
     let endian: Endian = bench.profile().endian;
     Dimensions::parse(&first?.payload(), endian)

@@ -1,4 +1,4 @@
-//! Sends and receives the frames of a test, and stores both for the report.
+//! Sends and receives the frames of a test, and stores them for the report.
 
 use crate::master::engine::{Forget, Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, SignalError};
@@ -6,20 +6,20 @@ use crate::master::procedures::control::start_application;
 use crate::master::reports::{BoardSeen, ConformanceOptions, Verdict};
 use ucom::{BoardInfo, Frame, Function, Profile, Sequence, Status};
 
-/// Functions that boards send by themselves and that answer nothing.
+/// Functions that boards send without a request.
 const NOISE: [Function; 3] = [Function::So, Function::Alive, Function::Debug];
 
-/// Limit of stored frames per test.
+/// Largest number of stored frames per test.
 const KEPT: usize = 64;
 
 /// State of the boards before the first test.
 pub(super) struct Found {
     pub boards: Vec<BoardSeen>,
-    /// `true` if a board outside the tests could take a number.
+    /// `true` if a board that is not tested could take a number.
     pub strangers: bool,
 }
 
-/// Conversation of one test.
+/// Exchange of frames during one test.
 pub(super) struct Bench<'a> {
     pub link: &'a Link,
     pub options: &'a ConformanceOptions,
@@ -42,7 +42,7 @@ impl<'a> Bench<'a> {
         (self.sent, self.came)
     }
 
-    /// Sends a frame; discards frames that were received before.
+    /// Sends a frame. Frames received before are discarded.
     pub async fn send(&mut self, function: Function, to: u8, data: &[u8]) {
         let number = Sequence::new(to).unwrap_or(Sequence::ZERO);
         let Some(frame) = Frame::new(function.id(number), data) else { return };
@@ -53,14 +53,14 @@ impl<'a> Bench<'a> {
         self.link.left(serial).await;
     }
 
-    /// Returns all frames of boards within a time, except those that boards send by themselves.
+    /// Returns all frames that boards send within `us` µs, except those that they send without a request.
     pub async fn receive(&mut self, us: u64) -> Vec<Frame> {
         let all = self.hear_all(us).await;
         let answer = |f: &Frame| f.address().is_ok_and(|(function, _)| !NOISE.contains(&function));
         all.into_iter().map(|(_, f)| f).filter(answer).collect()
     }
 
-    /// Like `receive`, for all functions, with the time of each frame.
+    /// Like `receive`, but includes all functions and the time of each frame.
     pub async fn hear_all(&mut self, us: u64) -> Vec<(u64, Frame)> {
         let until = self.link.now() + us;
         let mut all = Vec::new();
@@ -76,7 +76,7 @@ impl<'a> Bench<'a> {
         all
     }
 
-    /// Returns the first frame of a function under a number within a time.
+    /// Returns the first frame with this function and number that arrives within `us` µs.
     pub async fn wait(&mut self, function: Function, from: u8, us: u64) -> Option<Frame> {
         let until = self.link.now() + us;
         while let Some((_, frame)) = self.link.next_raw(until).await {
@@ -95,12 +95,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Returns the numbers of the answer to PC_INFO; `None`: silence.
+    /// Returns the values in the answer to PC_INFO; `None` if the board does not answer.
     pub async fn info(&mut self, board: u8) -> Option<BoardInfo> {
         for _ in 0..3 {
             self.send(Function::Info, board, &[]).await;
             let first = self.wait(Function::DspInfo, board, self.link.times().info).await;
-            // The text of the answer must not be taken for the next answer.
+            // The description that follows must not be mistaken for the next answer.
             self.receive(self.link.times().gap).await;
             if let Some(frame) = first {
                 return BoardInfo::parse(&frame.payload(), self.profile().endian);
@@ -109,7 +109,7 @@ impl<'a> Bench<'a> {
         None
     }
 
-    /// Checks that the status bits of a board match; the pins and autostart are left out.
+    /// Checks that a board has the expected status bits. The bits of the pins and of autostart are ignored.
     pub async fn status_is(&mut self, board: u8, bits: u8, step: &str) -> Result<(), Verdict> {
         let mask = !(Status::IPINIT | Status::OPINIT | Status::ASTART);
         match self.info(board).await {
@@ -130,7 +130,7 @@ impl<'a> Bench<'a> {
         });
     }
 
-    /// Starts the application, without its loop.
+    /// Starts the application, but not its loop.
     pub async fn started(&mut self, board: u8) -> Result<Result<(), Verdict>, Error> {
         match start_application(self.link, board).await {
             Ok(_) => {}
@@ -142,7 +142,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Skips the test if the board has no application.
+/// Skips the test if the board's application cannot start.
 fn skipped_or(e: Error) -> Result<Result<(), Verdict>, Error> {
     match e {
         Error::Exchange(ExchangeError::Device { .. }) | Error::Signal(SignalError::NoApplication { .. }) => {

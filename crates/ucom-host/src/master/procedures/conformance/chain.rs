@@ -50,7 +50,7 @@ pub(super) async fn unnumbered(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, 
             return Ok(Verdict::Fail(format!("{} is answered: {}", function.name(), list(&came))));
         }
     }
-    // Also by broadcast: a board without a number ignores it (D-04, D-06).
+    // The request is also sent by broadcast, which a board without a number ignores (D-04, D-06).
     bench.send(Function::Info, bench.link.broadcast_number().number(), &[]).await;
     let came = bench.receive(150 * MS).await;
     Ok(verdict(came.is_empty(), &came))
@@ -70,7 +70,7 @@ pub(super) async fn wire(bench: &mut Bench<'_>, _: u8) -> Result<Verdict, Error>
         if !pass {
             return Ok(Verdict::Fail(format!("PC_INIT({n}): {}", list(&came))));
         }
-        // No later board is enabled yet.
+        // At this point no later board may take a number.
         if let Some(next) = numbers.get(i + 1) {
             for function in [Function::Init, Function::Info] {
                 bench.send(function, *next, &[]).await;
@@ -133,7 +133,8 @@ pub(super) async fn mirrors(bench: &mut Bench<'_>, board: u8) -> Result<Verdict,
     Ok(Verdict::Pass)
 }
 
-/// Tests the autostart. The numbers must be new, because the reset in this test gives `first.number` to the first board on the wire.
+/// Tests the autostart. In this test the first board on the wire takes the number `board` after a reset. So the chain must have been
+/// renumbered just before: `board` must be the first board.
 pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdict, Error> {
     let Some(first) = bench.found.boards.iter().find(|b| b.number == board) else {
         return Ok(Verdict::Skipped("there is no such board".into()));
@@ -156,7 +157,7 @@ pub(super) async fn autostart(bench: &mut Bench<'_>, board: u8) -> Result<Verdic
     let acknowledged = bench.wait(Function::InitAck, board, bench.link.times().init_ack).await.is_some();
     bench.link.sleep(100 * MS).await;
     bench.send(Function::XReset, board, &[]).await;
-    // The hold-off, and the time that an application needs to start.
+    // Waits for the hold-off and the time that an application needs to start.
     let holdoff = u64::from(bench.profile().autostart_holdoff) * MS;
     let came = bench.receive(holdoff + bench.link.times().start).await;
     let now = bench.info(board).await;

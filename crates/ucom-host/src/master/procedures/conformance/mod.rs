@@ -1,8 +1,8 @@
-//! Acceptance tests of the board side, against real boards: they check that boards follow the protocol page.
+//! Acceptance tests for real boards. They check that boards follow the protocol page.
 //!
-//! By default the tests only ask questions that change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
-//! allows more: a new address assignment, running applications with safe outputs, programming. Each test exchanges a few frames that it
-//! builds itself, so the procedures of this crate do not check themselves.
+//! By default the tests only ask questions, which change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
+//! can allow more: a new address assignment, running applications with safe outputs, programming. Each test exchanges a few frames that it
+//! builds itself, so the procedures of this crate are not used to check themselves.
 
 mod application;
 mod ask;

@@ -43,7 +43,7 @@ pub(crate) async fn conformance(link: Link, options: ConformanceOptions) -> Resu
     Ok(Outcome::Conformance(report))
 }
 
-/// Identifies the boards and checks that the tests may run on them. Changes nothing.
+/// Identifies the boards, and checks that the tests are allowed with them. Changes nothing.
 async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error> {
     let mut boards = Vec::new();
     let asked: Vec<u8> = match options.boards.is_empty() {
@@ -71,7 +71,7 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
             let (wanted, found) = (program.flash_number, seen.info.flash_number);
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
         }
-        // U-2: program data outrank the process data of any running board, even outside the test.
+        // U-2: program data have priority over the process data of every running board, even of boards that are not tested.
         let states = board_states(link).await;
         running.extend(states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b));
         running.sort_unstable();
@@ -90,7 +90,8 @@ async fn look(link: &Link, options: &ConformanceOptions) -> Result<Found, Error>
     Ok(Found { boards, strangers: !all })
 }
 
-/// Returns the number of reports, and `true` if the reports match the numbered boards and each board has its own flash id.
+/// Returns the number of reports. Also returns `true` if the reports match the boards with numbers and each board has a flash id of its
+/// own.
 async fn who_reports(link: &Link, boards: &[BoardSeen]) -> (usize, bool) {
     let mut reports = Reports::default();
     for _ in 0..2 {

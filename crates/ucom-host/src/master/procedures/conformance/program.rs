@@ -7,7 +7,7 @@ use crate::master::reports::{ConformanceProgram, Verdict};
 use ucom::profile::{HeaderForm, Plan};
 use ucom::{BLOCK_LEN, Frame, Function, Header, checksum, data_block};
 
-/// Returns the reason why these tests do not fit the profile.
+/// Returns the reason why these tests cannot run with this profile; `None` if they can.
 fn unfit(bench: &Bench<'_>) -> Option<Verdict> {
     let profile = bench.profile();
     let fits = profile.prog_plan == Plan::VerifyWrite && profile.prog_header == HeaderForm::V1;
@@ -35,7 +35,7 @@ async fn block(bench: &mut Bench<'_>, board: u8, block: &[u8; BLOCK_LEN]) {
     }
 }
 
-/// Returns a board's answer to a block: READY, PROGFINISHED or an error.
+/// Returns a board's answer to a block: DSP_READY, DSP_PROGFINISHED or an error.
 async fn answer(bench: &mut Bench<'_>, us: u64) -> Option<Frame> {
     let until = bench.link.now() + us;
     loop {
@@ -116,7 +116,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     ];
     for (what, code, case) in cases {
         enter_exloader(bench.link, board, flash).await?;
-        // The board must have forgotten the cancelled transfer.
+        // Clears and sets PROG, so that the board drops the previous transfer.
         bench.send(Function::SetStatus, board, &[4, 0]).await;
         bench.send(Function::SetStatus, board, &[4, 4]).await;
         bench.receive(20 * MS).await;
@@ -136,7 +136,7 @@ pub(super) async fn refusals(bench: &mut Bench<'_>, board: u8) -> Result<Verdict
     })
 }
 
-/// Sends one faulty transfer; `good` is a correct header.
+/// Sends one faulty transfer. `good` is a correct header.
 async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, good: Header, case: &Case) {
     let endian = bench.profile().prog_endian;
     match case {
@@ -144,7 +144,7 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
         Case::Pause => {
             bench.send(Function::Prog, board, &[0x43; 8]).await;
             bench.link.sleep(300 * MS).await;
-            // Boards may evaluate the pause only when the next frame comes; frames received during the pause count as well.
+            // A board may notice the pause only when the next frame arrives. Frames received during the pause are also evaluated.
             bench.link.with(|core| core.queue_frame(Some(bench.link.id), next_frame(board), Forget::Nothing));
             bench.link.flush().await;
         }
@@ -162,7 +162,7 @@ async fn wrong(bench: &mut Bench<'_>, board: u8, program: &ConformanceProgram, g
     }
 }
 
-/// Returns a frame with eight more bytes of program data.
+/// Returns a frame with the next eight bytes of program data.
 fn next_frame(board: u8) -> Frame {
     let number = ucom::Sequence::new(board).unwrap_or(ucom::Sequence::ZERO);
     Frame::of(Function::Prog, number, [0x43; 8].into())

@@ -1,4 +1,4 @@
-//! Restores boards as they were found: after the tests, and when the tests end early.
+//! Returns boards to their state before the tests, also if the tests end early.
 use crate::master::engine::{Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, IdentityError, StatusError};
 use crate::master::procedures::conformance::bench::Found;
@@ -9,7 +9,7 @@ use crate::master::procedures::repair::repair;
 use crate::master::reports::{BoardSeen, ConformanceOptions, InitOptions, Outcome};
 use ucom::{Admin, BoardInfo, Status, ToBoard};
 
-/// Renumbers the chain; every board must have its previous number.
+/// Renumbers the chain. Every board must get its previous number.
 pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     // This PC is already the master of the bus.
     let outcome = init(link.clone(), InitOptions { force: true, ..Default::default() }).await?;
@@ -27,8 +27,8 @@ pub(super) async fn renumber(link: &Link, found: &Found) -> Result<(), Error> {
     Ok(())
 }
 
-/// Restores all boards after the tests. Failures are reported in `left` and do not prevent the restoration of other boards. `at` is the
-/// board whose test was ended early.
+/// Restores all boards after the tests. Failures are added to `left`, and the other boards are still restored. `at` is the board whose test
+/// ended early.
 pub(super) async fn put_all_back(
     link: &Link,
     found: &Found,
@@ -54,7 +54,7 @@ pub(super) async fn put_all_back(
     Ok(())
 }
 
-/// Restores one board: ends its loop, then sets ASTART, PROG and its application as they were.
+/// Restores one board: ends its control loop, then restores ASTART, PROG and its application.
 pub(super) async fn put_back(
     link: &Link,
     before: &BoardSeen,
@@ -67,7 +67,7 @@ pub(super) async fn put_back(
     if now.status.has(Status::MSTART) {
         halt(link, n).await?;
     }
-    // The board may be about to start by itself, or PC_START may have been the last command that it received.
+    // The board may start soon: by itself, or because PC_START was the last command that it received.
     let coming = now.status.has(Status::ASTART) || in_work;
     if now.status.has(Status::ASTART) != was.has(Status::ASTART) {
         now = set_status(link, n, Status::ASTART, was & Status::ASTART).await?;
@@ -90,7 +90,7 @@ pub(super) async fn put_back(
         }
         return Ok(());
     }
-    // PROG is cleared first, which discards a transfer in progress.
+    // PROG is cleared first, so that a transfer in progress is dropped.
     set_status(link, n, Status::MSTART | Status::PROG, Status(0)).await?;
     if was.has(Status::PROG) {
         set_status(link, n, Status::PROG, Status::PROG).await?;
@@ -98,8 +98,8 @@ pub(super) async fn put_back(
     Ok(())
 }
 
-/// Checks that the board answers and is the same board. A board that erases its memory is silent for long. A rebooted board has lost its
-/// number.
+/// Checks that the board answers and is the same board as before. A board may be silent for a long time because it erases its memory, or
+/// because it has rebooted and lost its number.
 async fn answering(
     link: &Link,
     before: &BoardSeen,
@@ -112,7 +112,7 @@ async fn answering(
     let now = match wait_status(link, n, Status(0), Status(0), limit, what).await {
         Ok(info) => info,
         Err(Error::Exchange(ExchangeError::NoAnswer { .. })) => {
-            // The board may run nevertheless.
+            // The board may still be running.
             halt(link, n).await?;
             repair(link, n, before.info.flash_number).await?.info
         }
@@ -133,7 +133,7 @@ async fn answering(
     }
 }
 
-/// Ends the loop; sends the stop three times, because one frame can be lost.
+/// Ends the control loop. Sends the stop three times, because a frame can be lost.
 async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     let to = link.board(board)?;
     for _ in 0..3 {
@@ -143,7 +143,7 @@ async fn halt(link: &Link, board: u8) -> Result<(), Error> {
     Ok(())
 }
 
-/// Waits for an application that should not be up but may be starting.
+/// If the application should not run but may be starting, waits until it has started.
 async fn coming_up(link: &Link, board: u8, now: BoardInfo, was: Status) -> Result<BoardInfo, Error> {
     if now.status.has(Status::MSTART) || was.has(Status::MSTART) || !now.has_application() {
         return Ok(now);

@@ -8,7 +8,7 @@ use crate::master::procedures::exchange::set_status;
 use crate::master::reports::{ConformanceOptions, ConformanceReport, ConformanceTest, Verdict};
 use ucom::Status;
 
-/// Test and its board; `None`: the whole chain.
+/// A test and its board; `None` for the whole chain.
 type Planned = (&'static Test, Option<u8>);
 
 /// State of the running tests.
@@ -18,7 +18,7 @@ pub(super) struct Runner<'a> {
     /// State to restore.
     found: &'a Found,
     pub report: ConformanceReport,
-    /// `true` if boards may be without their numbers.
+    /// `true` if boards may have lost their numbers.
     pub unnumbered: bool,
     /// Board of the running test.
     pub at: Option<u8>,
@@ -48,7 +48,7 @@ impl<'a> Runner<'a> {
         let boards = self.found.boards.iter().map(|b| b.number);
         match test.scope {
             Scope::Chain | Scope::Numbers => vec![None],
-            // The missing permission is reported once.
+            // Without the permission, the test is listed once and not for each board.
             _ if test.level == Level::Init && !self.options.init => vec![None],
             Scope::First => boards.min().into_iter().map(Some).collect(),
             Scope::Board | Scope::Programmed => boards.map(Some).collect(),
@@ -60,7 +60,7 @@ impl<'a> Runner<'a> {
         programmed.is_none_or(|program| Some(program.board) == board)
     }
 
-    /// Runs every allowed test; the others are skipped with their reason.
+    /// Runs every allowed test. Other tests are skipped, with the reason.
     pub async fn all(&mut self) -> Result<(), Error> {
         let planned = self.planned();
         for (i, (test, board)) in planned.iter().copied().enumerate() {
@@ -119,7 +119,7 @@ impl<'a> Runner<'a> {
     /// Gives every board its number again.
     async fn numbered(&mut self) -> Result<(), Error> {
         if self.unnumbered {
-            // The flag stays set until all boards have their numbers.
+            // The flag `unnumbered` stays set until all boards have their numbers.
             renumber(self.link, self.found).await?;
             self.unnumbered = false;
         }

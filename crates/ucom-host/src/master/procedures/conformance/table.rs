@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::Bench;
 use crate::master::procedures::conformance::{application, ask, chain, program};
 use crate::master::reports::{ConformanceOptions, Verdict};
 
-/// Effect of a test on boards, which decides the permission that it needs.
+/// Effect of a test on boards. It determines which permission the test needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     /// The test changes nothing.
@@ -20,7 +20,7 @@ pub(super) enum Level {
 }
 
 impl Level {
-    /// Returns the option that the test needs; `None`: the test is allowed.
+    /// Returns the option that the test needs; `None` if the test is already allowed.
     pub(super) fn needs(self, options: &ConformanceOptions) -> Option<&'static str> {
         match self {
             Self::Init if !options.init => Some("--init"),
@@ -36,17 +36,17 @@ impl Level {
 pub(super) enum Scope {
     /// The whole chain.
     Chain,
-    /// Like `Chain`; boards may be without their numbers before and after the test.
+    /// The whole chain. Boards may be without their numbers before and after the test.
     Numbers,
     /// Each board.
     Board,
-    /// The board with the first number; boards may be without their numbers afterwards.
+    /// The board with the first number. Boards may be without their numbers afterwards.
     First,
     /// The board to be programmed.
     Programmed,
 }
 
-/// Exchange of a test with a board; for a test of the whole chain the number has no meaning.
+/// Function that exchanges frames with a board. For a test of the whole chain the board number is not used.
 pub(super) type Talk =
     for<'a> fn(&'a mut Bench<'_>, u8) -> Pin<Box<dyn Future<Output = Result<Verdict, Error>> + Send + 'a>>;
 
@@ -54,7 +54,7 @@ pub(super) type Talk =
 pub(super) enum Run {
     /// An exchange with a board.
     Talk(Talk),
-    /// The test cannot run here; the reason.
+    /// The test cannot be run here, for this reason.
     Elsewhere(&'static str),
 }
 
@@ -63,13 +63,13 @@ pub(super) struct Test {
     pub id: &'static str,
     pub level: Level,
     pub scope: Scope,
-    /// Expectation of the test, in words.
+    /// Expected behaviour, in words.
     pub expects: &'static str,
     pub run: Run,
 }
 
 impl Test {
-    /// Returns `true` if both tests run with one board before the next board's turn.
+    /// Returns `true` if a board runs both tests before the next board runs them.
     pub(super) fn goes_with(&self, next: &Self) -> bool {
         let board = |test: &Self| matches!(test.scope, Scope::Board | Scope::Programmed);
         board(self) && board(next) && (self.level == next.level || next.level == Level::Program)
@@ -82,7 +82,7 @@ macro_rules! talk {
     };
 }
 
-/// All tests in the order of execution. The numbers are those of the acceptance tests.
+/// All tests in the order of execution. Their numbers are those of the acceptance tests.
 #[rustfmt::skip]
 pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),

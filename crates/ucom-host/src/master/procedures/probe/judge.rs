@@ -1,4 +1,5 @@
-//! Derives a profile from the received frames. Decisive observations are reported; other keys keep their values.
+//! Derives a profile from the received frames. If an observation decides the value of a key, the value is reported; other keys keep their
+//! values.
 
 use crate::master::counted::counted;
 use crate::master::reports::{ProbeReport, ProbeRow};
@@ -7,17 +8,17 @@ use std::sync::Arc;
 use ucom::profile::{AliveMode, Broadcast, Endian, KEYS, ReportMode};
 use ucom::{Checksum, Payload, Profile, Report, Sequence, Status, checksum};
 
-/// Answers of one board to PC_INFO, frame by frame.
+/// Answers of one board to PC_INFO. Each answer is a list of frames.
 pub(super) type Answers = Vec<Vec<Payload>>;
 
-/// Received frames and answers.
+/// The received frames and answers.
 #[derive(Debug, Default)]
 pub(super) struct Seen {
     pub before: Profile,
     pub image: Option<Arc<[u8]>>,
     pub reports: Vec<Report>,
     pub raised: Option<bool>,
-    /// Boards that answered PC_INFO to 0 and to 31.
+    /// Number of boards that answered a PC_INFO to number 0, and to number 31.
     pub broadcast: [usize; 2],
     /// `true` if a board has number 0.
     pub zero_answers: bool,
@@ -39,13 +40,13 @@ impl Seen {
         self.infos.iter().filter(|(_, a)| started(a)).filter_map(|(n, _)| Sequence::new(*n)).collect()
     }
 
-    /// Returns the first frames of the answers: the numbers.
+    /// Returns the first frames of the answers.
     fn heads(&self) -> impl Iterator<Item = [u8; 8]> + '_ {
         let first = |a: &Vec<Payload>| a.first().filter(|p| p.len() == 8).map(Payload::padded);
         self.infos.values().flatten().filter_map(first)
     }
 
-    /// Returns the headers of strings with the packages that followed: count bytes, number of packages.
+    /// Returns the headers of strings: the two count bytes, and the number of packages that followed.
     fn headers(&self) -> Vec<([u8; 2], usize)> {
         let header = |frames: &Vec<Payload>| match frames.as_slice() {
             [_, header, rest @ ..] => match header.bytes() {
@@ -64,7 +65,7 @@ struct Rows {
 }
 
 impl Rows {
-    /// Adds a row; `value`: the measured value.
+    /// Adds a row to the table. `value` is the measured value, if there is one.
     fn add(
         &mut self,
         key: &'static str,
@@ -79,12 +80,12 @@ impl Rows {
     }
 }
 
-/// Returns the status byte of the first frame of DSP_INFO. Its place does not depend on the profile.
+/// Returns the status byte of a first frame of DSP_INFO. Its position does not depend on the profile.
 pub(super) fn status_of(payload: &Payload) -> Option<Status> {
     payload.bytes().get(3).filter(|_| payload.len() >= 8).map(|byte| Status(*byte))
 }
 
-/// Returns the profile and the table.
+/// Returns the report with the derived profile and the table.
 pub(super) fn judge(seen: &Seen) -> ProbeReport {
     let mut rows = Rows { rows: Vec::new(), profile: seen.before };
     reports(&mut rows, seen);
@@ -131,7 +132,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
     let broadcast = match (zero, top) {
         (1.., _) => Some(Broadcast::Zero),
         (0, 1..) => Some(Broadcast::ThirtyOne),
-        // Silence has a meaning only if some boards could have answered.
+        // Silence means something only if there are boards that could have answered.
         (0, 0) if !seen.infos.is_empty() => Some(Broadcast::None),
         _ => None,
     };
@@ -140,7 +141,7 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
         seen.infos.len()
     );
     let value = broadcast.map(|b| b.to_string());
-    // Before the first number: 0 cannot be both.
+    // Decided after the broadcast number, because 0 cannot be both the broadcast number and the number of the first board.
     let first = if seen.zero_answers {
         Some("0")
     } else {
@@ -155,7 +156,8 @@ fn numbers(rows: &mut Rows, seen: &Seen) {
 
 fn strings(rows: &mut Rows, seen: &Seen) {
     let headers = seen.headers();
-    // Headers that a reading (byte order, count with or without header) fits. The best reading must fit more than any other.
+    // Number of headers that match an interpretation: byte order, and count with or without the header. The best interpretation must match
+    // more headers than any other.
     let fits = |endian: Endian, inclusive: bool| {
         let fit = |(count, packages): &&([u8; 2], usize)| {
             usize::from(endian.word(*count)) == packages + usize::from(inclusive) && (count[0] != count[1])
@@ -254,7 +256,7 @@ fn programs(rows: &mut Rows, seen: &Seen) {
     }
 }
 
-/// Decides which heartbeats keep a control loop running: broadcast heartbeats, or those to its number.
+/// Decides which heartbeats keep a control loop running: broadcast heartbeats, or heartbeats to the board's own number.
 pub(super) fn alive(report: &mut ProbeReport, [broadcast, unicast]: [bool; 2]) {
     let mut rows = Rows { rows: core::mem::take(&mut report.rows), profile: report.profile };
     let mode = match (broadcast, unicast) {

@@ -1,4 +1,4 @@
-//! Questions of a probe. Answers are kept as raw payloads, because the probe measures their interpretation.
+//! Questions of a probe. The answers are stored as raw payloads, because their interpretation is being measured.
 
 use crate::master::engine::{Core, Link, MS, Times};
 use crate::master::error::{Error, MasterError, RunningError};
@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use ucom::profile::AliveMode;
 use ucom::{Admin, Frame, FromBoard, Function, Payload, Profile, Sequence, Status, ToBoard};
 
-/// Number of questions to each board, because one lost frame must not decide.
+/// Number of questions to each board. There are several, so that one lost frame does not decide the result.
 const ROUNDS: usize = 3;
 
-/// Returns the findings of a probe, or the error that ended it. At any end the session keeps its profile, and no board stays started or
-/// running that was not so before.
+/// Returns the findings of a probe, or the error that ended it. In both cases the session keeps its profile, and every board that the probe
+/// started is stopped again.
 pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, Error> {
     let (before, mut begun) = (link.profile(), None);
     let result = link.or_cancel(measure(&link, &options, &mut begun)).await;
@@ -35,7 +35,7 @@ pub(crate) async fn probe(link: Link, options: ProbeOptions) -> Result<Outcome, 
     result.map(Outcome::Probe)
 }
 
-/// Refuses steps that end control loops, or withhold heartbeats from them, while loops run.
+/// While control loops run, refuses steps that end control loops or keep heartbeats from them.
 fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     let running = |core: &mut Core| {
         let running = core.boards.iter().filter(|(_, board)| board.is_known() && board.running(core.now));
@@ -48,14 +48,14 @@ fn no_loop_runs(link: &Link, options: &ProbeOptions) -> Result<(), Error> {
     }
 }
 
-/// Collects the observations. Boards that this step starts, and the level of their stop at the end, go to `begun`.
+/// Collects the observations. If a board is started, the board and the level of the stop that undoes this are stored in `begun`.
 async fn measure(
     link: &Link,
     options: &ProbeOptions,
     begun: &mut Option<(u8, StopLevel)>,
 ) -> Result<ProbeReport, Error> {
     let mut seen = Seen { before: link.profile(), image: options.image.clone(), ..Default::default() };
-    // All frames must be received raw, so no frame may be refused for its length.
+    // All frames must be received in raw form, so no frame may be refused because of its length.
     use_profile(link, Profile { dlc_strict: false, ..seen.before });
     seen.reports = all_reports(link).await;
     let mut numbered = None;
@@ -63,7 +63,7 @@ async fn measure(
         no_loop_runs(link, options)?;
         link.become_master(options.force).await?;
         seen.raised = pin_raised(link).await?;
-        // The whole chain. Values that the base profile reads wrong are judged below.
+        // The whole chain gets numbers. Values that are read wrong with the present profile are corrected below.
         let whole = InitOptions { force: options.force, ..Default::default() };
         link.bear_shared_numbers(true);
         if let Outcome::Init(report) = init(link.clone(), whole).await? {
@@ -118,7 +118,7 @@ fn use_profile(link: &Link, profile: Profile) {
     });
 }
 
-/// Collects the raw reports of all boards over several requests, because a board may be booting, or a frame may be lost.
+/// Collects the raw reports of all boards. Requests them several times, because a board may be booting and a frame may be lost.
 async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     let mut reports = Vec::new();
     for _ in 0..ROUNDS {
@@ -137,8 +137,8 @@ async fn all_reports(link: &Link) -> Vec<ucom::Report> {
     reports
 }
 
-/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status shows OPINIT at once; `None`: no board took the
-/// number.
+/// Sends PC_RESET, then PC_INIT to the first board. Returns `true` if the board's status then already shows OPINIT; `None` if no board took
+/// the number.
 async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     link.listen(0, &REPORTS);
     link.ask(link.broadcast_number(), ToBoard::Reset).await;
@@ -156,7 +156,7 @@ async fn pin_raised(link: &Link) -> Result<Option<bool>, Error> {
     Ok(status.map(|status| status.has(Status::OPINIT)))
 }
 
-/// Sends PC_INFO with `padding` bytes to some numbers; returns the frames of each answer until 100 ms of silence.
+/// Sends PC_INFO with `padding` additional bytes to some numbers. Returns the frames of each answer, which ends after 100 ms of silence.
 async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8, Vec<Payload>> {
     link.listen(u32::MAX, &[Function::DspInfo]);
     let mut answers: BTreeMap<u8, Vec<Payload>> = BTreeMap::new();
@@ -166,7 +166,7 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
         if let Some(frame) = Frame::new(Function::Info.id(*number), data) {
             link.send_frame(frame).await;
         }
-        // The answers of many boards must not come as one burst.
+        // The pause keeps the answers of many boards from arriving as one burst.
         link.sleep(2 * MS).await;
     }
     let (times, limit) = (link.times(), link.now() + 5_000 * MS);
@@ -182,7 +182,7 @@ async fn raw_infos(link: &Link, to: &[Sequence], padding: usize) -> BTreeMap<u8,
     answers
 }
 
-/// Returns the offsets of the packages that answer MCA_DUMP_CI, as the profile in use reads them.
+/// Returns the offsets of the packages that answer MCA_DUMP_CI, interpreted with the profile in use.
 async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     link.listen(1 << board.number(), &[Function::DspCi]);
     link.ask(board, ToBoard::DumpCi).await;
@@ -199,7 +199,7 @@ async fn initial_offsets(link: &Link, board: Sequence) -> Vec<u16> {
     offsets
 }
 
-/// Checks whether a control loop keeps running with broadcast heartbeats only, and with unicast heartbeats only.
+/// Checks whether a control loop continues with only broadcast heartbeats, and with only unicast heartbeats.
 async fn alive_form(link: &Link, board: u8) -> Result<[bool; 2], Error> {
     start_application(link, board).await?;
     let mut held = [false; 2];

@@ -1,4 +1,4 @@
-//! Update of one board: attempts, each from the exloader to the read-back (U-4 to U-10).
+//! Update of one board. Each attempt begins in the exloader and ends with the read-back (U-4 to U-10).
 use crate::master::engine::{Event, Link};
 use crate::master::error::{Error, IdentityError, StatusError};
 use crate::master::procedures::control::{enter_exloader, start_application};
@@ -18,7 +18,7 @@ pub(super) async fn shows(link: &Link, board: u8, plan: &UpdatePlan) -> bool {
     confirmed(link, board).await.is_ok_and(|seen| has(&seen.info, plan))
 }
 
-/// Updates one board, from attempt number `first` on.
+/// Updates one board. The first attempt has the number `first`.
 pub(super) async fn one(
     link: &Link,
     session: &mut UpdateSession,
@@ -40,7 +40,7 @@ pub(super) async fn one(
         }
         match again {
             None => break,
-            // After an overrun the board needs more time between frames.
+            // After an overrun the pause between frames is made longer.
             Some(Broken::Device { code: ErrorCode::Overrun | ErrorCode::CanOverrun, .. }) => {
                 gap_us = (gap_us * 2).max(500);
             }
@@ -54,15 +54,15 @@ pub(super) async fn one(
     Ok(())
 }
 
-/// Takes the board that was checked into its exloader with programming enabled.
+/// Brings a board that has been checked into its exloader with programming enabled.
 ///
-/// Reads the board before each XRESET, because another board may have taken its place since the check or the previous attempt.
+/// Reads the board before each XRESET, because another board may have its number since the check or the previous attempt.
 pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Result<(), Error> {
     let flash_number = session.flash_number(board);
     if let (Some(wanted), Ok(seen)) = (flash_number, numbers(link, board).await)
         && seen.flash_number != wanted
     {
-        // A single damaged answer does not count as another board.
+        // A single damaged answer must not be mistaken for another board.
         let found = confirmed(link, board).await?.info.flash_number;
         if found != wanted {
             return Err(IdentityError::WrongBoard { board, wanted, found }.into());
@@ -74,7 +74,7 @@ pub(super) async fn enter(link: &Link, session: &UpdateSession, board: u8) -> Re
     }
     let entered = enter_exloader(link, board, flash_number).await;
     if entered.is_err() {
-        // A board that took the XRESET must not take the program data for another board.
+        // If the board has executed the XRESET, it must not accept program data for another board.
         leave_programming(link, board).await;
     }
     entered.map(drop)
@@ -86,7 +86,7 @@ async fn leave_programming(link: &Link, board: u8) {
     }
 }
 
-/// Makes one attempt with one board; returns `Some` if another attempt may succeed (the result shows the failure).
+/// Makes one attempt with one board. Returns `Some` if another attempt may succeed; the result of the board contains the failure.
 async fn attempt(
     link: &Link,
     session: &mut UpdateSession,
@@ -107,7 +107,7 @@ async fn attempt(
     judge(link, session, board, plan, number, broken.first().map(|(_, b)| *b)).await
 }
 
-/// Judges the result by a read-back, or by the early end.
+/// Determines the result from a read-back, or from the reason why the attempt ended early.
 pub(super) async fn judge(
     link: &Link,
     session: &mut UpdateSession,
@@ -123,7 +123,7 @@ pub(super) async fn judge(
             return None;
         }
         Some(Broken::NoFinish { .. }) if shows(link, board, plan).await => {
-            // U-9: only DSP_PROGFINISHED was lost.
+            // U-9: only the frame DSP_PROGFINISHED was lost.
             verify(link, session, board, plan).await;
             return None;
         }
@@ -138,29 +138,29 @@ pub(super) async fn judge(
             UpdateFailure::Device { code, cycle, block, attempts, erased }
         }
     };
-    // The board must not take the following frames as the remainder of this transfer. The command is sent while the board still counts as
-    // in progress, so a cancel at this moment sends the command, too.
+    // The board must not use the next program data as the remainder of this transfer. The command is sent while the board is still listed
+    // as in progress, so a cancel at this moment also sends it.
     leave_programming(link, board).await;
-    // Another board that has taken the number meanwhile reports errors about program data, or takes them in the wrong order.
+    // If another board has taken the number meanwhile, it reports errors about program data, or receives them in the wrong order.
     if let Err(error) = one_board_each(link, &[board]).await {
         session.fail_with(board, error.into());
         return None;
     }
     session.fail(board, failure);
-    // U-7: the image or the board is wrong, and another attempt would fail in the same way.
+    // U-7: the image or the board is wrong, so another attempt would fail in the same way.
     let hopeless = |code| matches!(code, ErrorCode::MemProtected | ErrorCode::Data);
     broken.filter(|b| !matches!(b, Broken::Device { code, .. } if hopeless(*code)))
 }
 
-/// U-10: checks that the board shows the new program; then starts it if requested.
+/// U-10: checks that the board shows the new program. Then starts it if the options require it.
 pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) {
     session.reach(board, Stage::Written);
     let known = match confirmed(link, board).await {
         Ok(seen) => seen.info,
-        // The board reported that it is done; only the read-back failed.
+        // The board reported that it is done. Only the read-back failed.
         Err(e) => return session.fail_with(board, e),
     };
-    // A board that shares the number was also written, or it gave the last answer.
+    // If another board shares the number, it was also written, or it may have given the last answer.
     if let Err(error) = one_board_each(link, &[board]).await {
         return session.fail_with(board, error.into());
     }
@@ -180,7 +180,7 @@ pub(super) async fn verify(link: &Link, session: &mut UpdateSession, board: u8, 
             let failure = UpdateFailure::NotVerified { program_id, date, wanted_id, wanted_date };
             return session.fail(board, failure);
         }
-        // The expected program is not known. The board must at least show an application, and its exloader must run.
+        // The expected program is not known. The board must at least show an application, and must be in its exloader.
         None if known.has_application() && status.has(Status::EXLRUN) => UpdateOutcome::Written,
         None => return session.fail(board, UpdateFailure::NotValid { program_id, date, status }),
     };

@@ -1,4 +1,5 @@
-//! Update of several boards at once by broadcast PC_PROG. Every board with PROG = 1 takes it, so all other boards must have PROG = 0.
+//! Update of several boards at once by broadcast PC_PROG. Every board with PROG = 1 accepts the data, so all other boards must have PROG =
+//! 0.
 use crate::master::engine::{Link, MS};
 use crate::master::error::Error;
 use crate::master::procedures::exchange::TRIES;
@@ -10,9 +11,9 @@ use crate::master::procedures::update::transfer::{Attempt, Broken, Transferred};
 use crate::master::reports::update::UpdatePlan;
 use ucom::{Sequence, Status, ToBoard};
 
-/// Updates all open boards at once by broadcast. Boards that drop out of the group get attempts of their own.
+/// Updates all boards that are not done yet at once by broadcast. A board that drops out of the group gets further attempts on its own.
 ///
-/// If the broadcast could reach a wrong board, the boards stay open and are updated one by one.
+/// If the broadcast could reach a wrong board, nothing is sent and the boards are updated one by one.
 pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     let Some(broadcast) = link.profile().broadcast_number() else {
         link.note("no number reaches all boards (`addr.broadcast` is none): one by one".into());
@@ -28,7 +29,7 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     let (boards, stray) = gather(link, session, &selected).await;
     if stray {
         link.note("a board that does not answer may listen: no broadcast, the others one by one".into());
-        // The boards in their exloaders stay in progress: a cancel takes them out of programming mode.
+        // The boards that are in their exloaders stay listed as in progress, so a cancel ends their programming mode.
         return Ok(());
     }
     for board in &boards {
@@ -65,8 +66,9 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks whether a board whose READY was lost has continued with the others and is done; then verifies it. Otherwise stores its answer
-/// about the flash in the session. If a board had this program before, its answer proves nothing.
+/// Checks whether a board whose READY was lost has continued with the others and is done; if so, verifies it. Otherwise stores in the
+/// session what the board's answer shows about its flash. If the board already had this program before, its answer does not show whether it
+/// is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));
@@ -83,9 +85,9 @@ async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, 
     false
 }
 
-/// Takes every number that is not selected out of programming mode, and reads that back.
+/// Ends the programming mode of every number that is not selected, and reads the status back.
 ///
-/// A number that does not answer has received the command three times as well. Boards without a number ignore PC_PROG.
+/// Even numbers that do not answer are sent the command three times. Boards without a number ignore PC_PROG.
 async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     let others: Vec<Sequence> =
         link.profile().board_numbers().filter(|n| !selected.contains(&n.number())).collect();
@@ -97,15 +99,15 @@ async fn silence_others(link: &Link, selected: &[u8]) -> Result<(), Error> {
     }
     for (board, status) in statuses(link, &others).await {
         if status?.has(Status::PROG) {
-            // Three more attempts, each read back; then the update is refused.
+            // This makes three more attempts and reads the status back each time. If they fail, the update is refused.
             set_status(link, board, Status::PROG, Status(0)).await?;
         }
     }
     Ok(())
 }
 
-/// Takes the selected boards into their exloaders. Returns `true` if a board failed and did not confirm that it left programming mode
-/// either: frames to the group would erase it unnoticed.
+/// Brings the selected boards into their exloaders. Returns `true` if a board failed and did not confirm that its programming mode has
+/// ended. Frames to the group would then erase that board unnoticed.
 async fn gather(link: &Link, session: &mut UpdateSession, selected: &[u8]) -> (Vec<u8>, bool) {
     let (mut boards, mut stray) = (Vec::new(), false);
     for board in selected {

@@ -1,4 +1,5 @@
-//! Firmware update: the image is sent twice in blocks of 64 bytes, first checked, then written, and read back at the end (D-40 to D-46).
+//! Firmware update. The image is sent twice in blocks of 64 bytes: first it is checked, then written. At the end it is read back (D-40 to
+//! D-46).
 
 mod board;
 mod group;

@@ -1,4 +1,4 @@
-//! Sequence of an update: checks U-1 to U-3, then boards one by one or as a group; cleans up after an early end.
+//! Sequence of an update: checks U-1 to U-3, then the boards one by one or as a group. Cleans up if the update ends early.
 
 use crate::master::engine::Link;
 use crate::master::error::{Error, IdentityError, MasterError, RunningError, TargetError};
@@ -43,12 +43,12 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     }
     match end {
         Ok(()) => {}
-        // After a second cancel the remaining clean-up is skipped.
+        // After a second cancel the rest of the clean-up is skipped.
         Err(Error::Master(MasterError::Cancelled)) => {
             session.unfinished().into_iter().for_each(|board| session.cancel(board));
             session.cancel_starts();
         }
-        // No frame can be sent any more, but the known state of the boards is still reported.
+        // Frames can no longer be sent, but the known state of the boards is still reported.
         Err(error @ Error::Master(MasterError::Bus { .. })) => {
             let waiting = core::mem::take(&mut session.to_start);
             for board in session.unfinished().into_iter().chain(waiting) {
@@ -70,16 +70,16 @@ pub(crate) async fn update(link: Link, options: UpdateOptions) -> Result<Outcome
     Ok(Outcome::Update(report))
 }
 
-/// Commands the boards in progress to forget the transfer; a partly written image is never valid. `why`: the user cancelled, or two
-/// boards have one number.
+/// Commands the boards in progress to drop the transfer. A partly written image is never valid. `why` is a cancel by the user, or the error
+/// that two boards have the same number.
 async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Result<(), Error> {
     for board in session.active.clone() {
-        // The board may have taken PC_START already: the update stops boards that it has started.
+        // The board may have received PC_START already. The update stops boards that it has started.
         if session.starting == Some(board) && set_status(link, board, Status::MSTART, Status(0)).await.is_ok()
         {
             session.starting = None;
         }
-        // Best effort: if the board does not take the command now, its own timeout and the next XRESET end the mode.
+        // If the board does not execute this command, its own timeout and the next XRESET end the programming mode.
         if set_status(link, board, Status::PROG, Status(0)).await.is_err() {
             link.note(format!("board {board} did not confirm that it left programming"));
         }
@@ -101,8 +101,8 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
     Ok(())
 }
 
-/// Ends programming mode of boards that already show the program. A board may still be in that mode after its update tool was killed, and
-/// would then take program data for other boards.
+/// Ends the programming mode of boards that already show the program. A board may still be in that mode because an earlier update tool was
+/// killed. It would then accept program data for other boards.
 async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.programming.first().copied() {
         let ended = match link.become_master(session.options.force).await {
@@ -120,8 +120,8 @@ async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(),
     Ok(())
 }
 
-/// Takes boards that were found in programming mode out of it when the update ends early, if this PC already is the master. Otherwise
-/// names them, because nothing may be sent to them (D-08).
+/// The update ends early. If this PC is already the master, ends the programming mode of boards that were found in it. Otherwise nothing
+/// may be sent to them (D-08), so they are reported.
 async fn still_programming(link: &Link, session: &mut UpdateSession, why: &Error) {
     while let Some(board) = session.programming.first().copied() {
         let ended = link.is_master() && set_status(link, board, Status::PROG, Status(0)).await.is_ok();
@@ -153,7 +153,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         link.become_master(session.options.force).await?;
         return start_rest(link, session).await;
     }
-    // D-10: the numbers in the header would have their bytes swapped.
+    // D-10: with the wrong byte order, the bytes of the numbers in the header would be swapped.
     let flash_numbers: Vec<u16> = session.results.iter().filter_map(|result| result.flash_number).collect();
     if !session.options.force
         && let Err(error) = right_order(link, &flash_numbers).await
@@ -161,14 +161,14 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
         session.refuse(&error.into());
         return Ok(());
     }
-    // U-2: program data outrank the process data of a running board.
+    // U-2: program data have priority over the process data of running boards.
     let states = board_states(link).await;
     let running: Vec<u8> = states.iter().filter(|(_, s)| s.has(Status::MCARUN)).map(|(b, _)| *b).collect();
     if !running.is_empty() && !session.options.force {
         session.refuse(&Error::Running(RunningError::Running { boards: running }));
         return Ok(());
     }
-    // D-08, also in a dry run: its report must show what an update would do.
+    // D-08: this is also checked in a dry run, because its report must show the result of a real update.
     if let Err(error) = link.look_for_master(session.options.force).await {
         session.refuse(&error);
         return Ok(());
@@ -194,7 +194,7 @@ async fn all(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
 /// Starts the boards that already showed the program.
 async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.to_start.first().copied() {
-        // PC_INFO has shown the program.
+        // PC_INFO has already shown the program.
         session.reach(board, Stage::Verified);
         session.begin(board);
         session.to_start.retain(|b| *b != board);
@@ -206,9 +206,9 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
     Ok(())
 }
 
-/// Returns the outcome of a board that needs no transfer (U-3 and D-62); `None`: the board is written.
+/// Returns the outcome of a board that needs no transfer (U-3 and D-62); `None` if the board must be written.
 ///
-/// PC_INFO shows Program ID and date of program memory. The answer covers neither the load address nor any other image.
+/// PC_INFO shows only the Program ID and date of program memory. It shows neither the load address nor a second image.
 fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
     let options = &session.options;
     let expected = session.plan(link, None).ok()?.expected?;
@@ -225,12 +225,12 @@ fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<Up
     if other_date && !options.any_date {
         return None;
     }
-    // If the board's answer differs from that after the update, it has had another program since.
+    // If the board's answer differs from its answer after the recorded update, it has had another program since.
     let holds = record.is_some_and(|r| (r.program_id, r.date) == (known.program_id, known.date));
     Some(if holds { UpdateOutcome::UpToDate } else { UpdateOutcome::ProgramUpToDate })
 }
 
-/// Checks U-1 and U-3 with questions only.
+/// Checks U-1 and U-3. Sends only questions.
 async fn check(link: &Link, session: &mut UpdateSession) {
     for target in session.options.targets.clone() {
         let board = target.board;
@@ -264,7 +264,7 @@ async fn check(link: &Link, session: &mut UpdateSession) {
             if known.status.has(Status::PROG) && !session.options.dry_run {
                 session.programming.push(board);
             }
-            // An unproven program is started only if the user accepts it.
+            // A program without a valid flash record is started only if the user accepts this.
             let trusted = proven || session.options.accept_unverified;
             if session.options.start && trusted && !session.options.dry_run {
                 session.to_start.push(board);

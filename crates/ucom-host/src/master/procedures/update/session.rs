@@ -1,4 +1,4 @@
-//! The update session: the state of all boards of an update, which survives a cancel and a bus that fails.
+//! State of all boards of an update. It is kept if the update is cancelled or the bus fails.
 
 use crate::master::engine::Link;
 use crate::master::error::Error;
@@ -7,17 +7,17 @@ use host_kit::{Diagnose, ErrorKind};
 use std::collections::BTreeMap;
 use ucom::{BoardInfo, Header};
 
-/// Extent of the change to a board's memory. The stage only grows, except in [`UpdateSession::proved_untouched`].
+/// How much of a board's memory has changed. The stage only increases, except in [`UpdateSession::proved_untouched`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
-    /// Unchanged.
+    /// The memory is unchanged.
     #[default]
     Untouched,
-    /// Frames that erase were sent while the board may have listened.
+    /// Frames that erase the memory were sent, and the board may have received them.
     MaybeErased,
     /// The board was commanded to erase.
     Erased,
-    /// The board reported that it is done.
+    /// The board reported that the program is written.
     Written,
     /// PC_INFO showed the program.
     Verified,
@@ -27,11 +27,11 @@ pub(super) enum Stage {
 pub(super) struct UpdateSession {
     pub options: UpdateOptions,
     pub results: Vec<UpdateResult>,
-    /// Boards between XRESET and the end of their update.
+    /// Boards that have got an XRESET and whose update has not ended.
     pub active: Vec<u8>,
     /// The board that is commanded to start its application.
     pub starting: Option<u8>,
-    /// Boards that already show the program and will be started.
+    /// Boards that already show the program and will be started at the end.
     pub to_start: Vec<u8>,
     /// Boards that already show the program and are in programming mode.
     pub programming: Vec<u8>,
@@ -49,7 +49,7 @@ impl UpdateSession {
         self.results.iter_mut().find(|r| r.board == board)
     }
 
-    /// Marks the board as in progress, together with others of its group.
+    /// Marks the board as in progress. Other boards of its group may be in progress as well.
     pub fn begin(&mut self, board: u8) {
         if !self.active.contains(&board) {
             self.active.push(board);
@@ -60,7 +60,7 @@ impl UpdateSession {
         self.stages.get(&board).copied().unwrap_or_default()
     }
 
-    /// Returns `true` if the old application is erased, or may be, completely or partly.
+    /// Returns `true` if the old application is, or may be, completely or partly erased.
     pub fn may_be_erased(&self, board: u8) -> bool {
         self.stage(board) > Stage::Untouched
     }
@@ -70,14 +70,14 @@ impl UpdateSession {
         *known = stage.max(*known);
     }
 
-    /// Records that PC_INFO shows the state before the update: the frames that might have erased the board did not do so.
+    /// Records that PC_INFO shows the same state as before the update, so the frames that might have erased the board did not do so.
     pub fn proved_untouched(&mut self, board: u8) {
         if self.stage(board) == Stage::MaybeErased {
             self.stages.remove(&board);
         }
     }
 
-    /// Records that the board shows the program and that this tool wrote it there.
+    /// Records that the board shows the program and that this tool has written it.
     pub fn prove(&mut self, board: u8) {
         if let Some(result) = self.result(board) {
             result.verified = true;
@@ -96,7 +96,7 @@ impl UpdateSession {
         }
     }
 
-    /// Records a failure. The board's outcome is the change of its memory so far.
+    /// Records a failure. The outcome is derived from the change of the board's memory so far.
     pub fn fail(&mut self, board: u8, failure: UpdateFailure) {
         let outcome = match self.stage(board) {
             Stage::Untouched if matches!(failure, UpdateFailure::Cancelled { .. }) => {
@@ -112,7 +112,7 @@ impl UpdateSession {
         self.end(board, outcome, Some(failure));
     }
 
-    /// Records an error of a step, named by the state that it left.
+    /// Records an error of a step. The kind of failure depends on the state of the board's memory.
     pub fn fail_with(&mut self, board: u8, error: Error) {
         let (kind, error) = (error.kind(), Box::new(error));
         let failure = match self.stage(board) {
@@ -127,7 +127,7 @@ impl UpdateSession {
         self.fail(board, failure);
     }
 
-    /// Records a cancel by the user. A board that was commanded to start, and is not known to be stopped, may run.
+    /// Records a cancel by the user. If the board was commanded to start and is not known to be stopped, it may be running.
     pub fn cancel(&mut self, board: u8) {
         self.fail(board, UpdateFailure::Cancelled { left: UpdateOutcome::Cancelled });
         let started = self.starting == Some(board);
@@ -137,7 +137,7 @@ impl UpdateSession {
         }
     }
 
-    /// Cancels the starts of boards whose update is otherwise done.
+    /// Cancels the starts of boards that are otherwise done.
     pub fn cancel_starts(&mut self) {
         for board in core::mem::take(&mut self.to_start) {
             let left = self.outcome(board);
@@ -149,27 +149,27 @@ impl UpdateSession {
         self.results.iter().find(|r| r.board == board).map(|r| r.outcome).unwrap_or_default()
     }
 
-    /// Returns the boards whose turn has not come.
+    /// Returns the boards whose update has not begun.
     pub fn open(&self) -> Vec<u8> {
         let open = |r: &&UpdateResult| r.failure.is_none() && r.outcome == UpdateOutcome::NotStarted;
         self.results.iter().filter(open).map(|r| r.board).collect()
     }
 
-    /// Refuses the update before any board is begun.
+    /// Refuses the update of all boards that have not begun.
     pub fn refuse(&mut self, error: &Error) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Refused(Box::new(error.clone())));
         }
     }
 
-    /// Skips all boards that were not begun, after one that failed.
+    /// Skips all boards whose update has not begun, because board `after` failed.
     pub fn skip_open(&mut self, after: u8) {
         for board in self.open() {
             self.fail(board, UpdateFailure::Skipped { after });
         }
     }
 
-    /// Returns the boards that are in progress or whose turn has not come.
+    /// Returns the boards that are in progress or have not begun.
     pub fn unfinished(&self) -> Vec<u8> {
         let mut boards = self.active.clone();
         boards.extend(self.open().iter().filter(|b| !self.active.contains(b)));
@@ -185,7 +185,7 @@ impl UpdateSession {
         self.results.iter().find(|r| r.board == board).and_then(|r| r.before)
     }
 
-    /// Returns the data to send to a board, or to a group.
+    /// Returns the plan for one board, or for a group of boards.
     pub fn plan(&self, link: &Link, board: Option<u8>) -> Result<UpdatePlan, Error> {
         let named = board.and_then(|b| self.flash_number(b)).filter(|_| self.options.name_target);
         Ok(UpdatePlan::new(&self.options, named.unwrap_or(Header::ANY_BOARD), &link.profile())?)

@@ -1,9 +1,9 @@
-//! Update attempt: both cycles, block by block. Each block must be answered before the next is sent (U-5).
+//! Attempt to transfer both cycles, block by block. Each block must be answered before the next one is sent (U-5).
 use crate::master::engine::{Event, Link, MS};
 use crate::master::reports::update::{Progress, UpdatePlan};
 use ucom::{BLOCK_LEN, ErrorCode, FromBoard, Function, Sequence, ToBoard};
 
-/// Reasons why an attempt ended early, for one board.
+/// Reasons why the attempt with a board ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Broken {
     Device {
@@ -16,15 +16,15 @@ pub(super) enum Broken {
         block: usize,
         waited_ms: u64,
     },
-    /// No answer came after the very last block: PC_INFO must show the result (U-9).
+    /// No answer to the very last block. PC_INFO must show the result (U-9).
     NoFinish {
         waited_ms: u64,
     },
 }
 
 impl Broken {
-    /// Returns `true` if the board drops the following frames (D-43), because it reported an error of programming. After any other error,
-    /// and after silence, the board may go on listening.
+    /// Returns `true` if the board drops the following frames (D-43), because it has reported a programming error. After any other error,
+    /// and after silence, the board may still accept frames.
     pub(super) fn ended_transfer(self) -> bool {
         use ErrorCode::{CanReceive, Checksum, Data, ExloadCycle, Flash, MemProtected, Overrun};
         let Self::Device { code, .. } = self else { return false };
@@ -36,7 +36,7 @@ impl Broken {
 pub(super) struct Attempt<'a> {
     pub link: &'a Link,
     pub plan: &'a UpdatePlan,
-    /// Number that the blocks go to.
+    /// Number to which the blocks are sent.
     pub to: Sequence,
     pub boards: Vec<u8>,
     pub number: u32,
@@ -53,8 +53,8 @@ pub(super) struct Transferred {
 }
 
 impl Attempt<'_> {
-    /// Sends both cycles. `erasing` is called before the first frame of a block that may erase, with the boards that take part and those
-    /// that have dropped out.
+    /// Sends both cycles. Calls `erasing` before the first frame of a cycle that may erase, with the boards that still take part and the
+    /// boards that have dropped out.
     pub(super) async fn run(mut self, mut erasing: impl FnMut(&[u8], &[(u8, Broken)])) -> Transferred {
         let mut out = Transferred::default();
         let mask = self.boards.iter().fold(0, |mask, b| mask | 1 << b);
@@ -84,18 +84,18 @@ impl Attempt<'_> {
         out
     }
 
-    /// Sends the eight frames of a block. A frame received before the last of them left is not an answer to the block.
+    /// Sends the eight frames of a block. A frame that was received before the last of them left is not an answer to the block.
     async fn send(&self, block: &[u8; BLOCK_LEN]) {
         let (frames, _) = block.as_chunks::<8>();
         let mut next = 0;
         for data in frames {
             self.link.sleep_until(next).await;
-            // From the start of one frame to that of the next.
+            // The gap is measured from the start of one frame to the start of the next.
             next = self.link.feed(self.to, ToBoard::Prog(*data)).await + self.gap_us;
         }
     }
 
-    /// Waits for every board. Boards that report an error or stay silent drop out of the attempt.
+    /// Waits for the answers of all boards. A board that reports an error or stays silent drops out of the attempt.
     async fn wait(&mut self, cycle: u32, block: usize, slow: bool, last: bool, out: &mut Transferred) {
         let times = self.link.times();
         let timeout = if slow { times.erase } else { times.ready };
@@ -108,7 +108,7 @@ impl Attempt<'_> {
                 continue;
             }
             match received.message {
-                // A READY after the very last block is ignored: FINISHED must follow.
+                // A READY after the very last block is ignored, because PROGFINISHED must follow.
                 FromBoard::Ready if !last => waiting.retain(|b| *b != received.from),
                 FromBoard::ProgFinished if last => waiting.retain(|b| *b != received.from),
                 FromBoard::Error(code) => {

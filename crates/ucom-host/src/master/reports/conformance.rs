@@ -5,25 +5,25 @@ use host_kit::{Diagnose, ErrorKind};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Permissions and selection of the tests.
+/// Permissions for the tests, and the selection of tests and boards.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ConformanceOptions {
-    /// The boards; empty: all boards that answer.
+    /// The boards to test. Empty: all boards that answer.
     pub boards: Vec<u8>,
     /// Permission to reset and renumber the chain, and to set and clear status bits.
     pub init: bool,
     /// Permission to start applications and control loops, with safe outputs.
     pub run: bool,
-    /// Program for one board, which permits programming that board.
+    /// Program for one board. It also is the permission to program that board.
     pub program: Option<ConformanceProgram>,
-    /// Only the tests with these names; empty: all.
+    /// Names of the tests to run. Empty: all tests.
     pub only: Vec<String>,
     /// Permission to run the tests although another PC is on the bus.
     pub force: bool,
 }
 
 impl ConformanceOptions {
-    /// Returns `true` if tests are allowed that change a board.
+    /// Returns `true` if tests that change a board are allowed.
     pub fn changes(&self) -> bool {
         self.init || self.run || self.program.is_some()
     }
@@ -34,11 +34,11 @@ impl ConformanceOptions {
 pub struct ConformanceProgram {
     /// Board number.
     pub board: u8,
-    /// The flash number that the board must have. The header of the image names it, so that no other board takes the image.
+    /// Flash number that the board must have. The header of the image contains it, so that other boards refuse the image.
     pub flash_number: u16,
     /// The program.
     pub image: UpdateImage,
-    /// Flash date, in the form of the profile's `prog.date`.
+    /// Flash date in the form that `prog.date` in the profile defines.
     pub date: u16,
 }
 
@@ -48,34 +48,34 @@ pub struct ConformanceProgram {
 pub enum Verdict {
     /// The board behaves as expected.
     Pass,
-    /// The test failed; the actual result.
+    /// The test failed, with this actual result.
     Fail(String),
-    /// The test was skipped; the reason.
+    /// The test was skipped, for this reason.
     Skipped(String),
 }
 
-/// Test of one board, or of the chain.
+/// Result of a test with one board or the whole chain.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ConformanceTest {
     /// Name, such as `D-T10`.
     pub id: &'static str,
-    /// Board; `None`: the whole chain.
+    /// Board number; `None` for the whole chain.
     pub board: Option<u8>,
-    /// Expected result.
+    /// Expected behaviour.
     pub expected: &'static str,
-    /// Result.
+    /// Actual result.
     #[serde(flatten)]
     pub verdict: Verdict,
-    /// Option that would have allowed the test; `None`: the test was allowed.
+    /// Option that would have allowed the test; `None` if the test was allowed.
     pub needs: Option<&'static str>,
-    /// Sent frames, in candump's form.
+    /// Frames sent, in candump's form.
     pub sent: Vec<String>,
-    /// Received frames, at most 64 of them.
+    /// Frames received, in candump's form; at most 64.
     pub came: Vec<String>,
 }
 
 impl ConformanceTest {
-    /// Returns the subject in words: `board 3`, or `chain`.
+    /// Returns what was tested, in words: `board 3` or `chain`.
     pub fn subject(&self) -> String {
         self.board.map_or_else(|| "chain".into(), |n| format!("board {n}"))
     }
@@ -86,9 +86,9 @@ impl ConformanceTest {
 pub struct ConformanceReport {
     /// Tests in the order of execution.
     pub tests: Vec<ConformanceTest>,
-    /// Differences from the state before, and the remedy.
+    /// Remaining differences from the state before the tests, each with the remedy.
     pub left: Vec<String>,
-    /// Error that ended the tests before the last one; the remaining tests are skipped.
+    /// Error that ended the tests early. The remaining tests are skipped.
     #[serde(skip)]
     pub error: Option<Error>,
 }
@@ -109,8 +109,8 @@ impl ConformanceReport {
         self.tests.len() - self.passed() - self.failed()
     }
 
-    /// Returns the names of the tests that were not allowed, by the option that would have allowed them. Each name appears once, for any
-    /// number of boards.
+    /// Returns the names of the tests that were not allowed, sorted by the option that would have allowed them. Each name appears only
+    /// once, for any number of boards.
     pub fn not_allowed(&self) -> BTreeMap<&'static str, Vec<&'static str>> {
         let mut by_option: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for (option, test) in self.tests.iter().filter_map(|test| Some((test.needs?, test))) {
@@ -122,8 +122,8 @@ impl ConformanceReport {
         by_option
     }
 
-    /// Returns the kind of failure: that of the error that ended the tests, or `Device` if a test failed or a board is not in its
-    /// previous state. `None`: every test passed.
+    /// Returns the kind of failure. If an error ended the tests, it is the kind of that error; if a test failed or a board is not in its
+    /// previous state, it is `Device`. `None` if every test passed.
     pub fn failure(&self) -> Option<ErrorKind> {
         match &self.error {
             Some(error) => Some(error.kind()),

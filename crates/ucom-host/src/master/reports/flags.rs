@@ -20,26 +20,26 @@ impl AdminChange {
         let run = self.run.unwrap_or(old.run);
         Admin {
             run,
-            // Outputs need a running loop.
+            // The outputs can only be enabled while the loop runs.
             active: self.active.unwrap_or(old.active) && run,
             debug: self.debug.unwrap_or(old.debug),
             global_debug: self.global_debug.unwrap_or(old.global_debug),
         }
     }
 
-    /// Returns `true` if the change only ends motion: such a change is neither delayed nor refused.
+    /// Returns `true` if the change only ends motion. Such a change is neither delayed nor refused.
     pub fn only_ends(&self) -> bool {
         let sets = [self.run, self.active, self.debug, self.global_debug].contains(&Some(true));
         !sets && (self.run == Some(false) || self.active == Some(false))
     }
 }
 
-/// Level of a stop.
+/// How far a board is stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopLevel {
-    /// The outputs are switched off, and the control loop goes on.
+    /// The outputs are switched off; the control loop continues.
     Outputs,
-    /// The control loop ends, and the application stays started.
+    /// The control loop ends; the application stays started.
     Loop,
     /// The board returns to its exloader.
     Application,

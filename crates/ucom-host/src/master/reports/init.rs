@@ -1,4 +1,4 @@
-//! Options and results of numbering a chain.
+//! Options and results of an init, which assigns numbers to a chain.
 use crate::master::counted::counted;
 use crate::master::error::{Error, MEASURE_ORDER, other_order};
 use crate::master::reports::scan::Reports;
@@ -6,19 +6,19 @@ use crate::master::reports::seen::BoardSeen;
 use host_kit::ErrorKind;
 use ucom::profile::Endian;
 
-/// Options for numbering a chain.
+/// Options for an init.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitOptions {
-    /// Flash numbers by position, from an inventory. A difference is a finding.
+    /// Expected board numbers and flash numbers, from an inventory. A difference is reported as a finding.
     pub expected: Vec<(u8, u16)>,
-    /// Permission to number the chain although another PC is on the bus.
+    /// Permission to assign numbers although another PC is on the bus.
     pub force: bool,
 }
 
 /// Result of an init.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct InitReport {
-    /// Boards that reported after the reset.
+    /// Reports of boards after the reset.
     pub reports: Reports,
     /// Boards in the order of the chain.
     pub boards: Vec<BoardSeen>,
@@ -51,7 +51,7 @@ pub enum InitFinding {
         "no board reported and none took a number: is the bus connected, powered, and at this bit rate? `ucom doctor`"
     )]
     NoBoards,
-    /// Boards reported but got no number.
+    /// Boards have reported but got no number.
     #[error(
         "board reported but not reached: UCoM id {} after position {after}; the init wire behind that board may be broken",
         hex(ids)
@@ -59,25 +59,25 @@ pub enum InitFinding {
     NotReached {
         /// Position of the last board that was reached.
         after: u8,
-        /// Low bytes of the flash numbers of boards that reported and were not reached.
+        /// Low bytes of the flash numbers of boards that have reported but got no number.
         ids: Vec<u8>,
     },
-    /// The flash numbers fit the reports only after a swap of their bytes (D-10).
+    /// The flash numbers match the reports only if their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
         endian: Endian,
     },
-    /// There are more boards than reports, so boards share the low byte of their flash number.
+    /// There are more boards than reports, so boards have the same low byte in their flash numbers.
     #[error(
         "more boards than reports: {}, {}; flash ids must be unique in their low byte",
         counted(*boards as usize, "board"),
         counted(*reports as usize, "report")
     )]
     MoreBoardsThanReports {
-        /// Boards with a number.
+        /// Number of boards with a number.
         boards: u32,
-        /// Different reports.
+        /// Number of different reports.
         reports: u32,
     },
     /// A board did not report.
@@ -91,17 +91,17 @@ pub enum InitFinding {
     NotReset {
         /// Board number.
         board: u8,
-        /// `true` if the board has since confirmed that its application is stopped.
+        /// `true` if the board has confirmed since that its application is stopped.
         stopped: bool,
     },
-    /// Two boards have one flash number.
+    /// Two boards have the same flash number.
     #[error("duplicate flash number 0x{flash_number:04X}: boards {first} and {second}")]
     DuplicateFlash {
-        /// The number.
+        /// The flash number.
         flash_number: u16,
-        /// First board.
+        /// Number of the first board.
         first: u8,
-        /// The other board.
+        /// Number of the second board.
         second: u8,
     },
     /// The board at a position differs from the inventory.
@@ -116,7 +116,7 @@ pub enum InitFinding {
         /// Flash number of the board.
         found: u16,
     },
-    /// The inventory has a board after the end of the chain.
+    /// The inventory contains a board beyond the end of the chain.
     #[error("board {board} (flash number 0x{expected:04X}) of the inventory is missing")]
     Missing {
         /// Position.
@@ -124,7 +124,7 @@ pub enum InitFinding {
         /// Flash number of the board.
         expected: u16,
     },
-    /// A board was refused, so only the boards before it have numbers.
+    /// A board was refused, so only the boards before it got numbers.
     #[error("position {board}: {error}")]
     Refused {
         /// Position.
@@ -132,7 +132,7 @@ pub enum InitFinding {
         /// Reason.
         error: Error,
     },
-    /// Two flash ids share an identifier.
+    /// Two boards have UCoM ids that use the same identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
         /// The lower id.

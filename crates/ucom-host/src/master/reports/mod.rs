@@ -1,4 +1,4 @@
-//! Data in and out: requests with their options, outcomes with their reports and findings. This module neither sends nor
+//! Data that enter and leave procedures: requests with options, outcomes with reports and findings. This module neither sends frames nor
 //! waits.
 mod conformance;
 mod flags;

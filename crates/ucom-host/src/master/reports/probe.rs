@@ -9,45 +9,45 @@ use crate::master::reports::init::InitReport;
 /// Permissions of a probe.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProbeOptions {
-    /// Permission to reset and renumber the chain; shows whether boards raise their pin by themselves.
+    /// Permission to reset and renumber the chain. The probe then also finds out whether boards raise their pin by themselves.
     pub init: bool,
-    /// Permission to start a control loop with inactive outputs; shows which heartbeats count.
+    /// Permission to start a control loop with inactive outputs. The probe then also finds out which heartbeats keep the loop running.
     pub alive: bool,
-    /// An image that some board has, as sent; shows how the Program ID is computed.
+    /// The image that a board has, as it was sent. The probe then also finds out how the Program ID is computed.
     pub image: Option<Arc<[u8]>>,
-    /// Permission to probe although another PC is on the bus; with `init` and `alive` also although control loops run, which this ends.
+    /// Permission to probe although another PC is on the bus. With `init` and `alive`, also permission to end running control loops.
     pub force: bool,
 }
 
-/// Unknown property and its measurement.
+/// A property that the published description leaves open, and its measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ProbeRow {
     /// Key of the profile.
     pub key: &'static str,
-    /// Unknown property.
+    /// The property.
     pub unknown: &'static str,
-    /// Statement of the published description.
+    /// What the published description says about it.
     pub published: &'static str,
-    /// Observation.
+    /// What was observed.
     pub observed: String,
-    /// The value in the profile.
+    /// Value in the resulting profile.
     pub decision: String,
-    /// `true` if the observation decided; otherwise the previous value stays.
+    /// `true` if the observation determines the value; otherwise the previous value is kept.
     pub measured: bool,
 }
 
 /// Result of a probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProbeReport {
-    /// Profile with the measured values; the master keeps its own profile.
+    /// Profile with the measured values. The master does not use it by itself.
     pub profile: Profile,
-    /// Statement, observation and decision.
+    /// The table: one row per property.
     pub rows: Vec<ProbeRow>,
     /// Boards that answered.
     pub boards: Vec<u8>,
-    /// Different UCoM ids in reports: boards with and without a number.
+    /// Number of different UCoM ids in the reports. It includes boards without a number.
     pub reports: usize,
-    /// New numbers, if the probe assigned any.
+    /// Report of the new numbers, if the probe has assigned numbers.
     pub init: Option<InitReport>,
 }
 

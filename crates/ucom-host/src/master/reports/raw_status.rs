@@ -6,16 +6,17 @@ use ucom::{BoardInfo, Status};
 pub struct RawStatus {
     /// Board number.
     pub board: u8,
-    /// Status before the command.
+    /// Answer to PC_INFO before the command.
     pub before: BoardInfo,
     /// Status that the formula and the rules require.
     pub expected: Status,
-    /// Status after the command; `None`: the board does not answer under its number any more.
+    /// Answer after the command; `None` if the board no longer answers to its number.
     pub after: Option<BoardInfo>,
 }
 
 impl RawStatus {
-    /// Returns `true` if the board did as the rules require. Without INIT it has forgotten its number and is silent.
+    /// Returns `true` if the board's state is the required one. If INIT was cleared, the board must be silent, because it has forgotten its
+    /// number.
     pub fn as_expected(&self) -> bool {
         match self.after {
             Some(after) => after.status == self.expected,
@@ -24,18 +25,18 @@ impl RawStatus {
     }
 }
 
-/// Returns the next status of a board by the rules (D-22).
+/// Returns the status that the rules require after PC_SETSTATUS (D-22).
 pub fn expected_status(before: &BoardInfo, mask: u8, value: u8) -> Status {
     let old = before.status;
     let new = old.set(mask, value);
     let kept = new & Status::ASTART;
     if !new.has(Status::INIT) || !old.has(Status::INIT) {
-        // The board loses its number, and with the number its application, PROG and pin.
+        // The board loses its number and therefore also its application, PROG and its outgoing pin.
         return kept | Status::EXLRUN | (old & Status::IPINIT);
     }
     let started = new.has(Status::MSTART) && (old.has(Status::MSTART) || before.has_application());
     let just_started = started && !old.has(Status::MSTART);
-    // An application that runs makes the board ignore PROG, and a start clears it.
+    // While an application runs, the board ignores PROG. A start of the application clears PROG.
     let prog = new.has(Status::PROG) && !started && !just_started;
     let pins = (new & Status::OPINIT) | (old & Status::IPINIT);
     let running = old.has(Status::MCARUN) && started;
@@ -52,7 +53,7 @@ mod tests {
     use ucom::{Frame, Profile, Sequence, ToBoard};
     use ucom_sim::memory::{MemoryApplication, MemoryFlash, MemoryStore, WirePins};
 
-    /// Creates a board with its number and with or without a running application.
+    /// Creates a board that has a number. The parameters define its application and its state.
     fn board(application: bool, started: bool, history: &[(u8, u8)]) -> (Board, u64) {
         let mut flash = MemoryFlash::default();
         if application {
@@ -91,7 +92,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// D-22: for any two bytes the expected status is the status of a simulated board.
+        /// D-22: for any two bytes, the expected status equals the status of a simulated board.
         #[test]
         fn d22_what_is_expected_is_what_a_board_does(mask: u8, value: u8, application: bool, started: bool, history in prop::collection::vec((any::<u8>(), any::<u8>()), 0..3)) {
             let history: Vec<(u8, u8)> = history.into_iter().map(|(m, v)| (m & !0x08, v & !0x40)).collect();

@@ -11,15 +11,16 @@ use crate::master::reports::seen::BoardSeen;
 use crate::master::reports::update::{UpdateOptions, UpdateReport};
 use ucom::{Admin, BoardInfo, Status};
 
-/// Identifies a procedure while it runs.
+/// Identifier of a procedure while it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ProcedureId(pub(crate) u64);
 
-/// Request to start a procedure. `force`: the procedure runs although another PC is on the bus or another check refuses.
+/// Request that starts a procedure. With `force` the procedure runs although another PC is on the bus, or although another check would
+/// refuse it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Request {
-    /// Lists the boards; changes nothing.
+    /// Lists the boards. Changes nothing.
     Scan,
     /// Assigns numbers to the whole chain.
     Init(InitOptions),
@@ -32,50 +33,50 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// PC_INFO; changes nothing.
+    /// Sends PC_INFO. Changes nothing.
     Info {
         /// The board.
         board: u8,
     },
-    /// PC_SETSTATUS with read-back.
+    /// Sends PC_SETSTATUS and reads the status back.
     SetStatus {
         /// The board.
         board: u8,
         /// Bits to change.
         mask: Status,
-        /// Their values; bits outside the mask are not sent.
+        /// Requested values of these bits. Bits outside the mask are not sent.
         value: Status,
         /// See above.
         force: bool,
     },
-    /// Sends one PC_SETSTATUS exactly by the formula, value bits outside the mask included; never repeated.
+    /// Sends one PC_SETSTATUS exactly as the formula defines it, including value bits outside the mask. Never repeated.
     RawStatus {
-        /// The board to send it to; `None`: all boards at once.
+        /// The board; `None` for a broadcast to all boards.
         board: Option<u8>,
         /// Boards to read before and after.
         seen: Vec<u8>,
-        /// First byte.
+        /// First byte of PC_SETSTATUS.
         mask: u8,
-        /// Second byte.
+        /// Second byte of PC_SETSTATUS.
         value: u8,
-        /// See above; with `force` also although control loops run.
+        /// See above. With `force` the command is also sent although control loops run.
         force: bool,
     },
-    /// PC_RESET.
+    /// Sends PC_RESET.
     Reset {
-        /// The board; `None`: all.
+        /// The board; `None` for all boards.
         board: Option<u8>,
         /// See above.
         force: bool,
     },
-    /// PC_XRESET until the exloader runs with programming enabled.
+    /// Sends PC_XRESET until the exloader runs with programming enabled.
     XReset {
         /// The board.
         board: u8,
         /// See above.
         force: bool,
     },
-    /// PC_START until the application is up.
+    /// Sends PC_START until the application is up.
     Start {
         /// The board.
         board: u8,
@@ -91,32 +92,32 @@ pub enum Request {
         /// See above.
         force: bool,
     },
-    /// Flags of a board, read, changed and written.
+    /// Reads the flags of a board, changes them and writes them.
     Admin {
         /// The board.
         board: u8,
-        /// Change.
+        /// The change.
         change: AdminChange,
         /// See above.
         force: bool,
     },
     /// Updates the firmware of boards.
     Update(UpdateOptions),
-    /// Descriptions of inputs, outputs and parameters; changes nothing.
+    /// Reads the descriptions of inputs, outputs and parameters. Changes nothing.
     Describe {
         /// The board.
         board: u8,
-        /// `true` to read it again although it is known.
+        /// `true` to read the description again even if it is already known.
         fresh: bool,
     },
-    /// MCA_DUMP_CI; changes nothing.
+    /// Reads the initial inputs with MCA_DUMP_CI. Changes nothing.
     InitialInputs {
         /// The board.
         board: u8,
     },
-    /// Runs boards: all steps to a running control loop.
+    /// Runs boards: takes all steps to a running control loop.
     Run(RunOptions),
-    /// Measures properties in which a board differs from the profile.
+    /// Measures properties in which a board may differ from the profile.
     Probe(ProbeOptions),
     /// Tests that boards follow the protocol page.
     Conformance(ConformanceOptions),
@@ -145,8 +146,8 @@ impl Request {
         }
     }
 
-    /// Returns `true` if two boards with one number do not end the request. A stop stops both boards and must not wait. The other
-    /// requests detect such boards themselves and report more.
+    /// Returns `true` if the request is not ended when two boards have the same number. A stop must not wait, and reaches both boards. The
+    /// other requests detect such boards themselves and report them in more detail.
     pub(crate) fn bears_shared_numbers(&self) -> bool {
         match self {
             Self::Stop { .. } | Self::Scan | Self::Init(_) | Self::Repair { .. } => true,
@@ -155,13 +156,13 @@ impl Request {
         }
     }
 
-    /// Returns the boards that the request works with, by bit. Only one procedure at a time works with a board.
+    /// Returns the boards that the request works with, one bit per board. Only one procedure at a time can work with a board.
     pub(crate) fn claims(&self) -> u32 {
         let one = |board: &u8| 1_u32.checked_shl((*board).into()).unwrap_or(0);
         match self {
             Self::Scan | Self::Init(_) | Self::Reset { board: None, .. } | Self::Probe(_) => u32::MAX,
             Self::RawStatus { .. } | Self::Conformance(_) => u32::MAX,
-            // The broadcast of a group reaches all boards, and program data must not coincide with the start of another board.
+            // The broadcast of a group reaches all boards, and no other board may be started while program data are sent.
             Self::Update(_) => u32::MAX,
             Self::Repair { board, .. }
             | Self::Info { board }
@@ -194,7 +195,7 @@ pub enum Outcome {
     Status {
         /// The board.
         board: u8,
-        /// Board info as read back.
+        /// Answer to PC_INFO after the change.
         info: BoardInfo,
     },
     /// Outcome of [`Request::Reset`].
@@ -205,16 +206,16 @@ pub enum Outcome {
     Admin {
         /// The board.
         board: u8,
-        /// Present flags.
+        /// Flags after the change.
         admin: Admin,
     },
-    /// Outcome of [`Request::Update`]; see each board's result.
+    /// Outcome of [`Request::Update`]. It contains a result for each board.
     Update(UpdateReport),
     /// Outcome of [`Request::Describe`].
     Description {
         /// The board.
         board: u8,
-        /// Description.
+        /// The description.
         description: IoDescription,
     },
     /// Outcome of [`Request::InitialInputs`].
@@ -230,6 +231,6 @@ pub enum Outcome {
     Probe(ProbeReport),
     /// Outcome of [`Request::RawStatus`].
     RawStatus(Vec<RawStatus>),
-    /// Outcome of [`Request::Conformance`]; see each verdict, and the error that ended the tests.
+    /// Outcome of [`Request::Conformance`]. It contains the results of the tests, and the error that ended them early.
     Conformance(ConformanceReport),
 }

@@ -1,11 +1,11 @@
-//! Boards to run, and their values.
+//! Options for a run of boards, and the values that the boards get.
 use crate::master::load::LoadForecast;
 use ucom::Admin;
 
 /// A value for an input or a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Setting {
-    /// The signal's text, or its number.
+    /// Name or index of the signal.
     pub name: String,
     /// The word.
     pub value: u16,
@@ -16,13 +16,13 @@ pub struct Setting {
 pub struct RunBoard {
     /// Board number.
     pub board: u8,
-    /// Inputs that differ from the board's initial inputs.
+    /// Inputs whose values differ from the board's initial inputs.
     pub ci: Vec<Setting>,
     /// Parameters.
     pub par: Vec<Setting>,
 }
 
-/// Boards to run, and options.
+/// Options for a run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunOptions {
     /// The boards.
@@ -33,7 +33,7 @@ pub struct RunOptions {
     pub force: bool,
 }
 
-/// Running boards.
+/// Result of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RunReport {
     /// Flags of each board.

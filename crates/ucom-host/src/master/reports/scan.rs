@@ -1,4 +1,4 @@
-//! Boards that report, boards with a number, and findings about them.
+//! Results of a scan: boards that report, boards with a number, and findings about them.
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::master::error::{Error, IdentityError, MEASURE_ORDER, other_order};
@@ -6,14 +6,14 @@ use crate::master::reports::seen::BoardSeen;
 use ucom::Report;
 use ucom::profile::Endian;
 
-/// Reports of boards after PC_RESET or PC_REPORT.
+/// Reports of the boards after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers, which distinguish boards.
+    /// Low bytes of the flash numbers. They distinguish the boards.
     pub ids: BTreeSet<u8>,
-    /// Number of frames from each board.
+    /// Number of report frames from each board.
     pub frames: BTreeMap<u8, u32>,
-    /// Boards whose reports have different ids in identifier and data, with `report.mode = flash7`.
+    /// With `report.mode = flash7`: boards whose report has different ids in identifier and data.
     pub disagree: BTreeSet<u8>,
 }
 
@@ -26,7 +26,7 @@ impl Reports {
         }
     }
 
-    /// Returns flash ids that differ only in bit 7: they share an identifier (D-07).
+    /// Returns pairs of flash ids that differ only in bit 7. Such boards use the same identifier (D-07).
     pub fn ambiguous(&self) -> Vec<(u8, u8)> {
         self.ids
             .iter()
@@ -39,7 +39,7 @@ impl Reports {
 /// Result of a scan.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ScanReport {
-    /// Boards that reported.
+    /// Reports of boards.
     pub reports: Reports,
     /// Boards with a number.
     pub boards: Vec<BoardSeen>,
@@ -47,16 +47,16 @@ pub struct ScanReport {
     pub findings: Vec<ScanFinding>,
 }
 
-/// A property of the chain that its user should know.
+/// A property of the chain that the user should know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ScanFinding {
-    /// A board without a number.
+    /// A board has no number.
     #[error("board with UCoM id 0x{ucom_id:02X} has no number: `ucom init`")]
     Unnumbered {
         /// Low byte of its flash number.
         ucom_id: u8,
     },
-    /// A board with a number that did not report.
+    /// A board has a number but did not report.
     #[error("board {board} has a number but did not report")]
     NotReported {
         /// Board number.
@@ -65,14 +65,14 @@ pub enum ScanFinding {
     /// Two boards with numbers have the same flash number.
     #[error("boards {first} and {second} have the same flash number 0x{flash_number:04X}")]
     SameFlash {
-        /// First board.
+        /// Number of the first board.
         first: u8,
-        /// The other board.
+        /// Number of the second board.
         second: u8,
-        /// The number.
+        /// The flash number.
         flash_number: u16,
     },
-    /// Two flash ids share an identifier.
+    /// Two boards have UCoM ids that use the same identifier.
     #[error("UCoM ids 0x{low:02X} and 0x{high:02X} differ in bit 7 only and share an identifier")]
     Ambiguous {
         /// The lower id.
@@ -80,13 +80,13 @@ pub enum ScanFinding {
         /// The higher id.
         high: u8,
     },
-    /// Identifier and data of a report disagree.
+    /// A report has different UCoM ids in identifier and data.
     #[error("the report of UCoM id 0x{ucom_id:02X} came with another identifier: `ucom probe` may show why")]
     Disagrees {
         /// UCoM id in the data.
         ucom_id: u8,
     },
-    /// The flash numbers fit the reports only after a swap of their bytes (D-10).
+    /// The flash numbers match the reports only if their bytes are swapped (D-10).
     #[error("{}: {MEASURE_ORDER}", other_order(*endian))]
     ByteOrder {
         /// Byte order of the profile.
@@ -98,25 +98,25 @@ pub enum ScanFinding {
         /// Board number.
         board: u8,
     },
-    /// Two boards have one number (D-24).
+    /// Two boards have the same number (D-24).
     #[error("{}", shared(*board, [*first, *second]))]
     NumberShared {
         /// The number.
         board: u8,
-        /// Flash number of one board.
+        /// Flash number of the first board.
         first: u16,
-        /// Flash number of another board; the same number if the boards cannot be distinguished.
+        /// Flash number of the second board. It equals `first` if the boards cannot be distinguished.
         second: u16,
     },
-    /// The status of a board is not possible.
+    /// A board reports an impossible status.
     #[error("board {board}: {problem}")]
     Status {
         /// Board number.
         board: u8,
-        /// Reason.
+        /// Explanation.
         problem: &'static str,
     },
-    /// The description was never complete.
+    /// No description of the board was received completely.
     #[error("the description of board {board} never came whole")]
     NoDescription {
         /// Board number.
@@ -129,7 +129,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error of other commands, which refuse to work with such a chain.
+    /// Returns the error with which other commands refuse such a chain; `None` if they accept it.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

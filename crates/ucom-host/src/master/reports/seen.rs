@@ -1,4 +1,4 @@
-//! A board as seen on the bus.
+//! The answer of a board.
 use ucom::BoardInfo;
 
 /// Answer of a board to PC_INFO.
@@ -6,8 +6,8 @@ use ucom::BoardInfo;
 pub struct BoardSeen {
     /// Board number.
     pub number: u8,
-    /// The numbers.
+    /// Values of the first frame.
     pub info: BoardInfo,
-    /// Description; `None` if it was never complete.
+    /// Description; `None` if it was not received completely.
     pub description: Option<String>,
 }

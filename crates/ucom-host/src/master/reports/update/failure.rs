@@ -1,4 +1,4 @@
-//! Reasons why a board was not updated, with the facts, the kind and the remedy.
+//! Reasons why a board was not updated, with the facts, the kind of failure and the remedy.
 use crate::master::error::Error;
 use crate::master::reports::update::outcome::UpdateOutcome;
 use host_kit::{Diagnose, Diagnosis, ErrorKind};
@@ -7,13 +7,13 @@ use ucom::{ErrorCode, Status};
 /// Reasons why a board was not updated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UpdateFailure {
-    /// A check refused the update; nothing was erased.
+    /// A check refused the update. Nothing was erased.
     #[error("{0}")]
     Refused(Box<Error>),
-    /// No answer before anything was erased.
+    /// The board did not answer. Nothing was erased.
     #[error("{0}")]
     NoAnswer(Box<Error>),
-    /// The board answered, but did not carry out the request, before anything was erased.
+    /// The board answered but did not carry out a request. Nothing was erased.
     #[error("{0}")]
     Reported(Box<Error>),
     /// The board reported an error.
@@ -23,21 +23,21 @@ pub enum UpdateFailure {
         code: ErrorCode,
         /// Cycle, 1 or 2.
         cycle: u32,
-        /// Block, from 0, the header's block.
+        /// Number of the block. Block 0 contains the header.
         block: usize,
         /// Number of attempts.
         attempts: u32,
         /// `true` if something was erased.
         erased: bool,
     },
-    /// The board did not take a block in time.
+    /// The board did not confirm a block in time.
     #[error(
         "no DSP_READY for block {block} of cycle {cycle} within {waited_ms} ms, after {attempts} attempts"
     )]
     Timeout {
         /// Cycle, 1 or 2.
         cycle: u32,
-        /// Block, from 0, the header's block.
+        /// Number of the block. Block 0 contains the header.
         block: usize,
         /// Time waited, ms.
         waited_ms: u64,
@@ -46,7 +46,7 @@ pub enum UpdateFailure {
         /// `true` if something was erased.
         erased: bool,
     },
-    /// DSP_PROGFINISHED came, or should have, and the board shows another program.
+    /// The board reported that it is done, or should have done so, but it shows another program.
     #[error(
         "the board shows Program ID 0x{program_id:04X}, date 0x{date:04X} instead of 0x{wanted_id:04X}{}",
         wanted_date.map_or_else(String::new, |date| format!(", 0x{date:04X}"))
@@ -58,10 +58,10 @@ pub enum UpdateFailure {
         date: u16,
         /// Program ID of the image.
         wanted_id: u16,
-        /// Flash date of the image; `None`: not known.
+        /// Flash date of the image; `None` if it is not known.
         wanted_date: Option<u16>,
     },
-    /// DSP_PROGFINISHED came, and the board shows no application in its exloader.
+    /// The board reported that it is done, but in its exloader it shows no application.
     #[error(
         "the board reports that it is done, but shows no valid application in its exloader: Program ID 0x{program_id:04X}, date 0x{date:04X}, status {status}"
     )]
@@ -76,22 +76,22 @@ pub enum UpdateFailure {
     /// The board shows the program, but the application did not start.
     #[error("the board shows the program, but: {0}")]
     NotRunning(Box<Error>),
-    /// The board already showed the program, but was found in programming mode, and that mode could not be ended.
+    /// The board already showed the program but was in programming mode, and this mode could not be ended.
     #[error("the board shows the program already, but it may still be in programming mode: {0}")]
     StillProgramming(Box<Error>),
     /// A step failed after something was erased.
     #[error("{0}")]
     After(Box<Error>),
-    /// Frames to a group may have erased a board that had dropped out and does not answer.
+    /// The board had dropped out of the group and does not answer. Frames to the group may have erased it.
     #[error("it may be erased, the group's frames went past it: {0}")]
     MayBeErased(Box<Error>),
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// State that the cancel left: the board's outcome.
+        /// State after the cancel. It equals the board's outcome, except that it is `Running` if the application may be running.
         left: UpdateOutcome,
     },
-    /// Another board of the list failed before its turn came.
+    /// An earlier board of the list failed, so this board was skipped.
     #[error("not begun: board {after} failed before")]
     Skipped {
         /// The board that failed.
@@ -106,7 +106,7 @@ impl Diagnose for UpdateFailure {
 }
 
 impl UpdateFailure {
-    /// Returns the kind. Any failure or cancel after memory may have been erased is a fault.
+    /// Returns the kind of failure. Every failure or cancel is a fault if memory may have been erased before.
     fn kind_of(&self) -> ErrorKind {
         match self {
             Self::Refused(e) | Self::StillProgramming(e) => match e.kind() {
@@ -177,7 +177,7 @@ impl UpdateFailure {
     }
 }
 
-/// Returns the state after a cancel, in words.
+/// Returns a text about the state after a cancel.
 fn left_behind(outcome: UpdateOutcome) -> &'static str {
     match outcome {
         UpdateOutcome::Incomplete => "the old application is erased, the board waits in its exloader",

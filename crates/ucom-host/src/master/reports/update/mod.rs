@@ -1,4 +1,4 @@
-//! Firmware update: options, blocks to send, results for each board.
+//! Firmware update: options, the blocks to send, and results for each board.
 mod failure;
 mod options;
 mod outcome;

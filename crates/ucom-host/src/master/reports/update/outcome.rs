@@ -1,31 +1,30 @@
-//! Progress of a board's update.
+//! Outcome of the update of a board.
 use serde::Serialize;
 
-/// Progress of a board's update.
+/// Outcome of the update of a board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum UpdateOutcome {
-    /// No memory was erased: the board is unchanged.
+    /// Nothing was erased. The board is unchanged.
     #[default]
     NotStarted,
-    /// The user cancelled the update before anything was erased: the board is unchanged.
+    /// The user cancelled the update before anything was erased. The board is unchanged.
     Cancelled,
     /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62). No program data were sent.
     UpToDate,
-    /// The board shows the program, but no flash record covers load address and content (D-62). No program data were sent.
+    /// The board shows the program, but there is no flash record that shows its load address and content (D-62). No program data were sent.
     ProgramUpToDate,
-    /// Something was erased and no image is complete: the board stays in its exloader and can be programmed again.
+    /// Memory was erased and no image is complete. The board stays in its exloader and can be programmed again.
     Incomplete,
-    /// The old program of the board may be lost, and the board has not reported its state.
+    /// The old program of the board may be lost, and the board has not reported its state since.
     Unknown,
-    /// The board reports the program as written, but PC_INFO did not confirm the new Program ID and date: PC_INFO showed
-    /// others, did not answer, or the expected values are not known
-    /// ([`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable)).
+    /// The board reported that the program is written, but PC_INFO did not confirm Program ID and date: it showed other values, did not
+    /// answer, or the expected values are not known ([`UpdateReport::unverifiable`](crate::master::update::UpdateReport::unverifiable)).
     Written,
-    /// PC_INFO shows the new Program ID and date (U-10).
+    /// PC_INFO showed the new Program ID and date (U-10).
     Verified,
-    /// The application runs. [`UpdateResult::verified`](crate::master::update::UpdateResult::verified) shows whether the image
-    /// is proven.
+    /// The application is running. [`UpdateResult::verified`](crate::master::update::UpdateResult::verified) shows whether the image is
+    /// verified.
     Running,
 }
 

@@ -1,4 +1,4 @@
-//! Content of an update: the blocks of both cycles (D-40, D-41).
+//! Data that an update sends: the blocks of both cycles (D-40, D-41).
 use core::fmt;
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ pub(crate) struct Cycle {
 }
 
 impl Cycle {
-    /// Returns the number of blocks, including the header's.
+    /// Returns the number of blocks, including the header block.
     pub(crate) fn blocks(&self) -> usize {
         block_count(self.bytes.len()) + usize::from(self.header.is_some())
     }
@@ -35,7 +35,7 @@ impl Cycle {
 pub struct Expected {
     /// Program ID.
     pub program_id: u16,
-    /// Flash date; `None`: not known, because no header of this tool carries it.
+    /// Flash date; `None` if it is not known, because no header with a date is sent.
     pub date: Option<u16>,
 }
 
@@ -46,14 +46,14 @@ impl Expected {
     }
 }
 
-/// Reasons why the program that a board must show after the update is not known.
+/// Reasons why it is not known which program a board must show after the update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unverifiable {
-    /// Plan `raw`: the Program ID is not visible in the files.
+    /// Plan `raw`: the files do not show the Program ID.
     RawPlan,
-    /// `prog.header` is `none`: the board computes Program ID and date by itself.
+    /// `prog.header` is `none`: the board itself determines Program ID and date.
     NoHeader,
-    /// `prog.checksum` is `none`: Program IDs are not checksums of images.
+    /// `prog.checksum` is `none`: a Program ID is not the checksum of an image.
     NoChecksum,
 }
 
@@ -68,24 +68,24 @@ impl fmt::Display for Unverifiable {
 }
 
 impl Unverifiable {
-    /// Returns the remedy that makes a verification possible.
+    /// Returns how to make a verification possible.
     pub fn hint(&self) -> &'static str {
         "to have it verified name the Program ID that the board must show: `--expect-program-id 0x…`"
     }
 }
 
-/// Image as sent.
+/// An image as it is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlannedImage {
-    /// First and last cycle that carry it: 1, 2 or both.
+    /// First and last cycle in which the image is sent: 1, 2 or both.
     pub cycles: (u32, u32),
-    /// Target memory; `None`: only the file knows (plan `raw`).
+    /// Target memory; `None` with the plan `raw`, because only the file determines it.
     pub memory: Option<Memory>,
-    /// Load address, words; `None`: it is not sent.
+    /// Load address in words; `None` if no address is sent.
     pub address_words: Option<u32>,
-    /// Length, bytes.
+    /// Length in bytes.
     pub bytes: usize,
-    /// Program ID (D-44); `None`: not visible, or not computed.
+    /// Program ID (D-44); `None` if it is not visible or not computed.
     pub program_id: Option<u16>,
 }
 
@@ -102,7 +102,7 @@ impl Unverifiable {
 }
 
 impl UpdateImage {
-    /// Checks that the image can be sent: whole words, unless the plan is `raw`.
+    /// Checks that the image can be sent. It must consist of complete words, except with the plan `raw`.
     fn check(&self, plan: Plan) -> Result<(), PlanError> {
         match self.bytes.len() {
             0 => Err(PlanError::Empty),
@@ -112,12 +112,12 @@ impl UpdateImage {
     }
 }
 
-/// Returns `true` if updates with this profile send a header, which carries Program ID and flash date (D-41).
+/// Returns `true` if updates with this profile send a header with Program ID and flash date (D-41).
 pub fn has_header(profile: &Profile) -> bool {
     profile.prog_plan != Plan::Raw && profile.prog_header == HeaderForm::V1
 }
 
-/// Returns the image and the memory of each cycle.
+/// Returns image and target memory of each cycle.
 fn parts<'a>(
     plan: Plan,
     image: &'a UpdateImage,
@@ -133,22 +133,22 @@ fn parts<'a>(
     })
 }
 
-/// Data for a board, and the program that the board must show afterwards.
+/// The data to send to a board, and the program that the board must show afterwards.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdatePlan {
     pub(crate) cycles: [Cycle; 2],
-    /// Given images, the main image first.
+    /// Images of the user, the main image first.
     pub images: Vec<PlannedImage>,
-    /// Program that the board shows at the end; `None`: not known.
+    /// Program that the board must show at the end; `None` if it is not known.
     pub expected: Option<Expected>,
     /// Reason why the expected program is not known.
     pub unverifiable: Option<Unverifiable>,
-    /// The first cycle that may erase flash, 1 or 2. Before that cycle nothing is lost.
+    /// First cycle that may erase flash, 1 or 2. Nothing is lost before that cycle.
     pub erases_from: u32,
 }
 
 impl UpdatePlan {
-    /// Creates the plan for a board, with `target` in the header.
+    /// Creates the plan for a board. The header contains `target`.
     pub fn new(options: &UpdateOptions, target: u16, profile: &Profile) -> Result<Self, PlanError> {
         let plan = profile.prog_plan;
         let image = &options.image;
@@ -158,9 +158,9 @@ impl UpdatePlan {
         let other = options.second.as_ref();
         let [first, last] = parts(plan, image, other)?;
         let erases_from = match plan {
-            // The first cycle only checks, or fills RAM: the application in flash stays valid.
+            // The first cycle only checks the image, or fills RAM. The application in flash stays valid.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
-            // The first cycle writes program flash; the effect of raw files is known only to their makers.
+            // The first cycle writes program flash. With raw files, only their author knows what they do.
             Plan::PmemXmem | Plan::Raw => 1,
         };
         let unverifiable = Unverifiable::by_profile(profile);
@@ -211,12 +211,12 @@ impl UpdatePlan {
         Ok(Self { cycles: [cycle(1, first), cycle(2, last)], images, expected, unverifiable, erases_from })
     }
 
-    /// Returns the Program ID that the board must show; `None`: not known.
+    /// Returns the Program ID that the board must show; `None` if it is not known.
     pub fn program_id(&self) -> Option<u16> {
         self.expected.map(|expected| expected.program_id)
     }
 
-    /// Returns the bytes of both cycles on the wire.
+    /// Returns the number of bytes that both cycles send.
     pub fn total_bytes(&self) -> u64 {
         self.cycles.iter().map(|c| (c.blocks() * BLOCK_LEN) as u64).sum()
     }

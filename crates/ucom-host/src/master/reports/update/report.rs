@@ -1,4 +1,4 @@
-//! Results of an update, with the kind of failure.
+//! Results of an update, and the kind of failure.
 use crate::date_text;
 use crate::master::reports::update::failure::UpdateFailure;
 use crate::master::reports::update::outcome::UpdateOutcome;
@@ -6,27 +6,27 @@ use crate::master::reports::update::plan::{PlannedImage, Unverifiable, has_heade
 use host_kit::{Diagnose, ErrorKind};
 use ucom::{BoardInfo, Profile};
 
-/// Result of one board.
+/// Result of the update of one board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UpdateResult {
     /// Board number.
     pub board: u8,
     /// Flash number, if the board answered.
     pub flash_number: Option<u16>,
-    /// PC_INFO before the update.
+    /// Answer to PC_INFO before the update.
     pub before: Option<BoardInfo>,
-    /// PC_INFO after the board reported that it is done.
+    /// Answer to PC_INFO after the board reported that it is done.
     pub after: Option<BoardInfo>,
-    /// Progress of the update.
+    /// Outcome of the update.
     pub outcome: UpdateOutcome,
-    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool wrote exactly this image to this address: now, or
-    /// earlier according to the flash record.
+    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool has written exactly this image to this address. It may
+    /// have done so now, or earlier according to the flash record.
     pub verified: bool,
     /// Number of attempts.
     pub attempts: u32,
-    /// Reason of the failure.
+    /// Reason of the failure; `None` if there is none.
     pub failure: Option<UpdateFailure>,
-    /// Time from XRESET to the last answer, µs.
+    /// Time from the XRESET to the last answer, µs.
     pub time_us: u64,
 }
 
@@ -46,29 +46,29 @@ impl UpdateResult {
     }
 }
 
-/// Results of all boards.
+/// Results of an update.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UpdateReport {
-    /// Results in the order of the list.
+    /// Results in the order of the boards in the options.
     pub boards: Vec<UpdateResult>,
     /// `true` if only questions were sent.
     pub dry_run: bool,
-    /// Program ID that the boards must show; `None`: not known.
+    /// Program ID that the boards must show; `None` if it is not known.
     pub program_id: Option<u16>,
-    /// Reason why it is not known. The written program could then not be verified.
+    /// Reason why it is not known, so that the written program cannot be verified.
     pub unverifiable: Option<Unverifiable>,
-    /// `true` if written but unverified programs count as done.
+    /// `true` if programs that were written but not verified are accepted.
     pub accept_unverified: bool,
-    /// Sent images, the main image first.
+    /// Images that were sent, the main image first.
     pub images: Vec<PlannedImage>,
     /// Flash date of the image.
     pub date: u16,
-    /// Bytes of both cycles.
+    /// Number of bytes that both cycles send.
     pub bytes: u64,
 }
 
 impl UpdateReport {
-    /// Returns the kind of failure: the most serious of any board. `None`: all boards are done.
+    /// Returns the kind of failure, which is the most serious one of all boards. `None` if the update succeeded.
     pub fn failure(&self) -> Option<ErrorKind> {
         let kinds = self.boards.iter().filter_map(|b| b.failure.as_ref()).map(UpdateFailure::kind);
         let unproven = self.boards.iter().filter(|b| !self.accept_unverified && b.failure.is_none());
@@ -80,7 +80,7 @@ impl UpdateReport {
         kinds.chain(unproven).max()
     }
 
-    /// Returns the final message and the remedy for a report without a failed board if something is not proven.
+    /// Returns the final message and the remedy for an update without failures in which a program is not verified.
     pub fn unproven(&self) -> (String, &'static str) {
         let is_shown = |b: &&UpdateResult| b.outcome == UpdateOutcome::ProgramUpToDate;
         let boards: Vec<String> = self.boards.iter().filter(is_shown).map(|b| b.board.to_string()).collect();
@@ -95,20 +95,21 @@ impl UpdateReport {
         (message, "`rewrite` writes it")
     }
 
-    /// Returns the flash date of a board that already shows the program, if it differs from that of the image.
+    /// Returns the flash date of a board that already shows the program, if it differs from the date of the image.
     fn flashed(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let before = result.before.filter(|before| has_header(profile) && before.date != self.date)?;
         let is_shown = matches!(result.outcome, UpdateOutcome::UpToDate | UpdateOutcome::ProgramUpToDate);
         is_shown.then(|| format!("flashed {}", date_text(profile, before.date)))
     }
 
-    /// Returns the outcome of a board in words: `up-to-date (flashed 2026-11-25)` if the board keeps another date (U-3).
+    /// Returns the outcome of a board in words. If the board keeps another date, the words contain it: `up-to-date (flashed 2026-11-25)`
+    /// (U-3).
     pub fn outcome_words(&self, result: &UpdateResult, profile: &Profile) -> String {
         let name = result.outcome.name();
         self.flashed(result, profile).map_or_else(|| name.into(), |flashed| format!("{name} ({flashed})"))
     }
 
-    /// Returns the evidence for a board that already shows the program; `None` for any other board.
+    /// Returns how it is known that a board already has the program; `None` for boards that did not already show it.
     pub fn shown_already(&self, result: &UpdateResult, profile: &Profile) -> Option<String> {
         let same = match self.flashed(result, profile) {
             Some(flashed) => format!("same Program ID, {flashed}"),
@@ -131,12 +132,12 @@ pub struct Progress {
     pub attempt: u32,
     /// Cycle, 1 or 2.
     pub cycle: u32,
-    /// Bytes of both cycles that were taken in this attempt.
+    /// Number of bytes, of both cycles, that the boards have confirmed in this attempt.
     pub bytes: u64,
-    /// Bytes of both cycles.
+    /// Number of bytes that both cycles send.
     pub total: u64,
-    /// Bytes per second so far.
+    /// Average rate so far, in bytes per second.
     pub rate: u64,
-    /// Remaining time at that rate, µs.
+    /// Remaining time at this rate, µs.
     pub remaining_us: u64,
 }

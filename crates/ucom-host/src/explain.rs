@@ -181,8 +181,8 @@ pub fn words() -> Vec<Word> {
     fixed.chain(errors).collect()
 }
 
-/// Returns the words that match exactly. If there are none, returns the words that match without regard to letter case and punctuation. If
-/// there are none of these either, returns the words that contain the query, which needs at least 3 letters for this.
+/// Returns the words that match exactly. Otherwise returns the words that match without regard to letter case and punctuation. If this also
+/// finds nothing and the query has at least 3 letters, returns the words that contain the query.
 pub fn find<'a>(all: &'a [Word], query: &str) -> Vec<&'a Word> {
     let any = |fits: &dyn Fn(&str) -> bool| -> Vec<&'a Word> {
         all.iter().filter(|word| word.shown.iter().any(|shown| fits(shown))).collect()

@@ -7,7 +7,7 @@ use ucom::node::{Application, Text};
 
 /// Time from the start of the program until it serves requests, µs.
 const UP_US: u64 = 60_000;
-/// Longest time by which the axes are moved in one step, s.
+/// Longest time that one call simulates for the axes, s.
 const MOST_S: f64 = 5.0;
 
 /// Program of a board: its model, connected to the words of the protocol.

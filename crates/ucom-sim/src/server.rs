@@ -16,7 +16,7 @@ const CHANNEL: &str = "can0";
 /// If the computer was busy for longer than this, virtual time pauses. Otherwise the boards would lose their PC.
 const CATCH_UP_US: u64 = 200_000;
 
-/// Real-time server. It connects clients of the socketcand protocol with the boards of the chain over a simulated bus.
+/// Server that connects clients of the socketcand protocol with the boards of the chain, over a simulated bus and in real time.
 pub struct ChainServer<'a> {
     gateway: SocketcandGateway,
     bus: TimedBus,
@@ -80,7 +80,8 @@ impl<'a> ChainServer<'a> {
         self.bus.stats()
     }
 
-    /// Serves until nothing happens for a moment, no longer than `patience`.
+    /// Serves clients and boards. Waits for an event of a client at most until the next event of the chain or the bus, and at most
+    /// `patience`.
     pub fn turn(&mut self, patience: Duration) {
         let now_us = self.now_us();
         self.advance(now_us);

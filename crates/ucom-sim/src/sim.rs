@@ -12,7 +12,7 @@ const MASTER_US: u64 = 250_000;
 /// Period of frames of another protocol, µs.
 const FOREIGN_US: u64 = 40_000;
 
-/// Boards of a chain and the other senders on their bus. They are members of a bus that the caller runs.
+/// Boards of a chain and the other senders on their bus. All of them are members of a bus that the caller runs.
 ///
 /// Member 0 is the first board. The last member is not a board: it sends all frames that faults bring onto the bus. Call
 /// [`advance`](Self::advance), then [`poll`](Self::poll) each member and put its frame on the bus. Report the result to the member with
@@ -30,7 +30,7 @@ pub struct ChainSim {
     seen: BTreeMap<u16, u64>,
     /// `true` if the init wire after the board is broken.
     broken: Vec<bool>,
-    /// Members whose frames in transmission are no longer valid, because their controllers were reset.
+    /// Members whose frames in transmission are void because their controllers were reset.
     void: Vec<usize>,
     lost: f64,
     corrupted: f64,
@@ -82,7 +82,7 @@ impl ChainSim {
         self.boards.iter().enumerate().find_map(|(i, board)| Some((i, board.violation?)))
     }
 
-    /// Returns the time of the next event, µs; a time in the past means "at once".
+    /// Returns the time of the next event in µs. A time in the past means "at once".
     pub fn next_due_us(&self) -> u64 {
         let boards = self.boards.iter().map(Board::next_us);
         let begin = self.waiting.iter().filter_map(|fault| match fault.trigger {

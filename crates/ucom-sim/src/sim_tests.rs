@@ -85,7 +85,7 @@ fn the_same_seed_gives_the_same_frames() {
     };
     let first = run(1);
     assert!(first.len() > 300 && first == run(1));
-    // Only the back-off of unasked flags is random: it depends on the seed.
+    // Only the back-off of flags that are sent without a request is random: the back-off depends on the seed.
     assert_ne!(first, run(2));
 }
 

@@ -24,7 +24,7 @@ impl Admin {
         Payload::of(data, 4)
     }
 
-    /// Reads the 4 bytes. Returns `None` if a byte is neither 0 nor 1: such a frame is ignored.
+    /// Reads the 4 bytes. Returns `None` if a byte is neither 0 nor 1. The receiver then ignores the frame.
     pub const fn from_bytes(bytes: [u8; 4]) -> Option<Self> {
         if bytes[0] > 1 || bytes[1] > 1 || bytes[2] > 1 || bytes[3] > 1 {
             return None;

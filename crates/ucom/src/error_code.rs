@@ -9,7 +9,7 @@ macro_rules! error_codes {
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ErrorCode {
             $($(#[$doc])* $code,)+
-            /// A code that is not in the published list. It is shown as a number and never dropped.
+            /// A code that is not in the published list. The code is shown as a number and never dropped.
             Unknown(u8),
         }
 
@@ -73,11 +73,11 @@ error_codes! {
     Flash = 3, "DSP_ERROR_FLASH":
         "The board could not erase, write or verify its flash memory.",
         "Send the image again; after three attempts the hardware is at fault.";
-    /// 4: program data came while the block buffer was in use.
+    /// 4: program data arrived while the block buffer was in use.
     Overrun = 4, "DSP_ERROR_OVERRUN":
         "Program data came while the board was still busy with the block before.",
         "Send the image again with a larger prog.frame_gap_us.";
-    /// 5: invalid data header; or an offset at or beyond the dimension.
+    /// 5: invalid data header, or an offset at or beyond the end of the buffer.
     Data = 5, "DSP_ERROR_DATA":
         "The header of the image is invalid; or controller inputs or parameters were sent beyond the last one.",
         "In an update: the image's header is wrong. Else: compare the profile's dimensions and endian.";
@@ -97,7 +97,7 @@ error_codes! {
     Reinit = 9, "DSP_ERROR_REINIT":
         "A number was given while the acknowledgement of the one before had not left the board.",
         "Wait 100 ms, ask with PC_INFO, go on.";
-    /// 10: a cycle broke off, came out of turn or differed from the first.
+    /// 10: a cycle was interrupted, came in the wrong order or differed from the first cycle.
     ExloadCycle = 10, "DSP_ERROR_EXLOAD_CYCLE":
         "The transfer paused too long, came out of turn, or the second cycle differed from the first.",
         "Send the image again; three attempts in all.";
@@ -107,7 +107,7 @@ error_codes! {
         "Program the board first: `ucom update`.";
 }
 
-/// `5 DSP_ERROR_DATA`, `42 unknown error`.
+/// Prints number and name, such as `5 DSP_ERROR_DATA` or `42 unknown error`.
 impl fmt::Display for ErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.number(), self.name())

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Reasons why a frame is not of this protocol: such a frame is counted and shown, never acted on (D-02).
+/// Reasons why a frame is not of this protocol. Such a frame is counted and shown, but has no effect (D-02).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Foreign {
     /// 29-bit identifier.
@@ -11,7 +11,7 @@ pub enum Foreign {
     Remote,
     /// CAN FD frame.
     Fd,
-    /// Bit 5 of the identifier is set. It is 0 in every identifier of this protocol (D-01).
+    /// Bit 5 of the identifier is set. This bit is 0 in every identifier of this protocol (D-01).
     Bit5,
     /// Function number 28 to 31: it fits into the identifier, but the protocol does not define it.
     NoFunction(u8),

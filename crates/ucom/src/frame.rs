@@ -106,7 +106,7 @@ impl Frame {
         }
     }
 
-    /// Creates a frame of this protocol; infallible, because a [`Sequence`] always fits.
+    /// Creates a frame of this protocol. This cannot fail, because a [`Sequence`] is always valid.
     pub const fn of(function: Function, sequence: Sequence, payload: Payload) -> Self {
         Self { id: function.id(sequence), payload }
     }
@@ -170,7 +170,7 @@ impl fmt::Display for NotAFrame {
 
 impl core::error::Error for NotAFrame {}
 
-/// The form that candump prints; blanks and dots between bytes are allowed.
+/// Reads the form that candump prints. Blanks and dots between the bytes are allowed.
 impl FromStr for Frame {
     type Err = NotAFrame;
 

@@ -20,7 +20,7 @@ impl Sequence {
         if number > 31 { None } else { Some(Self(number)) }
     }
 
-    /// Returns the low 5 bits of a number, for fields that have only 5 bits.
+    /// Creates a number from the low 5 bits of a value, for fields that have only 5 bits.
     pub(crate) const fn low5(number: u8) -> Self {
         Self(number & 0x1F)
     }
@@ -64,7 +64,7 @@ macro_rules! functions {
             /// All functions in the order of their numbers.
             pub const ALL: [Self; 28] = [$(Self::$variant),+];
 
-            /// Returns the name in the published list, `PC_RESET`.
+            /// Returns the name in the published list, such as `PC_RESET`.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$variant => $name),+ }
             }
@@ -233,7 +233,7 @@ mod tests {
         assert_eq!(Function::split(0x800), Err(Foreign::Malformed));
     }
 
-    /// D-00: names and numbers are those of the published list.
+    /// D-00: names and numbers match the published list.
     #[test]
     fn d00_names_are_those_of_the_list() {
         assert_eq!(Function::from_number(22).unwrap().name(), "MCA_DUMP_IO_DESCRIPTION");

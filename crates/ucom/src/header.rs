@@ -57,7 +57,7 @@ pub struct Header {
     pub program_id: u16,
     /// Flash date (D-45).
     pub date: u16,
-    /// Flash number of the board that the image is for, [`Header::ANY_BOARD`] for every board.
+    /// Flash number of the board for which the image is made; [`Header::ANY_BOARD`] for every board.
     pub target: u16,
 }
 

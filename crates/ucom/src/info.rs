@@ -13,9 +13,9 @@ pub struct BoardInfo {
     pub sequence: u8,
     /// Status byte.
     pub status: Status,
-    /// Checksum of the application (D-44); 0xFFFF without one.
+    /// Checksum of the application (D-44); 0xFFFF if the board has none.
     pub program_id: u16,
-    /// Date of the application as a number (D-45); 0xFFFF without one.
+    /// Date of the application as a number (D-45); 0xFFFF if the board has none.
     pub date: u16,
 }
 

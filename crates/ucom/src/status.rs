@@ -10,7 +10,7 @@ pub struct Status(pub u8);
 impl Status {
     /// The application has been started by the exloader.
     pub const MSTART: Self = Self(0x80);
-    /// Autostart is enabled; kept over power loss.
+    /// Autostart is enabled. The bit survives a power loss.
     pub const ASTART: Self = Self(0x40);
     /// The control loop is running. Shows the actual state; cannot be written.
     pub const MCARUN: Self = Self(0x20);
@@ -105,7 +105,7 @@ impl fmt::Display for Status {
     }
 }
 
-/// Prints the names that are marked `true`, separated by blanks; `-` if there is none.
+/// Prints the names that are marked `true`, separated by blanks; `-` if all are `false`.
 pub(crate) fn words<const N: usize>(f: &mut fmt::Formatter<'_>, names: [(bool, &str); N]) -> fmt::Result {
     let mut gap = "";
     for (_, name) in names.iter().filter(|(on, _)| *on) {

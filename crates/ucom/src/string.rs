@@ -82,7 +82,7 @@ pub enum Assembled<'a> {
 pub struct StringAssembler<const N: usize = 512> {
     text: [u8; N],
     len: usize,
-    /// Packages still to come; `None` before the header.
+    /// Number of packages that are still missing; `None` before the header.
     open: Option<u16>,
     last_us: u64,
 }
@@ -245,7 +245,7 @@ mod tests {
         assert_eq!(assembler.missing(), 1);
         assert!(!assembler.expired(199_998, &profile));
         assert!(assembler.expired(199_999, &profile));
-        // After the gap, the header of the repeated answer starts a new string. It is not used as the missing package.
+        // After the gap, the header of the repeated answer starts a new string. The assembler does not use it as the missing package.
         assert_eq!(assembler.push(199_999, &header, &profile), Assembled::Partial);
         assert_eq!(assembler.missing(), 2);
     }

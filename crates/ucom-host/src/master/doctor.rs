@@ -13,7 +13,7 @@ use ucom::{Function, Profile};
 pub struct Controller {
     /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// Number of times that the controller was bus-off during the observation. It may be active again.
+    /// Number of times that the controller was bus-off during the observation. The controller may be active again.
     pub times_bus_off: u64,
     /// `true` if the controller is error passive.
     pub passive: bool,

@@ -154,7 +154,7 @@ impl Master {
         lock(&self.core).boards.clone()
     }
 
-    /// Returns the numbers that two boards share, each as the error with which procedures end for this reason.
+    /// Returns the numbers that two boards share, each as the error of a procedure that ends for this reason.
     pub fn shared_numbers(&self) -> Vec<Error> {
         lock(&self.core).holders.all_shared().into_iter().map(Error::from).collect()
     }

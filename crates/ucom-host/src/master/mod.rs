@@ -1,7 +1,7 @@
 //! The PC side: procedures as state machines without I/O.
 //!
-//! A [`Master`] gets received frames and the time, and returns frames to send. It never waits, and has no clock and no thread. A driver is
-//! a loop of a few lines:
+//! A [`Master`] gets received frames and the time, and returns frames to send. The master never waits, and has no clock and no thread. A
+//! driver is a loop of a few lines:
 //!
 //! 1. deliver every frame that has arrived: [`Master::handle`];
 //! 2. send while [`Master::poll`] returns frames;
@@ -31,9 +31,9 @@
 //! assert!(report.boards.is_empty());
 //! ```
 //!
-//! A procedure that changes something first makes this PC the master of the bus. It listens for another master (D-08); then heartbeats are
-//! sent until [`Master::end_session`]. Procedures that only scan or read information and descriptions change nothing and send no
-//! heartbeats.
+//! A procedure that changes something first makes this PC the master of the bus. The procedure listens for another master (D-08); then
+//! heartbeats are sent until [`Master::end_session`]. Procedures that only scan or read information and descriptions change nothing and
+//! send no heartbeats.
 
 mod counted;
 pub mod doctor;

@@ -184,7 +184,7 @@ mod tests {
         assert!(words.contains("what was begun is complete"), "{words}");
     }
 
-    /// The list contains boards that earlier requests of the same command have started, whatever request is in progress.
+    /// During any request, the list contains the boards that earlier requests of the same command have started.
     #[test]
     fn boards_started_before_are_named() {
         let cleanup = CleanupList::default();

@@ -136,7 +136,7 @@ pub enum ValuesError {
         board: u8,
         /// Reason.
         why: String,
-        /// Boards that were written before; `None` if there is no such list.
+        /// Boards that were written before; `None` if the list does not apply.
         written: Option<Vec<u8>>,
     },
     /// A parameter file cannot be read, or contains no value.

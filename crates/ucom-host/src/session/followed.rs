@@ -1,7 +1,7 @@
 //! Supervision of the boards of a run: which boards have left their control loops, and how old their values are.
 //!
 //! A board leaves its control loop by itself if the PC's heartbeats are missing, if another PC stops it, or if its application ends the
-//! loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the outputs are no longer sent, and the master
+//! loop. The board reports this in a single MCA_ADMIN_DATA frame. If that frame is lost, the outputs stop all the same, and the master
 //! reads the board's status.
 
 use std::collections::BTreeMap;

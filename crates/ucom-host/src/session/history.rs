@@ -30,7 +30,7 @@ pub struct History {
 }
 
 impl History {
-    /// Returns the history of a board. It is empty if the board has another program now.
+    /// Returns the history of a board. The history is empty if the board has another program now.
     pub fn of(cache: &Cache, info: &BoardInfo) -> Self {
         let file = format!("written-{:04X}.json", info.flash_number);
         let text = cache.read(&file);

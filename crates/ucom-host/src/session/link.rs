@@ -14,7 +14,7 @@ use crate::files::recording::{FrameKind, RecordedFrame};
 const COARSE: Duration = Duration::from_millis(12);
 /// Interval at which the bus is polled during such a wait.
 const LOOK: Duration = Duration::from_micros(100);
-/// Time by which a sleep may last too long. The last part of a wait, of this length, is not slept.
+/// Largest overrun of a sleep. The last part of a wait, of this length, is not slept.
 const OVERSLEPT: Duration = Duration::from_micros(150);
 
 /// An open bus with its clock.

@@ -20,7 +20,7 @@ use crate::report::Report;
 pub enum FromBoard {
     /// DSP_ERROR.
     Error(ErrorCode),
-    /// DSP_INITACK with the number that the board took. It must equal the number in the identifier (D-24).
+    /// DSP_INITACK with the number that the board took. The identifier must contain the same number (D-24).
     InitAck(u8),
     /// DSP_PROGFINISHED.
     ProgFinished,

@@ -36,7 +36,7 @@ impl NodeConfig {
     }
 }
 
-/// Counters of a board. They are not sent on the bus.
+/// Counters of a board. The board does not send them on the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames that are not of this protocol (D-02).

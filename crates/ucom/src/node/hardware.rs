@@ -118,10 +118,10 @@ pub trait Application {
     /// Returns the number of inputs, outputs and parameters. MUST NOT change while the program runs.
     fn dimensions(&self) -> Dimensions;
 
-    /// Returns a description in Latin-1. The text is empty if there is none.
+    /// Returns a description in Latin-1. The text is empty if the application has no such description.
     fn text(&self, text: Text) -> &[u8];
 
-    /// Returns the initial value of an input. It applies until the input is set.
+    /// Returns the initial value of an input. The value applies until the input is set.
     fn initial_ci(&self, index: u16) -> u16;
 
     /// Returns the buffer for received inputs, one word for each input. The words take effect at [`Application::latch_ci`].

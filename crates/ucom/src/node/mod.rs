@@ -6,8 +6,8 @@
 //! nothing by itself. Flash, pins, non-volatile memory and the application are traits ([`Flash`], [`Pins`], [`Store`], [`Application`]);
 //! the crate `ucom-sim` implements all four in memory.
 //!
-//! The node offers one frame at a time. It offers the next one after [`Node::sent`]. Frames of strings and dumps are created only when the
-//! bus can take them, so a node needs no queue for them.
+//! The node offers one frame at a time. The next frame is offered after [`Node::sent`]. Frames of strings and dumps are created only when
+//! the bus can take them, so a node needs no queue for them.
 
 mod answers;
 mod application;
@@ -148,7 +148,7 @@ impl<F: Flash, P: Pins, S: Store, A: Application> Node<F, P, S, A> {
         node
     }
 
-    /// Reboots the board as after a crash, watchdog reset or brown-out. The board sends one report unasked (D-26).
+    /// Reboots the board as after a crash, watchdog reset or brown-out. The board sends one report without a request (D-26).
     pub fn restart(&mut self, now_us: u64) {
         self.now_us = self.now_us.max(now_us);
         self.reboot(self.now_us, true);

@@ -1,4 +1,4 @@
-//! The validity record. It is written last and cleared first (D-45).
+//! The validity record, which is written last and cleared first (D-45).
 
 use super::hardware::RECORD_LEN;
 use crate::profile::Endian;
@@ -20,7 +20,7 @@ pub struct Record {
 const MAGIC: [u8; 2] = *b"UR";
 
 impl Record {
-    /// Returns the bytes for the flash, including a checksum. It makes a record invalid that a power loss has cut off.
+    /// Returns the bytes for the flash, including a checksum. A record that a power loss has cut off is therefore invalid.
     pub fn build(&self) -> [u8; RECORD_LEN] {
         let [p0, p1] = self.program_id.to_le_bytes();
         let [d0, d1] = self.date.to_le_bytes();

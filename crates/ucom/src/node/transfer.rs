@@ -11,7 +11,7 @@ use crate::program::Digest;
 pub(super) enum Work {
     /// Waits for frames.
     None,
-    /// A complete block was received. It is processed at this time.
+    /// A complete block was received. The block is processed at this time.
     Block(u64),
     /// The validity record will be cleared before the flash is erased.
     ClearRecord,

@@ -19,7 +19,7 @@ pub enum ProfileError {
     UnknownKey,
     /// The value is outside the key's range.
     Value(&'static Key),
-    /// Two values contradict each other: the keys and why.
+    /// Two values contradict each other. The text contains the keys and the reason.
     Contradiction(&'static str),
 }
 
@@ -65,8 +65,8 @@ impl Profile {
         }
     }
 
-    /// Returns the number that boards without a number listen to and use in their own frames: the broadcast number, or 0 if there is none
-    /// (D-04, D-06).
+    /// Returns the number that boards without a number listen to and use in their own frames: the broadcast number, or 0 if the profile has
+    /// none (D-04, D-06).
     pub const fn unnumbered(&self) -> Sequence {
         match self.broadcast_number() {
             Some(number) => number,

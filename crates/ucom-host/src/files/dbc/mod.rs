@@ -1,4 +1,5 @@
-//! DBC files for cantools, SavvyCAN and similar tools. They describe the protocol's frames, and the process data of known boards by name.
+//! DBC files for cantools, SavvyCAN and similar tools. The files describe the protocol's frames, and the process data of known boards by
+//! name.
 //!
 //! CI, SO and PAR are multiplexed by their buffer offset: the first word selects which three words follow (D-15). Packages of strings have
 //! the same identifier as other frames, and nothing in them shows that they are strings. For DSP_INFO and the IO description the file
@@ -17,7 +18,7 @@ use ucom::{Endian, Function, Sender, Sequence, Status};
 /// An input, output or parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedSignal {
-    /// Name of the signal. It is converted to an identifier.
+    /// Name of the signal. The name is converted to an identifier.
     pub name: String,
     /// Meaning of its word (D-11).
     pub signal: Signal,

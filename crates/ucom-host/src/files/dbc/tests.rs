@@ -1,4 +1,4 @@
-//! Tests with the crate `can-dbc`. It reads the files, and the tests decode frames with its result.
+//! Tests with the crate `can-dbc`: the crate reads the files, and the tests decode frames with its result.
 
 use can_dbc::{ByteOrder, Dbc, Message, MessageId, MultiplexIndicator, Signal, ValueType};
 use std::panic;

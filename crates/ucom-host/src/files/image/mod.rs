@@ -81,7 +81,7 @@ impl fmt::Display for AddressUnit {
     }
 }
 
-/// Treatment of addresses between the first and the last byte that no record fills.
+/// Treatment of gaps: addresses between the first and the last byte for which no record has data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Gaps {
     /// Refuse the file.
@@ -104,7 +104,7 @@ pub struct ImageOptions {
     pub gaps: Gaps,
     /// `true` to swap the two bytes of each word, for tool chains whose byte order differs from the wire.
     pub swap_bytes: bool,
-    /// Load address in words. It replaces the address in the file. `None`: the address in the file, or 0 for raw bytes.
+    /// Load address in words, which replaces the address in the file. `None`: the address in the file, or 0 for raw bytes.
     pub load_address_words: Option<u32>,
     /// Largest length of the image in bytes, including gaps.
     pub max_bytes: usize,
@@ -140,7 +140,7 @@ pub enum ImageNote {
         /// Number of data records.
         records: u32,
     },
-    /// The records follow one another only if their addresses have this unit. It is not the usual unit of the format.
+    /// The records follow one another only if their addresses have this unit. The unit is not the usual one of the format.
     AddressesCount(AddressUnit),
 }
 
@@ -171,7 +171,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads the content of a file. It is raw bytes if neither options nor content determine another format.
+    /// Reads the content of a file. The content is raw bytes if neither options nor content determine another format.
     pub fn parse(content: &[u8], options: &ImageOptions) -> Result<Self, ImageError> {
         Self::parse_named(None, content, options)
     }

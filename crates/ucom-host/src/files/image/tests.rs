@@ -53,7 +53,8 @@ fn intel_hex_as_published() {
 
 #[test]
 fn s_records_as_published_count_words_here() {
-    // The example on the format's manual page, completed. It has no gap if its addresses count bytes, and one gap if they count words.
+    // The example on the format's manual page, completed. The records have no gap if their addresses count bytes, and one gap if they count
+    // words.
     let text = "S00F000068656C6C6F202020202000003C\n\
                 S11F00007C0802A6900100049421FFF07C6C1B787C8C23783C6000003863000026\n\
                 S11F001C4BFFFFE5398000007D83637880010014382100107C0803A64E800020E9\n\
@@ -152,7 +153,7 @@ fn raw_bytes_are_whole_words() {
     assert!(matches!(Image::parse(b":00000001FF\n", &forced), Err(ImageError::WasRecords { .. })));
 }
 
-/// A text is never read as raw bytes, whatever its name is. The error reports the place of the record.
+/// A text with any name is never read as raw bytes. The error reports the place of the record.
 #[test]
 fn a_text_is_no_image() {
     let hex = hex_line(0, 0, &[1, 2, 3, 4]) + ":00000001FF\n";
@@ -188,7 +189,7 @@ fn a_text_is_no_image() {
             assert!(read(name, text).is_err(), "{name}: {text:?}");
         }
     }
-    // The name is that of an S-record file, so the first error in its records is reported.
+    // The name belongs to an S-record file, so the first error in its records is reported.
     assert!(matches!(read("a.s19", b"S1zz\n"), Err(ImageError::Line { line: 1, .. })));
     assert!(matches!(read("a.hex", &[0, 1, 2, 3]), Err(ImageError::Line { line: 1, .. })));
     let bytes: Vec<u8> = (0..=255).collect();
@@ -207,14 +208,14 @@ fn a_count_record_ends_a_file() {
     for kind in [5, 6] {
         let image = parse(&(s_line(0, 2, 0, b"name") + &whole + &count(kind, 4))).unwrap();
         assert_eq!((image.bytes().len(), image.notes()), (64, &[ImageNote::EndedByCount { records: 4 }][..]));
-        // With an end record there is no note about the count record.
+        // If the file has an end record, the count record is not noted.
         let image = parse(&(whole.clone() + &count(kind, 4) + &s_line(9, 2, 0, &[]))).unwrap();
         assert!(image.notes().is_empty());
         for wrong in [0, 1, 3, 5, 0x104] {
             let problem = problem(&(whole.clone() + &count(kind, wrong))).2;
             assert_eq!(problem, LineProblem::Count { declared: wrong, has: 4 });
         }
-        // If a record follows the count record and there is no end record, the file is not complete.
+        // If a record follows the count record, and the end record is missing, the file is not complete.
         for more in [s_line(1, 2, 32, &[9; 16]), s_line(0, 2, 0, b"name")] {
             let cut = parse(&(whole.clone() + &count(kind, 4) + &more));
             assert!(matches!(cut, Err(ImageError::NoEnd { lines: 6, .. })), "{cut:?}");
@@ -295,7 +296,7 @@ fn characters_of_records_are_never_an_image() {
     }
 }
 
-/// Raw bytes on request may have any name except that of an Intel HEX or S-record file. A text is accepted only from a `.bin` file.
+/// On request, a file with any name is read as raw bytes, except Intel HEX and S-record files. A text is accepted only from a `.bin` file.
 #[test]
 fn raw_bytes_on_request_are_looked_at() {
     let dir = tempfile::tempdir().unwrap();
@@ -332,7 +333,7 @@ fn raw_bytes_on_request_are_looked_at() {
 }
 
 proptest! {
-    /// The same bytes in the three formats, with records of any size and order, give the same image.
+    /// If the three formats contain the same bytes, in records of any size and order, they give the same image.
     #[test]
     fn three_forms_are_one_image(
         words in prop::collection::vec(any::<[u8; 2]>(), 1..300),

@@ -1,7 +1,7 @@
 //! Parameter files: parameters and initial inputs for boards, in YAML that users edit.
 //!
 //! The protocol has no way to read parameters back (D-35). A file therefore contains requested values, never the present values of a board.
-//! It identifies boards by flash number or name. The names of signals apply to one Program ID.
+//! A file identifies boards by flash number or name. The names of signals apply to one Program ID.
 
 mod check;
 mod read;

@@ -166,8 +166,8 @@ fn d35_a_saved_file_has_no_value_that_nobody_wanted() {
     assert_eq!(ParamsFile::parse(&params_text(&[])).unwrap(), ParamsFile::default());
 }
 
-/// D-11, D-35: if a saved file is read with another signal table, or without one, it gives the same word or is refused. It never gives
-/// another word.
+/// D-11, D-35: if a saved file is read with another signal table, or without one, it gives the same word or is refused. The file never
+/// gives another word.
 #[test]
 fn d11_a_saved_file_never_changes_its_meaning_with_the_table() {
     let description = IoDescription { par: texts(&["kd"]), ..Default::default() };

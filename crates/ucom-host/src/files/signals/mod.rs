@@ -36,8 +36,8 @@ impl BoardSignals {
         Self { ci: of(Kind::Ci), so: of(Kind::So), par: of(Kind::Par) }
     }
 
-    /// Returns the signals of a program for which the signal table has no entry. They accept only raw words, because the units of numbers
-    /// are not known.
+    /// Returns the signals of a program for which the signal table has no entry. These signals accept only raw words, because the units of
+    /// numbers are not known.
     pub fn raw_only(mut self) -> Self {
         for signal in self.ci.iter_mut().chain(&mut self.so).chain(&mut self.par) {
             signal.raw_only = true;
@@ -54,7 +54,7 @@ impl BoardSignals {
         }
     }
 
-    /// Returns a signal; `None` beyond the dimension.
+    /// Returns a signal; `None` if the buffer has no signal with this index.
     pub fn get(&self, kind: Kind, index: usize) -> Option<&Signal> {
         self.all(kind).get(index)
     }

@@ -30,7 +30,7 @@ pub struct Signal {
     pub scale: f64,
     /// Value of the word 0, in the signal's unit.
     pub offset: f64,
-    /// Unit such as `deg`; empty if there is none.
+    /// Unit such as `deg`; empty if the signal has none.
     pub unit: String,
     /// Smallest value that may be written, in the signal's unit.
     pub min: Option<f64>,
@@ -187,7 +187,7 @@ impl Signal {
             (SignalValue::Raw(word), SignalType::Bool) if *word > 1 => {
                 return Err(ValueError::Switch { given: text() });
             }
-            // A raw word is sent unchanged, whatever the scale is. The limits apply to it as well.
+            // A raw word is sent unchanged, with any scale. The limits apply to it as well.
             (SignalValue::Raw(word), _) => {
                 let number = self.number(*word);
                 if !self.within(self.scaled(number)) {

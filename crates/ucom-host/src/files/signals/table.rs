@@ -123,8 +123,8 @@ impl SignalTable {
         self.programs.iter().find(|p| p.program_ids.contains(&id))
     }
 
-    /// Returns the text of a table for programs that need one. It contains every name, with scale and unit guessed from the texts of the
-    /// boards. An expert must review it.
+    /// Returns the text of a table for programs that need one. The text contains every name, with scale and unit guessed from the texts of
+    /// the boards. An expert must review it.
     pub fn template(programs: &[(u16, &IoDescription)]) -> String {
         let mut text = String::from(
             "# What the words of inputs, outputs and parameters mean; `ucom help edges` explains the keys.\n\

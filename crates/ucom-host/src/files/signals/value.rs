@@ -8,9 +8,9 @@ const UNIT_MAX: usize = 32;
 /// A value that is not assigned to a signal yet.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SignalValue {
-    /// `0x05DC`: a raw word, whatever the type and scale of the signal are.
+    /// `0x05DC`: a raw word, for any type and scale of the signal.
     Raw(u16),
-    /// `15.5 deg`: a value in the signal's unit. `15.5`: a value of a signal without a unit; if there is no table, the word as a number.
+    /// `15.5 deg`: a value in the signal's unit. `15.5`: a value of a signal without a unit; without a signal table, the word as a number.
     Number {
         /// The number.
         value: f64,
@@ -62,7 +62,7 @@ impl FromStr for SignalValue {
         if !may_follow(unit) || unit.len() > UNIT_MAX {
             return Err(wrong());
         }
-        // 0o10 and -0x10 are numbers in other languages. They are refused, so that they are not read as 0 with a unit.
+        // 0o10 and -0x10 are numbers in other languages. Such texts are refused, so that they are not read as 0 with a unit.
         let mut letters = unit.chars();
         let joined = !text.contains(char::is_whitespace);
         if joined

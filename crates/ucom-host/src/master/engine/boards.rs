@@ -33,7 +33,7 @@ pub struct Board {
     pub life: Life,
     /// Time of the last heartbeat, µs.
     pub alive_at: Option<u64>,
-    /// Time of the last frame of any kind, µs, and its function.
+    /// Time of the last frame of any kind in µs, and its function.
     pub last: Option<(u64, Function)>,
     /// Time of the last sensor outputs, µs. The control loop was running at that time.
     pub so_at: Option<u64>,
@@ -149,7 +149,7 @@ impl Board {
         self.stopped_at.is_some_and(|at| now.saturating_sub(at) > UNDER_WAY)
     }
 
-    /// Records that the application has ended or will end now. Its heartbeats are no longer expected, and its state is unknown.
+    /// Records that the application has ended or will end now. From now on heartbeats are not expected, and the state is unknown.
     pub(crate) fn application_ended(&mut self) {
         self.life = Life::Unarmed;
         self.alive_at = None;

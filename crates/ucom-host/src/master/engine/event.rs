@@ -65,7 +65,7 @@ pub enum Event {
         board: u8,
         /// The code.
         code: ErrorCode,
-        /// Procedure that works with the board; `None` if there is none.
+        /// Procedure that works with the board; `None` if no procedure does.
         during: Option<ProcedureId>,
     },
     /// A board sent its flags without a request.

@@ -1,4 +1,4 @@
-//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, whatever procedure has asked.
+//! Detection of numbers that two boards share. The master checks every answer to PC_INFO, for all procedures.
 //!
 //! If two boards have the same number, both carry out every command to it: both are flashed, both move. A board cannot detect this, but the
 //! PC can, because two boards answer one PC_INFO. All answers are compared ([`Holders::received`]). Before a procedure changes something,

@@ -7,7 +7,7 @@ use ucom::{BufferPackage, Frame, Sequence, ToBoard};
 
 /// Percentage of the bus that repeated inputs may use.
 const INPUTS_SHARE: u64 = 70;
-/// Longest time by which repetitions may fall behind this limit and catch up later, µs.
+/// Longest delay of the repetitions that is caught up later, µs.
 const INPUTS_CREDIT: u64 = 5_000;
 
 impl Core {

@@ -101,12 +101,12 @@ impl Link {
         });
     }
 
-    /// Returns the next frame in the mailbox; `None` if there is none until `until`.
+    /// Returns the next frame in the mailbox; `None` if no frame arrives before `until`.
     pub(crate) async fn next(&self, until: u64) -> Option<Received> {
         self.next_of(until, |mailbox| mailbox.received.pop_front()).await
     }
 
-    /// Applies `take` to the mailbox until it returns a result; `None` if there is none until `until`.
+    /// Waits until `take` returns a result for the mailbox; `None` if it does not before `until`.
     pub(crate) async fn next_of<T>(&self, until: u64, take: impl Fn(&mut Mailbox) -> Option<T>) -> Option<T> {
         poll_fn(|_| {
             self.with(|core| {
@@ -127,7 +127,7 @@ impl Link {
         .await
     }
 
-    /// Returns the next unparsed frame; `None` if there is none until `until`.
+    /// Returns the next unparsed frame; `None` if no frame arrives before `until`.
     pub(crate) async fn next_raw(&self, until: u64) -> Option<(u64, Frame)> {
         self.next_of(until, |mailbox| mailbox.raw.as_mut().and_then(|raw| raw.pop_front())).await
     }

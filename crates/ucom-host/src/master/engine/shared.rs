@@ -63,7 +63,7 @@ pub(crate) struct Core {
     pub competing_master: Option<(u64, Function, u8)>,
     /// Reports until this time are considered to be answers.
     pub report_until: u64,
-    /// Stop commands of the policy that will be repeated, and their times. They are repeated because a frame can be lost.
+    /// Stop commands of the policy that will be repeated, and their times. The stops are repeated because a frame can be lost.
     pub stops: Vec<(u64, Sequence)>,
     /// Earliest time at which inputs may be repeated again.
     pub inputs_from: u64,
@@ -262,7 +262,7 @@ impl Core {
 
     fn retain_queued(&mut self, keep: impl Fn(&Outgoing) -> bool) {
         self.normal.retain(keep);
-        // A procedure may wait for a removed frame before the first remaining one. It must not wait for ever.
+        // A procedure may wait for a removed frame before the first remaining one. The procedure must not wait for ever.
         let before_first = self.normal.front().map_or(self.queued, |next| next.serial - 1);
         self.sent = self.sent.max(before_first);
     }
@@ -326,7 +326,7 @@ impl Core {
             self.may_start(to);
         }
         if function == Function::AskReport {
-            // The reports that follow are answers to the other PC. They do not mean that a board has rebooted.
+            // The reports that follow are answers to the other PC. These reports do not mean that a board has rebooted.
             self.report_until = self.report_until.max(self.now + self.times.report_ask + 500_000);
         }
         // An event is reported only after a pause of at least 1 s.

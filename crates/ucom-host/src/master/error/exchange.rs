@@ -166,7 +166,7 @@ pub enum Incomplete {
         /// Number of strings.
         strings: u32,
     },
-    /// The counts would be small numbers in the other byte order.
+    /// The announced counts are multiples of 256. In the other byte order the counts would be small numbers.
     #[error(
         "it announces {strings} strings, every count a multiple of 256: the byte order is probably wrong"
     )]

@@ -27,7 +27,7 @@ pub enum Error {
     Running(#[from] RunningError),
     /// A signal cannot be read or written.
     Signal(#[from] SignalError),
-    /// It is not clear which boards the update is for.
+    /// The request does not show which boards the update is for.
     Target(#[from] TargetError),
     /// An update cannot be planned.
     Plan(#[from] PlanError),
@@ -85,7 +85,7 @@ impl Diagnose for Error {
     }
 }
 
-/// Returns the facts about some boards. They contain the board if there is exactly one.
+/// Returns the facts about some boards. If there is exactly one board, the facts contain it.
 pub(crate) fn of_one(boards: &[u8]) -> Facts {
     match boards {
         [board] => Facts::default().at_board(*board),

@@ -27,7 +27,7 @@ pub enum SignalError {
         /// `true` if the board has an application that is not running.
         valid: bool,
     },
-    /// The board's description is no longer the one with which the values were chosen (D-36).
+    /// The board's description has changed since the values were chosen (D-36).
     #[error(
         "board {board}: its inputs, outputs and parameters are not those that were known under its program"
     )]

@@ -27,7 +27,7 @@ impl Kind {
     }
 }
 
-/// Key of a description. It contains Program ID and flash date (D-36), and also the board, because boards with the same image can have
+/// Key of a description. The key contains Program ID and flash date (D-36), and also the board, because boards with the same image can have
 /// different applications.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct DescriptionKey {
@@ -46,10 +46,10 @@ impl DescriptionKey {
     }
 }
 
-/// The description that an application sends of itself and of every signal. It is stored under a [`DescriptionKey`].
+/// The description that an application sends of itself and of every signal. The description is stored under a [`DescriptionKey`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct IoDescription {
-    /// Text about the application. It may differ from the board's own description in DSP_INFO.
+    /// Text about the application. The text may differ from the board's own description in DSP_INFO.
     pub description: String,
     /// Controller inputs.
     pub ci: Vec<String>,
@@ -75,8 +75,8 @@ impl IoDescription {
         }
     }
 
-    /// Returns the index of a signal. It is found by its text, with or without the unit in brackets at its end, or by its index (`#3` or
-    /// `3`). The letter case is ignored if only one signal matches then.
+    /// Returns the index of a signal. The signal is found by its text, with or without the unit in brackets at its end, or by its index
+    /// (`#3` or `3`). The letter case is ignored if only one signal matches then.
     pub fn find(&self, board: u8, kind: Kind, name: &str) -> Result<u16, SignalError> {
         let names = self.names(kind);
         let only = |matches: &dyn Fn(&String) -> bool| {

@@ -3,7 +3,7 @@ use crate::master::engine::Link;
 use crate::master::reports::Reports;
 use ucom::{FromBoard, Function, ToBoard};
 
-/// The four functions with which boards report.
+/// The four functions of reports from boards.
 pub(crate) const REPORTS: [Function; 4] =
     [Function::Report0, Function::Report1, Function::Report2, Function::Report3];
 

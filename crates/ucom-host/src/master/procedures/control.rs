@@ -279,7 +279,7 @@ pub(crate) async fn start_from(link: &Link, before: BoardSeen) -> Result<BoardSe
                     }
                     .into());
                 }
-                // Errors caused by a bad bus are only stored. They are returned if all attempts fail.
+                // Errors caused by a bad bus are only stored. Such errors are returned if all attempts fail.
                 message => error = Link::device(board, &message, "PC_START").or(error),
             }
         }
@@ -307,8 +307,8 @@ pub(crate) async fn start(link: Link, board: u8, force: bool) -> Result<Outcome,
     start_application(&link, board).await.map(Outcome::Started)
 }
 
-/// Returns the flags before a change: those that the board sent last. If there are none, derives them from the status, with the outputs off
-/// (D-37).
+/// Returns the flags before a change: those that the board sent last. If the board has sent none, derives them from the status, with the
+/// outputs off (D-37).
 async fn flags(link: &Link, board: u8, ends: bool) -> Result<Admin, Error> {
     let known = info(link, board).await?.info;
     // A command that ends something must not wait for answers.

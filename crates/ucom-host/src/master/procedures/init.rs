@@ -41,8 +41,8 @@ pub(crate) async fn init(link: Link, options: InitOptions) -> Result<Outcome, Er
     Ok(Outcome::Init(report))
 }
 
-/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but its inputs are no longer
-/// repeated.
+/// Stops boards that did not receive the reset. Such a board has kept its number and continues to run, but this PC does not repeat its
+/// inputs any more.
 async fn stop_unreset(link: &Link, report: &mut InitReport) {
     for seen in report.boards.iter_mut().filter(|seen| runs_on(seen.info.status)) {
         let stopped = stop_board(link, seen.number, StopLevel::Application).await;

@@ -8,7 +8,7 @@ use ucom::{Function, ToBoard};
 
 /// Maximum age of an answer to PC_INFO that still shows which board has a number, µs.
 const FRESH: u64 = 2_000 * MS;
-/// Time between two questions in µs. It keeps the answers of 31 boards from arriving as one burst.
+/// Time between two questions in µs. The pause keeps the answers of 31 boards from arriving as one burst.
 const SPACING: u64 = 2 * MS;
 
 /// Checks that each of these numbers belongs to only one board: no other board answers PC_INFO within the allowed time. A number to which

@@ -7,13 +7,13 @@ use crate::master::procedures::exchange::{Answer, InfoCollector, TRIES, identity
 use crate::master::reports::BoardSeen;
 use ucom::{BoardInfo, FromBoard, Function, Sequence, Status, ToBoard};
 
-/// Time between two requests of a round in µs. It keeps the answers of 31 boards from arriving as one burst.
+/// Time between two requests of a round in µs. The pause keeps the answers of 31 boards from arriving as one burst.
 const SPACING: u64 = 2_000;
 
 /// The answers to one number.
 #[derive(Default)]
 pub(crate) struct Slot {
-    /// Answers so far. They may differ in their identity.
+    /// Answers so far, which may differ in their identity.
     pub answers: Vec<(BoardInfo, Option<String>)>,
     pub confirmed: bool,
     pub contradicts: bool,
@@ -120,7 +120,7 @@ pub(crate) async fn statuses(
 }
 
 /// Returns the status of every board that answers. All boards are asked at once, and twice, because a frame can be lost. A board that sends
-/// sensor outputs is considered to be running, whatever its status is.
+/// sensor outputs is considered to be running, even if its status shows another state.
 pub(crate) async fn board_states(link: &Link) -> BTreeMap<u8, Status> {
     let numbers: Vec<Sequence> = link.profile().board_numbers().collect();
     let mask = numbers.iter().fold(0, |mask, n| mask | 1 << n.number());

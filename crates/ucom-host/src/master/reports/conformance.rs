@@ -14,7 +14,7 @@ pub struct ConformanceOptions {
     pub init: bool,
     /// Permission to start applications and control loops, with safe outputs.
     pub run: bool,
-    /// Program for one board. It also is the permission to program that board.
+    /// Program for one board, and permission to program that board.
     pub program: Option<ConformanceProgram>,
     /// Names of the tests to run. Empty: all tests.
     pub only: Vec<String>,

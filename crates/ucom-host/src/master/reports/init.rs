@@ -22,7 +22,7 @@ pub struct InitReport {
     pub reports: Reports,
     /// Boards in the order of the chain.
     pub boards: Vec<BoardSeen>,
-    /// Problems; empty if there are none.
+    /// Problems; empty if the init succeeded.
     pub findings: Vec<InitFinding>,
 }
 

@@ -26,9 +26,9 @@ pub struct ProbeRow {
     pub key: &'static str,
     /// The property.
     pub unknown: &'static str,
-    /// What the published description says about it.
+    /// Statement about it in the published description.
     pub published: &'static str,
-    /// What was observed.
+    /// The observation.
     pub observed: String,
     /// Value in the resulting profile.
     pub decision: String,
@@ -45,7 +45,7 @@ pub struct ProbeReport {
     pub rows: Vec<ProbeRow>,
     /// Boards that answered.
     pub boards: Vec<u8>,
-    /// Number of different UCoM ids in the reports. It includes boards without a number.
+    /// Number of different UCoM ids in the reports. Boards without a number are included.
     pub reports: usize,
     /// Report of the new numbers, if the probe has assigned numbers.
     pub init: Option<InitReport>,

@@ -209,7 +209,7 @@ pub enum Outcome {
         /// Flags after the change.
         admin: Admin,
     },
-    /// Outcome of [`Request::Update`]. It contains a result for each board.
+    /// Outcome of [`Request::Update`], with a result for each board.
     Update(UpdateReport),
     /// Outcome of [`Request::Describe`].
     Description {
@@ -231,6 +231,6 @@ pub enum Outcome {
     Probe(ProbeReport),
     /// Outcome of [`Request::RawStatus`].
     RawStatus(Vec<RawStatus>),
-    /// Outcome of [`Request::Conformance`]. It contains the results of the tests, and the error that ended them early.
+    /// Outcome of [`Request::Conformance`], with the results of the tests and the error that ended them early.
     Conformance(ConformanceReport),
 }

@@ -9,7 +9,7 @@ use ucom::profile::Endian;
 /// Reports of the boards after PC_RESET or PC_REPORT.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reports {
-    /// Low bytes of the flash numbers. They distinguish the boards.
+    /// Low bytes of the flash numbers. These bytes distinguish the boards.
     pub ids: BTreeSet<u8>,
     /// Number of report frames from each board.
     pub frames: BTreeMap<u8, u32>,
@@ -105,7 +105,7 @@ pub enum ScanFinding {
         board: u8,
         /// Flash number of the first board.
         first: u16,
-        /// Flash number of the second board. It equals `first` if the boards cannot be distinguished.
+        /// Flash number of the second board. The same as `first` if the boards cannot be distinguished.
         second: u16,
     },
     /// A board reports an impossible status.
@@ -129,7 +129,7 @@ fn shared(board: u8, found: [u16; 2]) -> Error {
 }
 
 impl ScanFinding {
-    /// Returns the error with which other commands refuse such a chain; `None` if they accept it.
+    /// Returns the error of other commands that refuse such a chain; `None` if they accept it.
     pub fn error(&self) -> Option<Error> {
         match self {
             Self::NumberShared { board, first, second } => Some(shared(*board, [*first, *second])),

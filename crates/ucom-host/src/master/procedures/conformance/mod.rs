@@ -1,4 +1,4 @@
-//! Acceptance tests for real boards. They check that boards follow the protocol page.
+//! Acceptance tests for real boards. The tests check that boards follow the protocol page.
 //!
 //! By default the tests only ask questions, which change nothing. [`ConformanceOptions`](crate::master::conformance::ConformanceOptions)
 //! can allow more: a new address assignment, running applications with safe outputs, programming. Each test exchanges a few frames that it

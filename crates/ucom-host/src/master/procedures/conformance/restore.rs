@@ -1,4 +1,4 @@
-//! Returns boards to their state before the tests, also if the tests end early.
+//! Returns boards to their state before the tests, even if the tests end early.
 use crate::master::engine::{Link, MS, Session};
 use crate::master::error::{Error, ExchangeError, IdentityError, StatusError};
 use crate::master::procedures::conformance::bench::Found;

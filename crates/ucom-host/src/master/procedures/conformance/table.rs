@@ -6,7 +6,7 @@ use crate::master::procedures::conformance::bench::Bench;
 use crate::master::procedures::conformance::{application, ask, chain, program};
 use crate::master::reports::{ConformanceOptions, Verdict};
 
-/// Effect of a test on boards. It determines which permission the test needs.
+/// Effect of a test on boards. The effect determines which permission the test needs.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Level {
     /// The test changes nothing.
@@ -82,7 +82,7 @@ macro_rules! talk {
     };
 }
 
-/// All tests in the order of execution. Their numbers are those of the acceptance tests.
+/// All tests in the order of execution, with the numbers of the acceptance tests.
 #[rustfmt::skip]
 pub(super) static TESTS: [Test; 21] = [
     Test { id: "D-T2", level: Level::Ask, scope: Scope::Chain, run: talk!(ask::reports),

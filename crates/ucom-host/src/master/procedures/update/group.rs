@@ -66,9 +66,9 @@ pub(super) async fn group(link: &Link, session: &mut UpdateSession) -> Result<()
     Ok(())
 }
 
-/// Checks whether a board whose READY was lost has continued with the others and is done; if so, verifies it. Otherwise stores in the
-/// session what the board's answer shows about its flash. If the board already had this program before, its answer does not show whether it
-/// is done.
+/// Checks whether a board whose READY was lost has continued with the others and is done. If so, verifies it. Otherwise the session stores
+/// whether the board's flash was erased, as far as its answer shows this. If the board already had this program before, its answer does not
+/// show whether it is done.
 async fn is_done_after_all(link: &Link, session: &mut UpdateSession, board: u8, plan: &UpdatePlan) -> bool {
     let Ok(seen) = confirmed(link, board).await else { return false };
     let had = session.before(board).is_some_and(|before| has(&before, plan));

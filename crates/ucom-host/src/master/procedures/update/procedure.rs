@@ -102,7 +102,7 @@ async fn broken_off(link: &Link, session: &mut UpdateSession, why: &Error) -> Re
 }
 
 /// Ends the programming mode of boards that already show the program. A board may still be in that mode because an earlier update tool was
-/// killed. It would then accept program data for other boards.
+/// killed. The board would then accept program data for other boards.
 async fn end_programming(link: &Link, session: &mut UpdateSession) -> Result<(), Error> {
     while let Some(board) = session.programming.first().copied() {
         let ended = match link.become_master(session.options.force).await {
@@ -208,7 +208,7 @@ async fn start_rest(link: &Link, session: &mut UpdateSession) -> Result<(), Erro
 
 /// Returns the outcome of a board that needs no transfer (U-3 and D-62); `None` if the board must be written.
 ///
-/// PC_INFO shows only the Program ID and date of program memory. It shows neither the load address nor a second image.
+/// PC_INFO shows only the Program ID and date of program memory. The answer shows neither the load address nor a second image.
 fn already(link: &Link, session: &UpdateSession, known: &BoardInfo) -> Option<UpdateOutcome> {
     let options = &session.options;
     let expected = session.plan(link, None).ok()?.expected?;

@@ -1,4 +1,4 @@
-//! State of all boards of an update. It is kept if the update is cancelled or the bus fails.
+//! State of all boards of an update, which is kept if the update is cancelled or the bus fails.
 
 use crate::master::engine::Link;
 use crate::master::error::Error;

@@ -88,7 +88,7 @@ pub enum UpdateFailure {
     /// The user cancelled the update.
     #[error("cancelled: {}", left_behind(*left))]
     Cancelled {
-        /// State after the cancel. It equals the board's outcome, except that it is `Running` if the application may be running.
+        /// State after the cancel. This is the board's outcome, or `Running` if the application may be running.
         left: UpdateOutcome,
     },
     /// An earlier board of the list failed, so this board was skipped.

@@ -12,7 +12,8 @@ pub enum UpdateOutcome {
     Cancelled,
     /// The board shows the program, and the flash record has the same image at the same address (U-3, D-62). No program data were sent.
     UpToDate,
-    /// The board shows the program, but there is no flash record that shows its load address and content (D-62). No program data were sent.
+    /// The board shows the program, but a flash record that shows its load address and content is missing (D-62). No program data were
+    /// sent.
     ProgramUpToDate,
     /// Memory was erased and no image is complete. The board stays in its exloader and can be programmed again.
     Incomplete,

@@ -102,7 +102,7 @@ impl Unverifiable {
 }
 
 impl UpdateImage {
-    /// Checks that the image can be sent. It must consist of complete words, except with the plan `raw`.
+    /// Checks that the image can be sent. The image must consist of complete words, except with the plan `raw`.
     fn check(&self, plan: Plan) -> Result<(), PlanError> {
         match self.bytes.len() {
             0 => Err(PlanError::Empty),
@@ -160,7 +160,7 @@ impl UpdatePlan {
         let erases_from = match plan {
             // The first cycle only checks the image, or fills RAM. The application in flash stays valid.
             Plan::VerifyWrite | Plan::ExloaderApp => 2,
-            // The first cycle writes program flash. With raw files, only their author knows what they do.
+            // The first cycle writes program flash. The effect of raw files is known only to their author.
             Plan::PmemXmem | Plan::Raw => 1,
         };
         let unverifiable = Unverifiable::by_profile(profile);

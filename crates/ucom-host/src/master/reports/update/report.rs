@@ -19,12 +19,12 @@ pub struct UpdateResult {
     pub after: Option<BoardInfo>,
     /// Outcome of the update.
     pub outcome: UpdateOutcome,
-    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool has written exactly this image to this address. It may
-    /// have done so now, or earlier according to the flash record.
+    /// `true` if PC_INFO shows the Program ID and date of the image, and this tool has written exactly this image to this address. The
+    /// image was written now, or earlier according to the flash record.
     pub verified: bool,
     /// Number of attempts.
     pub attempts: u32,
-    /// Reason of the failure; `None` if there is none.
+    /// Reason of the failure; `None` if the update succeeded.
     pub failure: Option<UpdateFailure>,
     /// Time from the XRESET to the last answer, µs.
     pub time_us: u64,

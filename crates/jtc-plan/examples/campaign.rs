@@ -1,8 +1,8 @@
-//! Plans random motions and judges each by its samples.
+//! Plans random motions and checks the samples of each motion.
 //!
 //!     cargo run --profile dist -p jtc-plan --example campaign -- [CASES [SEED]]
 //!
-//! Prints the seed of every wrong case. Ends with exit code 1 if a case was wrong.
+//! Prints the seed of every failed case. Ends with exit code 1 if a case failed.
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use std::time::Instant;

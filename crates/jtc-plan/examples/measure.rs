@@ -3,9 +3,10 @@
 //!     cargo run --profile dist -p jtc-plan --example measure -- speed
 //!     cargo run --profile dist -p jtc-plan --example measure -- quality [CASES [SEED]]
 //!
-//! `speed` prints the processor time in ms, the least of some plans. `quality` prints a line for each kind of path: sum and worst case of
-//! the durations, as shares of the durations without a jerk limit, and the number of motions that became slower with all limits doubled. If
-//! a file name follows the seed, the duration of each motion is written to that file.
+//! `speed` prints the processor time in ms, the shortest of several runs. `quality` prints a line for each kind of
+//! path: sum and maximum of the durations, each divided by the duration without a jerk limit, and the number of motions
+//! that became slower when all limits were doubled. If a file name follows the seed, the duration of each motion is
+//! written to that file.
 use std::fmt::Write as _;
 
 use jtc_core::{Config, Parameters};

@@ -1,12 +1,14 @@
 //! Plans the motions that standard input requests, for comparison with other implementations.
 //!
-//! Input is lines of words, each number with all its digits. The arm is the default one, without friction and payload:
+//! Each input line is a list of words; numbers have all their digits. The arm is the default one, without friction and
+//! payload:
 //!
-//! - `limits`, then velocity, acceleration, jerk (`inf`: none) and torque of six joints: sets the limits for the lines that follow.
+//! - `limits`, then velocity, acceleration, jerk (`inf`: no limit) and torque of six joints: sets the limits for the
+//!   lines that follow.
 //! - `move`, then start and end positions of six joints: prints the duration in s.
-//! - `path`, then the blend (rad), 1 with torque or 0 without, the number of places, and waypoints of six joints: prints a line with
-//!   duration (s), planning time (s) and the number of places. A line for each place follows: the path's parameter, then position, first
-//!   and second derivative of six joints.
+//! - `path`, then the blend (rad), 1 with torque or 0 without, the number of places, and waypoints of six joints:
+//!   prints a line with duration (s), planning time (s) and the number of places. One line per place follows, with the
+//!   path parameter, then position, first and second derivative of six joints.
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::time::Instant;

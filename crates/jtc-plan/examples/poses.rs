@@ -1,12 +1,13 @@
-//! Answers poses of the flange with joint positions, and lines of the flange with paths, for comparison with other implementations.
+//! Solves inverse kinematics for flange poses and straight flange paths, for comparison with other implementations.
 //!
-//! Input is lines of words. Each line except `model` is answered by a line:
+//! Each input line is a list of words. The example answers each line except `model` with one line:
 //!
 //! - `model`: 7 joint origins (xyz in m, rpy in rad), then lowest and highest position of the 6 joints (rad).
-//! - `pose`: position (m), quaternion x y z w, joint positions that the solution should be near to: `solved`, the nearest solution, and all
-//!   solutions within the limits; or `refused` and the reason.
-//! - `line`: joint positions at the start, position and quaternion at the end, number of samples: `path`, and for each sample, evenly from
-//!   start to end, its parameter, joint positions, first and second derivatives; or `refused` and the reason.
+//! - `pose`: position (m), quaternion x y z w, joint positions that the solution should be near to. Answer: `solved`,
+//!   the nearest solution, and all solutions within the limits; or `refused` and the reason.
+//! - `line`: joint positions at the start, position and quaternion at the end, number of samples. Answer: `path`, and
+//!   for each sample, at equal distances from start to end, its parameter, joint positions, first and second
+//!   derivatives; or `refused` and the reason.
 use std::io::{BufRead, Write};
 
 use jtc_dynamics::{ArmModel, Origin, Pose};

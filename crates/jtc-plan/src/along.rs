@@ -15,9 +15,9 @@ use crate::{ArmDynamics, Limits, PlanError, jerk, reach, reasons, verify};
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::Position`] and
-/// [`PlanError::Path`] if the path leads outside the limits or has no direction, [`PlanError::Torque`] if the torque
-/// does not suffice at any speed.
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion, [`PlanError::Position`] and
+/// [`PlanError::Path`] if the path leads outside the limits or has no direction, [`PlanError::Torque`] if the torque is
+/// too small at every speed.
 pub fn along(path: &dyn Path, limits: &Limits, arm: Option<&ArmDynamics>) -> Result<Motion, PlanError> {
     unexplained(path, limits, arm).map(|motion| reasons::explained(motion, limits, arm))
 }
@@ -31,8 +31,8 @@ pub(crate) fn unexplained(
     along_at(path, limits, arm, &|_| 1.0, &mut Choices::default())
 }
 
-/// Choices made for each section of a path, so that a repeated plan makes the same choices: the time law then depends
-/// on the path without jumps.
+/// Choices made for each section of a path. A repeated plan reuses them, so that the time law changes continuously with
+/// the path.
 #[derive(Debug, Default)]
 pub(crate) struct Choices(Vec<Option<Choice>>);
 
@@ -40,11 +40,11 @@ pub(crate) struct Choices(Vec<Option<Choice>>);
 #[derive(Clone, Copy, Debug)]
 enum Choice {
     InteriorPoint,
-    /// Without jerk, or averaged with these shares.
+    /// Without a jerk limit, or averaged over a window with these shares.
     Other(Option<jerk::Shares>),
 }
 
-/// Like [`unexplained`], with a share of the speed that depends on the waypoint (from 1) that was passed last.
+/// Like [`unexplained`], with a speed factor that depends on the waypoint passed last (counted from 1).
 pub(crate) fn along_at(
     path: &dyn Path,
     limits: &Limits,
@@ -74,8 +74,8 @@ pub(crate) fn along_at(
     verify::finished(motion, limits, arm)
 }
 
-/// Returns the first waypoint at `s`, from 1; several waypoints in a row may be the same. Without a waypoint at `s`,
-/// returns the last one passed.
+/// Returns the number (from 1) of the first waypoint at `s`; several waypoints in a row may have the same position.
+/// Without a waypoint at `s`, returns the last one passed.
 fn first_waypoint(path: &dyn Path, s: f64) -> usize {
     let passed = |s: f64| if s < 0.0 { 0 } else { path.waypoint(s).unwrap_or(1) };
     passed(s).min(passed(s.next_down()) + 1)
@@ -105,7 +105,7 @@ fn sections(path: &dyn Path) -> Result<Vec<Section<'_>>, PlanError> {
     let sections = ends.windows(2).map(|pair| {
         let (from, to) = (pair[0], pair[1]);
         let mut of_section = between(&waypoints, from, to);
-        // A repeated waypoint is passed repeatedly.
+        // If a waypoint is repeated, the path passes it as many times.
         let at = |place: f64| {
             waypoints.partition_point(|s| *s <= place) - waypoints.partition_point(|s| *s < place)
         };
@@ -133,7 +133,7 @@ fn of_section(
         .collect();
     let caps = caps(section, &cells, limits, arm)?;
     let plan = Plan { section, cells: &cells, reached: caps.clone(), caps, shares, limits, arm };
-    // Along a straight line without torque no law is faster than an average.
+    // On a straight line without torque limits, the averaged law is already the fastest.
     let is_straight = cells.iter().all(Cell::is_straight);
     let found = match *chosen {
         Some(Choice::Other(_)) => None,
@@ -161,7 +161,7 @@ fn of_section(
     }
 }
 
-/// Returns the motion of a law without jerk, or of a law averaged over a window, with the shares chosen for it.
+/// Returns the motion of a law without a jerk limit, or of a law averaged over a window with the shares chosen for it.
 fn without_interior(
     mut plan: Plan,
     shares: Option<jerk::Shares>,
@@ -172,7 +172,7 @@ fn without_interior(
     };
     let mut made = plan.make(shares, 0)?;
     let shares = made.shares;
-    // Friction is evaluated up to the highest speed in a cell, which each round estimates better.
+    // Friction is evaluated up to the highest speed in a cell. Each round estimates that speed better.
     plan.arm = Some(arm);
     let mut best: Option<Motion> = None;
     for _ in 0..TORQUE_ROUNDS {
@@ -190,7 +190,7 @@ fn without_interior(
     Ok((best.ok_or("its time is not finite")?, shares))
 }
 
-/// Returns the highest squared speeds of the cells by the limits of speed and by friction.
+/// Returns the highest squared speed of each cell that velocity limits and friction permit.
 fn caps(
     section: &Section,
     cells: &[Cell],
@@ -217,7 +217,7 @@ pub(crate) struct Plan<'a> {
     pub caps: Vec<f64>,
     /// Squared speed in each cell up to which friction is evaluated.
     pub reached: Vec<f64>,
-    /// Shares of the speed, per cell.
+    /// Speed factor of each cell.
     pub shares: Vec<f64>,
     pub limits: &'a Limits,
     pub arm: Option<&'a ArmDynamics<'a>>,
@@ -231,9 +231,10 @@ pub(crate) struct Made {
     pub shares: Option<jerk::Shares>,
 }
 
-/// Number of repairs of a law by the interior-point method: cells in which a limit is violated between the samples are slowed down.
+/// Number of times that an interior-point law is repaired, by slowing down the cells in which a limit is violated
+/// between samples.
 const INTERIOR_REPAIRS: usize = 1;
-/// Largest number of cells for which averages over a window are tried as well.
+/// Largest number of cells for which averages over a window are tried in addition.
 const FEW: usize = 200;
 /// Number of times that a section is planned with torque.
 const TORQUE_ROUNDS: usize = 4;
@@ -242,9 +243,10 @@ const WORTH: f64 = 0.004;
 /// Largest factor between a cell's speeds in two consecutive rounds.
 const FASTER: f64 = 1.1;
 
-/// Number of repairs of single cells in which a limit is violated between the samples, before the whole motion is slowed down.
+/// Number of times that single cells are slowed down because of a limit violated between samples, before the whole
+/// motion is slowed down.
 const REPAIRS: usize = 4;
-/// Maximum slowdown factor of the whole motion that replaces a repair.
+/// The whole motion is slowed down, instead of another repair, if the factor is at most this.
 const LEFT_OVER: f64 = 1.001;
 
 impl Plan<'_> {
@@ -291,7 +293,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns a time factor for each cell, which makes its limits hold.
+    /// Returns a time factor for each cell with which its limits hold.
     pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

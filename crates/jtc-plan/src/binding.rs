@@ -15,7 +15,7 @@ pub enum LimitKind {
     Jerk,
     /// Joint torque, N·m.
     Torque,
-    /// A time given for a waypoint: the motion could be faster.
+    /// A time given for a waypoint. The limits permit a faster motion.
     GivenTime,
 }
 
@@ -49,7 +49,8 @@ impl fmt::Display for LimitKind {
     }
 }
 
-/// Time interval with the limit that is used up, or that is closest to being used up: a faster motion would exceed it.
+/// Time interval with its binding limit: the limit that is reached or nearly reached, so that a faster motion would
+/// exceed it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Binding {
     /// Start of the interval, s from the start.

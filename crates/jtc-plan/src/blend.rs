@@ -5,34 +5,35 @@ use crate::distance::distance;
 use crate::path::{Path, PathPoint, Waypointed};
 use crate::{JOINTS, JointVec, PlanError, thin};
 
-/// Distance below which waypoints count as equal, rad.
+/// Distance below which waypoints are considered equal, rad.
 const SAME: f64 = 1e-9;
-/// Smallest difference of directions that counts as a corner.
+/// Smallest difference of directions that is treated as a corner.
 const STRAIGHT: f64 = 1e-9;
-/// Size of the sum of directions below which the path turns back: a stop instead of a corner (some 3°).
+/// If the sum of the two directions is shorter than this, the path turns back (within some 3°) and stops instead of
+/// rounding the corner.
 const BACK: f64 = 0.05;
 
-/// Straight legs in joint space between waypoints, with rounded corners: the path leaves a leg, and reaches the next
-/// one, within `blend` rad of the waypoint between them, measured on the joint that moves most.
+/// Straight legs in joint space between waypoints, with rounded corners. The path leaves a leg and reaches the next one
+/// within `blend` rad of the waypoint between them, measured on the joint that moves most.
 ///
-/// In a corner the direction changes from that of one leg to that of the other along a step with a slope that rises,
-/// stays and falls, so that the curvature is continuous, the path stays in the triangle of the corner, and no joint
+/// In a corner the direction changes from one leg to the next along a smooth step, whose slope rises, stays constant
+/// and falls. The curvature is therefore continuous, the path stays in the triangle of the corner, and no joint
 /// overshoots. A corner takes at most half of each of its legs. Two collinear legs have no corner. The path stops if it
 /// turns back on itself, if a waypoint is given twice in a row, and at every waypoint if the blend is 0.
 ///
-/// The parameter is the distance that the joint with the largest movement covers, rad, along the straight legs.
+/// The path parameter is the distance in rad that the joint with the largest movement covers along the straight legs.
 #[derive(Clone, Debug)]
 pub struct BlendedPath {
     /// Corners without repetitions.
     corners: Vec<Corner>,
-    /// Entries for each given waypoint.
+    /// One entry for each given waypoint.
     given: Vec<Given>,
 }
 
 /// Place of a waypoint on the path.
 #[derive(Clone, Copy, Debug)]
 struct Given {
-    /// Index of the last corner up to the waypoint.
+    /// Index of the last corner that is at or before the waypoint.
     corner: usize,
     /// Parameter of this corner, if the waypoint is a corner.
     parameter: f64,
@@ -44,10 +45,10 @@ struct Corner {
     parameter: f64,
     /// Direction of the leg that begins here.
     direction: JointVec,
-    /// Half of the rounding's parameters; 0: no rounding.
+    /// Half of the parameter range of the rounding; 0: not rounded.
     half: f64,
     stop: bool,
-    /// `true` if a reversal is the only reason for the stop.
+    /// `true` if the path stops only because it turns back here.
     leads_back: bool,
 }
 
@@ -75,7 +76,7 @@ impl BlendedPath {
         Ok(path)
     }
 
-    /// Computes directions, parameters and rounded corners from the positions.
+    /// Computes directions, parameters and rounded corners from the waypoint positions.
     fn round(&mut self, blend: f64) {
         let corners = &mut self.corners;
         let mut length_before = 0.0;
@@ -96,9 +97,9 @@ impl BlendedPath {
         }
     }
 
-    /// Returns the path without the corners that lie within `share` of the blend of the straight line between the
-    /// corners that stay. The path must follow the line, and waypoints must be so close that the whole line is within
-    /// their blend. Waypoints for which `keep` holds stay. Returns `None` if no corner can be removed.
+    /// Removes the corners that lie within `share` of the blend from the straight line between the remaining corners.
+    /// Waypoints are removed only if they are so dense that the whole line stays within their blend. Waypoints for
+    /// which `keep` returns `true` stay. Returns `None` if no corner can be removed.
     pub(crate) fn thinned(&self, blend: f64, share: f64, keep: &dyn Fn(usize) -> bool) -> Option<Self> {
         let mut stays: Vec<bool> = self.corners.iter().map(|c| c.stop && !c.leads_back).collect();
         for (i, given) in self.given.iter().enumerate() {
@@ -141,12 +142,12 @@ impl BlendedPath {
         self.corners[1..self.corners.len() - 1].iter().all(|corner| corner.stop)
     }
 
-    /// Returns the positions of the legs' ends.
+    /// Returns the start and end position of each leg.
     pub(crate) fn legs(&self) -> impl Iterator<Item = (JointVec, JointVec)> {
         self.corners.windows(2).map(|pair| (pair[0].position, pair[1].position))
     }
 
-    /// Returns the parameters of the legs' middles.
+    /// Returns the parameter in the middle of each leg.
     pub(crate) fn middles(&self) -> Vec<f64> {
         self.corners.windows(2).map(|pair| 0.5 * (pair[0].parameter + pair[1].parameter)).collect()
     }
@@ -160,7 +161,7 @@ impl BlendedPath {
         path
     }
 
-    /// Returns `true` if two waypoints are too close for a leg between them.
+    /// Returns `true` if two waypoints are too close to have a leg between them.
     pub(crate) fn are_one(a: &JointVec, b: &JointVec) -> bool {
         distance(a, b) <= SAME
     }
@@ -175,7 +176,7 @@ impl BlendedPath {
     fn on_leg(&self, leg: usize, s: f64) -> PathPoint {
         let (from, to) = (&self.corners[leg], &self.corners[leg + 1]);
         let (gone, left) = (s - from.parameter, to.parameter - s);
-        // Measured from the nearer end, so that both ends are exact.
+        // Computed from the nearer end, so that both ends are exact.
         let position = std::array::from_fn(|j| {
             if gone <= left {
                 from.position[j] + gone * from.direction[j]
@@ -219,7 +220,7 @@ fn step(u: f64) -> (f64, f64, f64) {
 }
 
 impl Corner {
-    /// Decides how the corner is passed; `before` is the direction of the leg that ends here.
+    /// Decides how the path passes the corner; `before` is the direction of the leg that ends here.
     fn round(&mut self, before: &JointVec, half: f64) {
         let size = |sign: f64| {
             let parts = before.iter().zip(&self.direction).map(|(a, b)| (b + sign * a).abs());
@@ -260,7 +261,7 @@ impl Path for BlendedPath {
         let mut breaks = Vec::with_capacity(4 * inner.len());
         for corner in inner {
             if corner.half > 0.0 {
-                // Adjacent corners have one break between them.
+                // Two adjacent corners share one break.
                 let begin = corner.parameter - corner.half;
                 if breaks.last().is_none_or(|last| begin > last + 0.01 * corner.half) {
                     breaks.push(begin);
@@ -272,7 +273,7 @@ impl Path for BlendedPath {
                 breaks.push(corner.parameter);
             }
         }
-        // Corners next to a stop or an end need no break there either.
+        // A corner next to a stop or an end needs no break there.
         breaks.retain(|b| *b > 0.0 && *b < self.end());
         breaks
     }
@@ -299,7 +300,7 @@ impl Waypointed for BlendedPath {
     }
 }
 
-/// Returns the waypoints without repetitions, and the index of each given waypoint in them.
+/// Returns the waypoints without consecutive duplicates, and for each given waypoint its index in them.
 fn distinct(waypoints: &[JointVec]) -> Result<(Vec<Corner>, Vec<usize>), PlanError> {
     let mut corners: Vec<Corner> = Vec::with_capacity(waypoints.len());
     let mut given = Vec::with_capacity(waypoints.len());

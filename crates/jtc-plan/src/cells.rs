@@ -6,11 +6,11 @@ use crate::path::PathPoint;
 use crate::profile::Bounds;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Number of cells into which the parts of a path are divided.
+/// Numbers of cells into which the parts of a path are divided.
 struct Division {
     straight: usize,
     curved: usize,
-    /// Least number of cells for a path of few parts.
+    /// Smallest number of cells, for a path of few parts.
     least: usize,
 }
 
@@ -18,19 +18,19 @@ const COARSE: Division = Division { straight: 6, curved: 3, least: 120 };
 /// For a law whose acceleration changes only at the ends of cells.
 const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 
-/// Share of the torque left for motion that the speed may use.
+/// Share of the torque available for motion that the path speed may use.
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
-/// Share of the torque limit that must be left for motion if friction grows with the speed; below this share the speed
-/// is lowered.
+/// Share of the torque limit that must be available for motion where friction grows with the speed. With less, the
+/// speed is lowered.
 const MOTION_SHARE: f64 = 0.05;
-/// Share of the usable torque left by holding that must stay for motion, if that is less.
+/// Share of the torque available above holding that must stay available for motion, if that is less.
 const STANDING_SHARE: f64 = 0.5;
-/// Share of the torque limit that is enough to creep.
+/// Share of the torque limit that is enough to move slowly.
 const CREEP_SHARE: f64 = 0.002;
 
-/// Parts of the torque at a point, N·m: q̈ = q′·s̈ + q″·ṡ² gives hold + mass·s̈ + speed·ṡ², plus friction.
+/// Parts of the torque at a point, N·m. With q̈ = q′·s̈ + q″·ṡ² the torque is hold + mass·s̈ + speed·ṡ², plus friction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Loads {
     pub hold: JointVec,
@@ -58,7 +58,7 @@ pub(crate) struct End {
     pub loads: Option<Loads>,
 }
 
-/// A part of a section in which the path is one simple curve.
+/// A part of a section with a single smooth curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
     /// Range of the parameter, from the start of the section.
@@ -69,7 +69,8 @@ pub(crate) struct Cell {
     pub third: JointVec,
 }
 
-/// Returns the cells of a section. With `fine` there are more, for a law whose acceleration changes only at their ends.
+/// Returns the cells of a section. With `fine` the cells are smaller, for a law whose acceleration changes only at
+/// their ends.
 pub(crate) fn cells(
     section: &Section,
     arm: Option<&ArmDynamics>,
@@ -115,14 +116,14 @@ pub(crate) fn cells(
     Ok(cells)
 }
 
-/// Checks that the arm can be at a place and that the path has a direction there.
+/// Checks that a place is within the position limits and that the path has a direction there.
 fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Result<(), PlanError> {
     let leg = section.path.waypoint(s).unwrap_or(1);
     let numbers = point.first.iter().chain(&point.second);
     if numbers.into_iter().any(|x| !x.is_finite()) {
         return Err(PlanError::Path { leg, parameter: s });
     }
-    // The tolerance covers rounding between two positions at the limit.
+    // The tolerance allows for rounding between two positions at the limit.
     for joint in Joint::ALL {
         let (value, (min, max)) = (point.position[joint.index()], limits.position[joint.index()]);
         if !(min - 1e-9..=max + 1e-9).contains(&value) {
@@ -132,8 +133,8 @@ fn checked(section: &Section, point: &PathPoint, s: f64, limits: &Limits) -> Res
     Ok(())
 }
 
-/// Torque left for motion up (`high`) and down (`low`) at one end of a cell, N·m: the usable torque minus the holding
-/// torque and the worst friction in the direction of the path up to the speed.
+/// Torque available for motion up (`high`) and down (`low`) at one end of a cell, N·m: the usable torque minus the
+/// holding torque and minus the highest friction torque up to the speed, in the direction of the path.
 pub(crate) struct Room {
     pub high: JointVec,
     pub low: JointVec,
@@ -141,13 +142,13 @@ pub(crate) struct Room {
     limit: JointVec,
 }
 
-/// Returns the torque that a plan uses of a joint whose holding torque is `hold`, N·m.
+/// Returns the torque of a joint that a plan may use if the holding torque is `hold`, N·m.
 pub(crate) fn planned_torque(arm: &ArmDynamics, limits: &Limits, j: usize, hold: f64) -> f64 {
     TORQUE_SHARE * arm.usable_torque(limits, j, hold)
 }
 
 impl Room {
-    /// Computes the remaining torque for a squared parameter speed of at most `cap`.
+    /// Computes the available torque for a squared parameter speed of at most `cap`.
     pub fn new(end: &End, loads: &Loads, cap: f64, limits: &Limits, arm: &ArmDynamics) -> Self {
         let mut room = Self { high: [0.0; JOINTS], low: [0.0; JOINTS], limit: [0.0; JOINTS] };
         for j in 0..JOINTS {
@@ -161,8 +162,8 @@ impl Room {
         room
     }
 
-    /// Returns the smallest remaining torque as a share of the joint's torque limit, and the joint: the one with the
-    /// smallest excess over `needed`.
+    /// Returns the joint with the smallest excess over `needed`, and its available torque as a share of the joint's
+    /// torque limit.
     fn least(&self, limits: &Limits, needed: &JointVec) -> (f64, usize) {
         let share = |j: usize| self.high[j].min(self.low[j]) / limits.torque[j];
         let over = |j: &usize| share(*j) - needed[*j];
@@ -177,7 +178,7 @@ impl Cell {
         self.ends.iter().all(|end| end.point.second == [0.0; JOINTS])
     }
 
-    /// Returns the highest squared speed by the velocity limits alone.
+    /// Returns the highest squared speed that the velocity limits permit.
     pub fn speed_cap(&self, limits: &Limits) -> f64 {
         let mut cap = f64::INFINITY;
         for end in &self.ends {
@@ -193,7 +194,7 @@ impl Cell {
     ///
     /// # Errors
     ///
-    /// Returns the joint without remaining torque at any speed, with the required torque and its limit.
+    /// Returns the joint without available torque at any speed, with the required torque and its limit.
     pub fn friction_cap(
         &self,
         mut cap: f64,
@@ -216,7 +217,7 @@ impl Cell {
                     break;
                 }
                 if cap <= SLOWEST * fastest {
-                    // Enough to creep.
+                    // Enough torque to move slowly.
                     if share > CREEP_SHARE {
                         break;
                     }
@@ -230,9 +231,9 @@ impl Cell {
         Ok(cap)
     }
 
-    /// Returns limits of the parameter's speed, whose square is at most `cap`, and of its acceleration. Each limit
-    /// keeps the joints within their limits for every value of the other. The curvature may use `share` of the limits
-    /// of acceleration and jerk. Friction is considered up to the squared speed `reached`.
+    /// Returns limits of the parameter speed (its square is at most `cap`) and of the parameter acceleration. The two
+    /// limits are independent: any combination within both keeps the joints within their limits. The curvature may use
+    /// `share` of the acceleration and jerk limits. Friction is considered up to the squared speed `reached`.
     pub fn bounds(
         &self,
         cap: f64,
@@ -277,7 +278,7 @@ impl Cell {
         for j in 0..JOINTS {
             let (first, second) = (end.point.first[j].abs(), end.point.second[j].abs());
             most = most.min((limits.acceleration[j] - second * cap) / first);
-            // Half of the remaining jerk: the other half is for changes of the acceleration.
+            // Half of the remaining jerk is kept for changes of the acceleration.
             let left = limits.jerk[j] - self.third[j].abs() * cap * speed;
             most = most.min(0.5 * left / (3.0 * second * speed));
         }

@@ -1,27 +1,29 @@
 //! Chooses which corners are rounded, and which waypoints are corners.
 //!
-//! A stop lies within every blend. A line close to dense waypoints does too. The fastest option is used.
+//! A stop at a corner is always within the blend, and so is a line close to dense waypoints. The planner uses the
+//! fastest of these options.
 use crate::along::unexplained;
 use crate::path::{Path, PathPoint};
 use crate::{ArmDynamics, BlendedPath, JOINTS, JointVec, Limits, Motion, PlanError, verify};
 
 /// Maximum deviations of dropped waypoints from the line, as shares of the blend.
 const THIN: [f64; 2] = [0.2, 0.5];
-/// Factor of corners over a thinner path from which a path is not planned.
+/// A path is not planned if a thinned version has fewer corners by this factor.
 const DENSE: usize = 8;
 /// Number of rounds in which corners become stops.
 const ROUNDS: usize = 5;
-/// Share of the duration with a rounded corner below which a stop is used.
+/// A corner is replaced by a stop if the stop takes less than this share of the time with the rounded corner.
 const WORTH: f64 = 0.99;
 
-/// Fastest motion found, without its limiting constraints, and its path.
+/// Fastest motion found so far (without its limiting constraints) and its path.
 pub(crate) struct Chosen {
     pub path: BlendedPath,
     pub motion: Motion,
 }
 
-/// Returns the fastest of several motions through `path`'s waypoints: along the path; with some waypoints dropped or
-/// some corners as stops; and with a stop at each waypoint. Waypoints for which `keep` returns `true` are not dropped.
+/// Plans several motions through `path`'s waypoints and returns the fastest: along the path itself; with some waypoints
+/// dropped or stops at some corners; and with a stop at each waypoint. Waypoints for which `keep` returns `true` are
+/// not dropped.
 pub(crate) fn fastest(
     path: BlendedPath,
     blend: f64,
@@ -65,7 +67,7 @@ pub(crate) fn fastest(
                 _ => break,
             }
         }
-        // Planning again would give the same motion.
+        // Another plan would give the same motion.
         let is_planned =
             |best: &Timed| best.path.corners() == all_stops.corners() && best.path.stops_everywhere();
         let with_stops: f64 = all_stops.legs().map(|(a, b)| rest_to_rest(&a, &b, &line_limits)).sum();
@@ -106,8 +108,8 @@ impl Timed {
         Ok(Self { path, motion, middles })
     }
 
-    /// Returns the rounded corners that take longer than a stop at the same place. A stop counts as the adjacent halves
-    /// of two legs with rest at both ends.
+    /// Returns the rounded corners that take longer than a stop at the same place. The time with a stop is half the
+    /// rest-to-rest time of each adjacent leg.
     fn slow_corners(&self, limits: &Limits) -> Vec<usize> {
         let at_rest: Vec<f64> = self.path.legs().map(|(a, b)| rest_to_rest(&a, &b, limits)).collect();
         let is_slow = |&i: &usize| {
@@ -118,10 +120,10 @@ impl Timed {
     }
 }
 
-/// A path that also counts the middles of its legs as waypoints.
+/// A path that has the middles of its legs as additional waypoints.
 struct WithMiddles<'a> {
     path: &'a BlendedPath,
-    /// Parameters; `true` for a middle.
+    /// Parameter of each place; `true` for the middle of a leg.
     places: Vec<(f64, bool)>,
 }
 
@@ -161,8 +163,8 @@ impl Path for WithMiddles<'_> {
     }
 }
 
-/// Returns the time of the fastest motion on a straight line from rest to rest, s, without torque: with the highest
-/// speed, acceleration and jerk of the line that the joint limits permit.
+/// Returns the time of the fastest motion on a straight line from rest to rest, s, ignoring torque. Speed, acceleration
+/// and jerk on the line are the highest that the joint limits permit.
 fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     let least = |limit: &JointVec| {
         let of = |j: usize| limit[j] / (to[j] - from[j]).abs();
@@ -170,7 +172,7 @@ fn rest_to_rest(from: &JointVec, to: &JointVec, limits: &Limits) -> f64 {
     };
     let (speed, acceleration, jerk) =
         (least(&limits.velocity), least(&limits.acceleration), least(&limits.jerk));
-    // Positions are shares of the line. The speed-up takes `ramp` seconds; the distance covered is half of that times the speed.
+    // Positions are fractions of the line. The speed-up takes `ramp` seconds and covers half of `ramp` times the speed.
     let ramp = |speed: f64| {
         if speed * jerk < acceleration * acceleration {
             2.0 * (speed / jerk).sqrt()

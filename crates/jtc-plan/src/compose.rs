@@ -4,44 +4,44 @@ use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Shortest piece with a jerk limit, s: the third derivative of a shorter piece would be rounding.
+/// Shortest piece with a jerk limit, s. In a shorter piece rounding errors dominate the third derivative.
 const SHORTEST: f64 = 2e-4;
-/// Shortest piece without a jerk limit, s: limited by rounding of the second derivative.
+/// Shortest piece without a jerk limit, s. In a shorter piece rounding errors dominate the second derivative.
 const SHORTEST_WITHOUT_JERK: f64 = 1e-5;
 /// Largest distance of the middle of a piece from the path, rad.
 const AWAY: f64 = 1e-9;
-/// Largest error of the acceleration in its middle, as a share of its limit.
+/// Largest error of the acceleration in the middle of a piece, as a share of its limit.
 const ACCELERATION_AWAY: f64 = 1e-3;
-/// Maximum number of times that a piece is halved for this.
+/// Maximum number of times that a piece is halved to keep these errors.
 const HALVINGS: u8 = 7;
 
-/// Section of a path from stop to stop, and the places of a change of form.
+/// Section of a path from stop to stop, with the places at which the path changes its form.
 pub(crate) struct Section<'a> {
     pub path: &'a dyn Path,
     pub from: f64,
     pub to: f64,
-    /// Breaks, rising, strictly inside.
+    /// Breaks in ascending order, without the ends.
     pub breaks: Vec<f64>,
-    /// Parameters of the waypoints that belong to the section, rising; the waypoint at its start belongs to it only at
-    /// the beginning of the path.
+    /// Parameters of the waypoints that belong to the section, in ascending order. The waypoint at the start of a
+    /// section belongs to it only if it is the start of the path.
     pub waypoints: Vec<f64>,
     /// Number of parts between the breaks of the whole path.
     pub parts_of_path: usize,
 }
 
 impl Section<'_> {
-    /// Returns position and derivatives at the parameter `s`, between two breaks on the side of `side`.
+    /// Returns position and derivatives at the parameter `s`, evaluated inside the interval `side` between two breaks.
     pub fn at(&self, s: f64, side: (f64, f64)) -> PathPoint {
         self.path.at(s.clamp(side.0.next_up(), side.1.next_down().max(side.0.next_up())))
     }
 
-    /// Returns start and end of each part between two breaks.
+    /// Returns start and end of each part (a part lies between two breaks).
     pub fn parts(&self) -> impl Iterator<Item = (f64, f64)> {
         let ends = || self.breaks.iter().copied();
         std::iter::once(self.from).chain(ends()).zip(ends().chain([self.to]))
     }
 
-    /// Returns the motion along the section. Its first waypoint time is its start.
+    /// Returns the motion along the section. The first waypoint time is the start of the section.
     pub fn motion(&self, law: &Law, limits: &Limits) -> Motion {
         let mut pieces = Vec::new();
         let shortest = if limits.has_jerk() { SHORTEST } else { SHORTEST_WITHOUT_JERK };
@@ -70,7 +70,7 @@ impl Section<'_> {
         Motion::new(pieces, self.path.at(self.to).position, times)
     }
 
-    /// Returns start and end of each part in time, none shorter than a piece.
+    /// Returns start and end time of each part; no part is shorter than the shortest piece.
     fn times(&self, law: &Law) -> Vec<(f64, f64)> {
         let mut times: Vec<f64> = vec![0.0];
         times.extend(self.breaks.iter().map(|s| law.time_of(s - self.from)));
@@ -79,7 +79,7 @@ impl Section<'_> {
     }
 }
 
-/// An interval of time in one part of a section.
+/// A time interval within one part of a section.
 struct Part<'a> {
     section: &'a Section<'a>,
     law: &'a Law,
@@ -98,7 +98,7 @@ impl Part<'_> {
         }
         let length = to - from;
         let mut start = self.state(from, 1.0);
-        // A piece that follows another one starts exactly at its end, without a jump by rounding.
+        // A piece starts exactly at the end of the previous piece, so that rounding causes no jump.
         if let Some(last) = pieces.last() {
             let end = last.at(last.length);
             (start.position, start.velocity) = (end.position, end.velocity);

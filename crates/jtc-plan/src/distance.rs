@@ -3,8 +3,8 @@ use jtc_wire::Joint;
 
 use crate::JointVec;
 
-/// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. A joint whose difference
-/// is NaN counts as the furthest.
+/// Returns the joint whose position differs most between `a` and `b`, and the difference, rad. If a difference is NaN,
+/// that joint is returned.
 pub fn furthest_joint(a: &JointVec, b: &JointVec) -> (Joint, f64) {
     let apart = |joint: Joint| (joint, (b[joint.index()] - a[joint.index()]).abs());
     let [first, others @ ..] = Joint::ALL;

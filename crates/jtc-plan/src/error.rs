@@ -29,7 +29,7 @@ pub enum PlanError {
     /// A position outside the limits.
     #[error("waypoint {waypoint}, {}", self.what())]
     Position {
-        /// Waypoint outside the limits, or the last one before the position that is outside; from 1.
+        /// Waypoint outside the limits, or the last waypoint before the position outside the limits; from 1.
         waypoint: usize,
         /// Joint of the position.
         joint: Joint,
@@ -100,9 +100,9 @@ pub enum PlanError {
         joint: Joint,
         /// Limit that the joint reaches.
         limit: LimitKind,
-        /// Given time from that waypoint to this one, s.
+        /// Given time from waypoint `from` to this one, s.
         given: f64,
-        /// Shortest possible time, s; a twentieth more than given if only the adjacent legs leave no margin.
+        /// Shortest possible time, s. It is 5 % longer than the given time if only the adjacent legs leave no margin.
         shortest: f64,
     },
     /// The torque does not suffice at any speed.
@@ -114,11 +114,11 @@ pub enum PlanError {
         joint: Joint,
         /// Required torque, N·m.
         torque: f64,
-        /// Torque available for that, N·m.
+        /// Torque available for it, N·m.
         limit: f64,
-        /// Full torque limit, N·m; `limit` is a share of it.
+        /// Torque limit of the joint, N·m; `limit` is a share of it.
         whole: f64,
-        /// `true` if the arm cannot even be held there, at the start, at a rest or at the end.
+        /// `true` if the torque is too small even to hold the arm there: at the start, at a stop or at the end.
         holding: bool,
     },
     /// A path with NaN or infinite positions or derivatives, or without a length.
@@ -129,10 +129,10 @@ pub enum PlanError {
         /// Parameter of the path.
         parameter: f64,
     },
-    /// The flange cannot reach the pose, or not along a line or an arc.
+    /// The flange cannot reach the pose, or cannot follow a line or an arc to it.
     #[error(transparent)]
     Flange(#[from] PoseError),
-    /// No time law was found, because of a fault of the planner or of extreme values.
+    /// No time law was found, because of a defect of the planner or extreme values.
     #[error("leg {leg}: no time law within the limits: {reason}")]
     NoTimeLaw {
         /// Leg, from 1.
@@ -143,7 +143,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the waypoint that the message names, counted from 1, if it names one: of two, the invalid one.
+    /// Returns the waypoint in the message, counted from 1, if there is one. Of two waypoints, returns the invalid one.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }
@@ -162,7 +162,8 @@ impl PlanError {
         }
     }
 
-    /// Returns the message without the leading waypoint, if the error concerns a joint or the flange at a waypoint.
+    /// Returns the message without the waypoint at its beginning, if the error concerns a joint or the flange at a
+    /// waypoint.
     pub fn what(&self) -> String {
         match self {
             Self::NotFinite { joint, value, .. } => format!("{joint}: {value} is no position"),
@@ -179,7 +180,7 @@ impl PlanError {
         }
     }
 
-    /// Returns a hint for the correction.
+    /// Returns advice on how to correct the error.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::TooFew { .. } => "give where the motion starts and where it ends",

@@ -1,12 +1,12 @@
 //! Time laws with limited jerk, by an interior-point method (Boyd and Vandenberghe 2004).
 //!
-//! The squared speed of the parameter is a quadratic spline of the parameter, whose knots are the ends of cells: the
+//! The squared speed of the parameter is a quadratic spline of the parameter, with a knot at the end of each cell. The
 //! acceleration is half its slope, and the jerk is half its second derivative times the speed. Velocity, acceleration
 //! and torque are therefore linear in the coefficients; the jerk is linear except for the root of the squared speed.
 //! Newton's method minimises the sum of the time and the barriers of all limits, without the second derivatives of the
-//! limits. Only neighbours are coupled, so that the time of a step is proportional to the length of the path. In the
-//! first and the last cell the jerk is constant: from rest the squared speed rises with the power 4/3, which a spline
-//! cannot represent.
+//! limits. Only neighbouring coefficients are coupled, so the time of a step is proportional to the length of the path.
+//! In the first and the last cell the jerk is constant: from rest the squared speed rises with the power 4/3, which a
+//! spline cannot represent.
 mod place;
 mod problem;
 mod spline;
@@ -17,15 +17,15 @@ use spline::knot;
 use crate::along::Plan;
 use crate::law::Law;
 
-/// Shares of the time that the barriers may cost, in sequence.
+/// Shares of the time that the barriers may cost, one per round.
 const GAPS: [f64; 3] = [0.2, 0.04, 0.008];
 /// Maximum number of steps for each share.
 const STEPS: usize = 12;
-/// A step that promises less than this share of the allowed barrier cost is the last.
+/// Newton's method ends with a step that promises less than this share of the allowed barrier cost.
 const WORTH: f64 = 0.25;
-/// Smallest part of a step.
+/// Smallest fraction of a step that is tried.
 const SHORTEST: f64 = 1e-3;
-/// Factor for squared speeds outside the limits, and the largest number of reductions.
+/// Factors that lower squared speeds outside the limits, and the largest number of reductions.
 const LOWER: f64 = 0.85;
 const LOWER_AGAIN: f64 = 0.97;
 const LOWER_MAX: usize = 100;
@@ -36,7 +36,7 @@ struct Problem<'a> {
     places: Vec<Place>,
     /// Knots, between the first and the last cell.
     knots: Vec<f64>,
-    /// First and last coefficient as shares of their neighbours.
+    /// First and last coefficient, each divided by its neighbour.
     ties: (f64, f64),
     /// Number of limits.
     limits: f64,
@@ -90,7 +90,7 @@ impl<'a> Problem<'a> {
         c
     }
 
-    /// Lowers the speeds until they are within all limits.
+    /// Lowers the speeds until all limits hold.
     fn within(&self, c: &mut [f64], by: f64) -> Option<()> {
         self.tied(c);
         let lower = |c: &mut [f64], by: f64| c.iter_mut().for_each(|c| *c *= by);
@@ -104,7 +104,7 @@ impl<'a> Problem<'a> {
         None
     }
 
-    /// Shortens the time, with barriers that cost these shares of it, in sequence.
+    /// Shortens the time. In each round the barriers cost one of the shares `gaps` of the time.
     fn improve(&self, c: &mut Vec<f64>, gaps: &[f64]) {
         for gap in gaps {
             let time = self.value(c, 0.0);
@@ -135,7 +135,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a symmetric positive definite system with two bands next to the diagonal, whose right side is `-right`.
+/// Solves a symmetric positive definite system with two bands next to the diagonal and the right-hand side `-right`.
 fn solved(bands: &mut [[f64; 3]], right: &[f64]) -> Option<Vec<f64>> {
     let n = bands.len();
     let mut x: Vec<f64> = right.iter().map(|r| -r).collect();
@@ -184,11 +184,11 @@ impl<'a> Search<'a> {
         Some(Self { plan, c, found: false })
     }
 
-    /// Returns the fastest law with these factors of the time in each cell.
+    /// Returns the fastest law with a time factor for each cell.
     pub fn fastest(&mut self, slower: &[f64]) -> Option<Law> {
         let problem = Problem::new(self.plan, slower)?;
         if self.found {
-            // Scales the solution down in cells that `slower` slows down.
+            // Scales the previous solution down in the cells that `slower` slows down.
             for (i, c) in self.c.iter_mut().enumerate() {
                 let near = slower[i.saturating_sub(2)..slower.len().min(i + 3)].iter();
                 let most = near.fold(1.0f64, |most, s| most.max(*s));

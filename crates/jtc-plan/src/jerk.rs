@@ -1,8 +1,8 @@
 //! Time laws with limited jerk.
 //!
-//! The fastest law under limits of the parameter's speed and acceleration is averaged over a window. A jump of the
-//! acceleration becomes a ramp as long as the window: with a window of acceleration over jerk the jerk limit holds.
-//! [`crate::profile`] ensures that the averaged law keeps the limits of the cells around it.
+//! The fastest law under limits of the parameter's speed and acceleration is averaged over a time window. A jump of the
+//! acceleration then becomes a ramp as long as the window. With a window of acceleration divided by jerk, the jerk
+//! limit holds. [`crate::profile`] ensures that the averaged law keeps the limits of the cells around it.
 use crate::along::{Made, Plan};
 use crate::cells::Cell;
 use crate::interior::Search;
@@ -11,16 +11,16 @@ use crate::motion::Motion;
 use crate::profile::{self, Bounds};
 use crate::{JOINTS, Limits};
 
-/// Factor of the acceleration from attempt to attempt: lower accelerations have shorter ramps.
+/// Factor of the acceleration from one attempt to the next. A lower acceleration has shorter ramps.
 const LOWER: f64 = 0.7;
 /// Maximum number of attempts.
 const ATTEMPTS: usize = 24;
 /// Shares of acceleration and jerk that the curvature may use, in the order of the attempts: nearly all if the path
 /// keeps its speed in curves, less if its speed must change there.
 const CURVATURE_SHARES: [f64; 2] = [0.97, 0.7];
-/// Maximum slowdown factor of the whole motion that replaces a repair.
+/// The whole motion is slowed down, instead of another repair, if the factor is at most this.
 const LEFT_OVER: f64 = 1.002;
-/// Like [`LEFT_OVER`], for a law by the interior-point method.
+/// Like [`LEFT_OVER`], for an interior-point law.
 const LITTLE: f64 = 1.005;
 /// Share of the jerk limit for which the window is computed.
 const JERK_SHARE: f64 = 0.995;
@@ -34,7 +34,7 @@ pub(crate) struct Shares {
     curvature: f64,
 }
 
-/// Returns the best of several laws that use more or less of the limits, or the law with these `shares`.
+/// Returns the best of several laws with different shares of the limits, or the law with these `shares`.
 pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Result<Made, String> {
     let none = || String::from("no attempt took a finite time");
     let shares = shares.or_else(|| best_shares(plan)).ok_or_else(none)?;
@@ -47,10 +47,10 @@ pub(crate) fn limited(plan: &Plan, shares: Option<Shares>, repairs: usize) -> Re
     Ok(Made { law: best.law, motion: best.motion, shares: Some(shares) })
 }
 
-/// Shares of the law from which the search for a faster one starts.
+/// Shares of the law from which the interior-point method starts.
 const SEED: Shares = Shares { acceleration: LOWER * LOWER, curvature: CURVATURE_SHARES[0] };
 
-/// Returns the motion by an interior-point method, if that is faster than the law from which it starts.
+/// Returns the motion found by the interior-point method, if it is faster than the law from which the method starts.
 pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     let bounds = bounds(plan, SEED);
     let window = window(plan.cells, &bounds, plan.limits);
@@ -74,7 +74,7 @@ pub(crate) fn interior(plan: &Plan, repairs: usize) -> Option<Motion> {
     best.filter(|best| best.duration() < seed.duration()).map(|best| best.motion)
 }
 
-/// Returns the shares with the shortest motion, without torque.
+/// Returns the shares that give the shortest motion, ignoring torque.
 fn best_shares(plan: &Plan) -> Option<Shares> {
     let duration = |shares| Attempt::new(plan, &bounds(plan, shares), false).duration();
     let mut best: Option<(Shares, f64)> = None;
@@ -107,7 +107,7 @@ fn best_shares(plan: &Plan) -> Option<Shares> {
 fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     let of_cell = |(i, cell): (usize, &Cell)| {
         let bounds = cell.bounds(plan.caps[i], plan.reached[i], shares.curvature, plan.limits, plan.arm);
-        // At a share of the speed.
+        // Reduced by the speed factor of the cell.
         let slow = plan.shares[i] * plan.shares[i];
         let (up, down) = (bounds.up * slow * shares.acceleration, bounds.down * slow * shares.acceleration);
         Bounds { cap: bounds.cap * slow, up, down, ..bounds }
@@ -115,7 +115,7 @@ fn bounds(plan: &Plan, shares: Shares) -> Vec<Bounds> {
     plan.cells.iter().enumerate().map(of_cell).collect()
 }
 
-/// Law, its motion, and the factor for the time in each cell.
+/// A law, its motion, and the time factor of each cell.
 struct Attempt {
     law: Law,
     motion: Motion,

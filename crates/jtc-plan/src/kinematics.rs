@@ -1,4 +1,4 @@
-//! Inverse kinematics: joint positions for poses of the flange, and lines of the flange.
+//! Inverse kinematics: joint positions for flange poses, and straight flange paths.
 mod chain;
 mod closed_form;
 mod error;
@@ -31,20 +31,21 @@ pub use route::{LegKind, Route, RoutePoint};
 pub use singular::{SINGULAR, SingularKind, Singularity};
 pub use target::{Target, resolve};
 
-/// Iterations that refine a solution of a closed form: two if the arm matches the closed form, more next to a singular
-/// pose.
+/// Iterations that refine a closed-form solution. Two are enough if the arm matches the closed form; more are needed
+/// near a singular pose.
 const REFINE: usize = 25;
 /// Iterations of a search.
 const SEARCH: usize = 60;
 
-/// Kinematics of an arm within its position limits: poses of the flange from joint positions, and back.
+/// Kinematics of an arm within its position limits: converts joint positions to flange poses and back.
 ///
 /// Poses are poses of the flange in the base frame, with positions in m; joint positions are in rad. A solution brings
 /// the flange to the pose within 1 nm and 1 nrad.
 ///
-/// Arms with a spherical wrist, and arms with three parallel axes like the default arm and those of Universal Robots,
-/// are recognised from the parameters of the model, and all solutions are computed in closed form. For any other arm
-/// they are found by iteration from many fixed starting values. That finds nearly every solution, but may miss one.
+/// For arms with a spherical wrist, and for arms with three parallel axes such as the default arm and the arms of
+/// Universal Robots, all solutions are computed in closed form. The parameters of the model show to which kind an arm
+/// belongs. For any other arm the solutions are found by iteration from many fixed starting values, which may miss a
+/// solution in rare cases.
 #[derive(Clone, Debug)]
 pub struct Kinematics {
     chain: Chain,
@@ -87,31 +88,31 @@ impl Kinematics {
         std::array::from_fn(|row| std::array::from_fn(|joint| jacobian[(row, joint)]))
     }
 
-    /// Returns the joint positions within the limits that bring the flange to `target`. The solution is the one nearest to `near`: the one
-    /// with the smallest sum of squares of the joint motions.
+    /// Returns the joint positions within the limits that bring the flange to `target`. If there are several solutions,
+    /// returns the nearest to `near`, with the smallest sum of squared joint motions.
     ///
-    /// A singular target, with infinitely many solutions, returns one near `near`.
+    /// A singular target has infinitely many solutions; one near `near` is returned.
     ///
     /// # Errors
     ///
-    /// [`PoseError`] if the target is not a valid pose, is out of reach, in this orientation or in any, or is within
-    /// reach only outside the limits.
+    /// [`PoseError`] if the target is not a valid pose, is out of reach in this orientation or in every orientation, or
+    /// can only be reached outside the limits.
     pub fn solve(&self, target: &Pose, near: &JointVec) -> Result<JointVec, PoseError> {
         let goal = orientation::checked(target)?;
         if let Some(&bad) = near.iter().find(|q| !q.is_finite()) {
             return Err(PoseError::NotFinite { what: "a joint position to be near to", value: bad });
         }
         let mut found = self.solutions(&goal, near);
-        // In a singular pose this may be nearer than the choice of the closed form; its turns are handled below.
+        // In a singular pose this solution may be nearer than the one of the closed form. Full turns are handled below.
         found.extend(search::converge(&self.chain, &goal, near, SEARCH));
         let distance = |q: &JointVec| q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
         let within = found.iter().filter_map(|q| turns::nearest(q, near, &self.limits));
         within.min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or_else(|| self.reason(&goal, &found))
     }
 
-    /// Returns all joint positions within the limits that bring the flange to `target`, without duplicates: each
-    /// solution with every joint within (−π, π] and, if the limits allow, one turn less and one turn more. Returns an
-    /// empty list for an invalid pose.
+    /// Returns all joint positions within the limits that bring the flange to `target`, without duplicates. Each
+    /// solution appears with every joint within (−π, π] and, if the limits permit, with a joint turned by ±2π. Returns
+    /// an empty list for an invalid pose.
     ///
     /// A singular target has infinitely many solutions; some of them are returned.
     pub fn all(&self, target: &Pose) -> Vec<JointVec> {
@@ -120,7 +121,7 @@ impl Kinematics {
         found.iter().flat_map(|q| turns::variants(q, &self.limits)).collect()
     }
 
-    /// Returns the singular pose that `q` is in or next to: a smaller [`Singularity::smallest`] means nearer.
+    /// Returns the singular pose at or near `q`. A smaller [`Singularity::smallest`] means nearer.
     pub fn singularity(&self, q: &JointVec) -> Singularity {
         let geometry = self.exact.as_ref().or(self.near.as_ref());
         singular::nearest(&self.chain, geometry, &self.chain.at(q))
@@ -142,7 +143,7 @@ impl Kinematics {
         found
     }
 
-    /// Returns the reason why no solution is within the limits; `found` are all solutions.
+    /// Returns the reason why no solution is within the limits; `found` contains all solutions.
     fn reason(&self, goal: &Frame, found: &[JointVec]) -> PoseError {
         let least = found.iter().map(|q| turns::outside(q, &self.limits));
         match least.min_by(|a, b| a.beyond.total_cmp(&b.beyond)) {
@@ -154,7 +155,7 @@ impl Kinematics {
         }
     }
 
-    /// Returns how far a pose without a solution is out of reach.
+    /// Returns an error with the distance or angle by which a pose without a solution is out of reach.
     fn missing(&self, goal: &Frame) -> PoseError {
         let least = |weights: [f64; 6], from: &JointVec| {
             search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)
@@ -169,13 +170,13 @@ impl Kinematics {
         if place > 1e-6 {
             return PoseError::OutOfReach { distance, missing: place };
         }
-        // The position first: the remaining residual then belongs to the orientation.
+        // The position has priority, so that the remaining residual is in the orientation.
         let turn = best([1e3, 1e3, 1e3, 1.0, 1.0, 1.0]).map_or(0.0, |r| r.residual.fixed_rows::<3>(3).norm());
         PoseError::Orientation { distance, missing: turn }
     }
 }
 
-/// Returns the error for joint positions outside the limits: it names the joint that is furthest outside.
+/// Returns the error for joint positions outside the limits, with the joint that is farthest outside.
 fn outside(q: &JointVec, limits: &[(f64, f64); JOINTS]) -> Option<PoseError> {
     let beyond = |joint: &Joint| {
         let (low, high) = limits[joint.index()];

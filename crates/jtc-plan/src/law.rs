@@ -7,7 +7,7 @@ pub(crate) struct Phase {
     pub start: f64,
     /// Length, s.
     pub length: f64,
-    /// Parameter, and its first three derivatives by time, at the start.
+    /// Parameter and its first three time derivatives, at the start.
     pub s: f64,
     pub speed: f64,
     pub acceleration: f64,
@@ -33,8 +33,8 @@ pub(crate) struct Law {
 }
 
 impl Law {
-    /// Creates the law along the vertices (parameter, squared speed), between which the squared speed is linear in the
-    /// parameter: the acceleration is constant.
+    /// Creates the law along the vertices (parameter, squared speed). Between two vertices the squared speed is linear
+    /// in the parameter, so the acceleration is constant.
     pub fn of_vertices(vertices: &[(f64, f64)]) -> Self {
         let mut phases = Vec::with_capacity(vertices.len());
         let mut start = 0.0;
@@ -71,7 +71,7 @@ impl Law {
         (s.clamp(0.0, self.end), v.max(0.0), a)
     }
 
-    /// Like [`Law::at`], on one side of `t`, because the acceleration may jump: after it (1) or before it (−1).
+    /// Like [`Law::at`], just after `t` (1) or just before it (−1), because the acceleration may jump at `t`.
     pub fn beside(&self, t: f64, after: f64) -> (f64, f64, f64) {
         const NEAR: f64 = 1e-10;
         let (s, speed, _) = self.at(t);
@@ -108,8 +108,8 @@ impl Law {
         phase.start + t
     }
 
-    /// Returns the law averaged over a window of `window` seconds: each jump of its acceleration becomes a ramp of that
-    /// length. The law takes `window` seconds longer. Only for laws without a jerk limit.
+    /// Returns the law averaged over a window of `window` seconds. Each jump of the acceleration becomes a ramp of that
+    /// length, and the law takes `window` seconds longer. Only for laws without a jerk limit.
     pub fn averaged(&self, window: f64) -> Self {
         let ends: Vec<f64> = self.phases.iter().map(|p| p.start).chain([self.duration()]).collect();
         let mut times: Vec<f64> = ends.iter().copied().chain(ends.iter().map(|t| t + window)).collect();
@@ -124,7 +124,7 @@ impl Law {
             let now = |t: f64| if t >= self.duration() { (self.end, 0.0, 0.0) } else { self.at(t) };
             let (head, tail) = (now(start), now(start - window));
             let (speed, acceleration) = ((head.0 - tail.0) / window, (head.1 - tail.1) / window);
-            // In the middle no acceleration jumps.
+            // In the middle of a phase no acceleration jumps.
             let middle = start + 0.5 * length;
             let inside = |t: f64| if t <= 0.0 { 0.0 } else { now(t).2 };
             let jerk = (inside(middle) - inside(middle - window)) / window;
@@ -132,7 +132,7 @@ impl Law {
             s = phase.at(length).0;
             phases.push(phase);
         }
-        // Distribute the remainder left by rounding over all phases.
+        // Distributes the remaining rounding error over all phases.
         let factor = if s > 0.0 { self.end / s } else { 1.0 };
         for phase in &mut phases {
             phase.s *= factor;

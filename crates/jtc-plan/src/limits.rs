@@ -4,13 +4,14 @@ use jtc_wire::Joint;
 
 use crate::{JOINTS, JointVec, LimitKind, PlanError};
 
-/// Time in which an arm's limits permit a joint to reach its highest acceleration from rest, s: the jerk limit of [`Limits::of`].
+/// Time in which a joint may reach its highest acceleration from rest, s. The jerk limit of [`Limits::of`] follows from
+/// it.
 pub const JERK_TIME: f64 = 0.1;
 
-/// Largest share of a torque limit that a motion can keep free.
+/// Largest share of a torque limit that can be reserved as a margin.
 pub const MARGIN_MAX: f64 = 0.5;
 
-/// Limits that a motion keeps, per joint, base to wrist.
+/// Limits for planning a motion, per joint from base to wrist.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Lowest and highest position, rad.
@@ -23,13 +24,14 @@ pub struct Limits {
     pub jerk: JointVec,
     /// Highest torque, N·m; used only if a motion is planned with an [`crate::ArmDynamics`].
     pub torque: JointVec,
-    /// Share of the torque limit that a motion keeps free, 0 to [`MARGIN_MAX`]; see [`crate::ArmDynamics::usable_torque`].
+    /// Share of the torque limit that is reserved as a margin, 0 to [`MARGIN_MAX`]; see
+    /// [`crate::ArmDynamics::usable_torque`].
     pub margin: JointVec,
 }
 
 impl Limits {
-    /// Returns the limits of an arm (J-43). An arm has no limit of jerk: here it is the highest acceleration within
-    /// [`JERK_TIME`].
+    /// Returns the limits of an arm (J-43). The configuration of an arm has no jerk limit; here the jerk limit is the
+    /// highest acceleration divided by [`JERK_TIME`].
     pub fn of(config: &Config) -> Self {
         let of = |value: fn(&jtc_core::JointConfig) -> f64| config.joints.each_ref().map(value);
         let acceleration = of(|j| j.acceleration_max);
@@ -43,13 +45,14 @@ impl Limits {
         }
     }
 
-    /// Keeps this share of each torque limit free.
+    /// Reserves this share of each torque limit as a margin.
     pub fn with_margin(self, share: f64) -> Self {
         Self { margin: [share; JOINTS], ..self }
     }
 
-    /// Returns the limits at which a motion bound by them takes 1/`share` of the time: velocity × `share`, acceleration
-    /// × its square, jerk × its cube. Positions, torques and their margin stay unchanged.
+    /// Returns the limits for a share of the speed: velocity × `share`, acceleration × its square, jerk × its cube. A
+    /// motion that these three limits bind then takes 1/`share` of the time. Positions, torques and the torque margin
+    /// stay unchanged.
     pub fn at_speed(&self, share: f64) -> Self {
         Self {
             velocity: self.velocity.map(|v| v * share),
@@ -59,12 +62,12 @@ impl Limits {
         }
     }
 
-    /// Returns these limits without a limit of jerk.
+    /// Returns these limits without a jerk limit.
     pub fn without_jerk(self) -> Self {
         Self { jerk: [f64::INFINITY; JOINTS], ..self }
     }
 
-    /// Returns `true` if any joint's jerk is limited.
+    /// Returns `true` if any joint has a jerk limit.
     pub fn has_jerk(&self) -> bool {
         self.jerk.iter().any(|j| j.is_finite())
     }
@@ -74,7 +77,7 @@ impl Limits {
     /// # Errors
     ///
     /// [`PlanError::Limit`] for the first limit that is not a positive number (only the jerk limit may be infinite),
-    /// [`PlanError::Range`] for an empty range of positions, and [`PlanError::Margin`].
+    /// [`PlanError::Range`] for an empty position range, and [`PlanError::Margin`].
     pub fn check(&self) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let j = joint.index();
@@ -89,7 +92,7 @@ impl Limits {
                 (LimitKind::Torque, self.torque[j], true),
             ] {
                 let positive = value > 0.0 && (value.is_finite() || !finite);
-                // Squares and cubes of smaller values are lost in rounding.
+                // Squares and cubes of smaller values would be lost in rounding.
                 if !positive || value < 1e-9 || (value > 1e9 && value.is_finite()) {
                     return Err(PlanError::Limit { joint, limit, value });
                 }
@@ -102,7 +105,7 @@ impl Limits {
         Ok(())
     }
 
-    /// Checks that `position` is within the limits; `waypoint`, from 1, names it in the error.
+    /// Checks that `position` is within the limits. The error contains `waypoint`, counted from 1.
     pub(crate) fn holds(&self, position: &JointVec, waypoint: usize) -> Result<(), PlanError> {
         for joint in Joint::ALL {
             let (value, (min, max)) = (position[joint.index()], self.position[joint.index()]);

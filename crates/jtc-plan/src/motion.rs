@@ -4,7 +4,7 @@ use jtc_wire::Joint;
 use crate::binding::{Binding, LimitKind};
 use crate::{JOINTS, JointVec};
 
-/// Position, velocity and acceleration at a moment.
+/// Position, velocity and acceleration at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct State {
     /// Position, rad.
@@ -22,14 +22,14 @@ impl State {
     }
 }
 
-/// A part of a motion: each joint's position is a polynomial of fifth degree of the time since `start`.
+/// A part of a motion in which each joint's position is a polynomial of degree 5 in the time since `start`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     /// Start, s.
     pub start: f64,
-    /// Length, s, above 0.
+    /// Length, above 0 s.
     pub length: f64,
-    /// Coefficients per joint, ascending.
+    /// Coefficients per joint, in ascending order.
     pub coefficients: [[f64; 6]; JOINTS],
 }
 
@@ -39,7 +39,7 @@ impl Piece {
         let h = length;
         let coefficients = std::array::from_fn(|j| {
             let (p, v, c) = (a.position[j], a.velocity[j], 0.5 * a.acceleration[j]);
-            // Residual at the end, in units of the length.
+            // Residual at the end; time is measured in lengths of the piece.
             let dp = b.position[j] - (p + h * (v + h * c));
             let dv = (b.velocity[j] - (v + 2.0 * h * c)) * h;
             let da = (b.acceleration[j] - 2.0 * c) * h * h;
@@ -69,7 +69,7 @@ impl Piece {
         self.coefficients.map(|[_, _, _, c3, c4, c5]| 6.0 * c3 + t * (24.0 * c4 + t * 60.0 * c5))
     }
 
-    /// Returns the same path in `factor` times the time.
+    /// Returns the piece with the same path, taking `factor` times as long.
     pub fn stretched(&self, factor: f64) -> Self {
         let mut coefficients = self.coefficients;
         for c in &mut coefficients {
@@ -89,24 +89,24 @@ pub struct Motion {
     pub(crate) pieces: Vec<Piece>,
     pub(crate) end: State,
     pub(crate) binding: Vec<Binding>,
-    /// Joint for whose torque the whole motion was slowed down.
+    /// Joint whose torque required slowing down the whole motion.
     pub(crate) slowed: Option<Joint>,
     pub(crate) waypoint_times: Vec<f64>,
 }
 
 impl Motion {
-    /// Creates a motion from its pieces, which follow each other without a gap and come to rest at `end`.
+    /// Creates a motion from consecutive pieces without gaps; the last one comes to rest at `end`.
     pub(crate) fn new(pieces: Vec<Piece>, end: JointVec, waypoint_times: Vec<f64>) -> Self {
         Self { pieces, end: State::rest(end), binding: Vec::new(), slowed: None, waypoint_times }
     }
 
-    /// Returns the time from rest to rest, s, above 0.
+    /// Returns the time from rest to rest, above 0 s.
     pub fn duration(&self) -> f64 {
         self.pieces.last().map_or(0.0, |p| p.start + p.length)
     }
 
     /// Returns the state at `t` seconds from the start. Before the start and after the end the arm rests exactly at the
-    /// first and the last waypoint. Without a limit of jerk the acceleration jumps; the value after the jump is
+    /// first and the last waypoint. Without a jerk limit the acceleration may jump at `t`; the value after the jump is
     /// returned.
     pub fn at(&self, t: f64) -> State {
         match self.piece(t) {
@@ -127,8 +127,8 @@ impl Motion {
         self.piece(t).map_or([0.0; JOINTS], |piece| piece.jerk(t - piece.start))
     }
 
-    /// Returns the binding limits in the order of time. If no limit is used up, it is the limit that is closest to
-    /// being used up around that time, or the limit for which the whole motion was slowed down.
+    /// Returns the binding limits in chronological order. In an interval in which no limit is reached, this is the
+    /// limit closest to being reached, or the limit that required slowing down the whole motion.
     pub fn binding(&self) -> &[Binding] {
         &self.binding
     }
@@ -138,7 +138,7 @@ impl Motion {
         &self.waypoint_times
     }
 
-    /// Returns the piece at `t`, or the first one before the start; `None` from the end on.
+    /// Returns the piece at `t`. Before the start this is the first piece; from the end on, returns `None`.
     fn piece(&self, t: f64) -> Option<&Piece> {
         if t.is_nan() || t >= self.duration() {
             return None;
@@ -147,7 +147,7 @@ impl Motion {
         self.pieces.get(after.saturating_sub(1))
     }
 
-    /// Returns the same path in `factor` times the time.
+    /// Returns the motion on the same path, taking `factor` times as long.
     pub(crate) fn stretched(&self, factor: f64) -> Self {
         Self {
             pieces: self.pieces.iter().map(|p| p.stretched(factor)).collect(),
@@ -158,8 +158,8 @@ impl Motion {
         }
     }
 
-    /// Inserts a rest of `length` seconds at the waypoint with this index, if the motion is at rest there; later waypoints
-    /// are passed later.
+    /// Inserts a rest of `length` seconds at the waypoint with this index, if the motion is at rest there. Later
+    /// waypoints are delayed by it.
     pub(crate) fn rest_at(&mut self, waypoint: usize, length: f64) {
         let Some(&time) = self.waypoint_times.get(waypoint) else { return };
         let at = self.pieces.partition_point(|p| p.start + 0.5 * p.length < time);
@@ -176,7 +176,7 @@ impl Motion {
         let joint = self.binding.get(after.saturating_sub(1)).map_or(Joint::ALL[0], |b| b.joint);
         binding.extend(self.binding[..after].iter().map(|b| Binding { to: b.to.min(time), ..*b }));
         binding.push(Binding { from: time, to: time + length, joint, limit: LimitKind::GivenTime });
-        // A binding that continues after the rest is split in two.
+        // A binding interval that continues after the rest is split in two.
         let both = self.binding[..after].last().filter(|b| b.to > time).map(|b| Binding { from: time, ..*b });
         let later = both.into_iter().chain(self.binding[after..].iter().copied());
         binding.extend(later.map(|b| Binding { from: b.from + length, to: b.to + length, ..b }));

@@ -6,20 +6,21 @@ use rsruckig::prelude::{
 use crate::motion::{Motion, Piece};
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError, State, reasons, trapezoid, verify};
 
-/// Duration of a motion without movement, s: a trajectory has two points and therefore some duration.
+/// Duration of a motion without movement, s. A trajectory needs two points, and therefore a duration above 0.
 const STANDING: f64 = 0.01;
 
-/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk; all joints move from the first to
-/// the last moment (Ruckig: Berscheid and Kröger 2021). The motion follows a straight line of joint space if that takes
-/// no longer. With an `arm` it is slowed down until its torque suffices, and its speed is within the friction table.
+/// Plans the fastest motion from rest to rest within velocity, acceleration and jerk limits; all joints start and stop
+/// together (Ruckig: Berscheid and Kröger 2021). The motion follows a straight line in joint space if that takes no
+/// longer. With an `arm`, the motion is slowed down until the torque is sufficient, and its speed stays within the
+/// friction table.
 ///
-/// A motion from a place to the same place is a rest of 10 ms.
+/// If both positions are the same, the motion is a rest of 10 ms.
 ///
 /// # Errors
 ///
-/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that leave no motion, [`PlanError::NotFinite`] and
-/// [`PlanError::Position`] for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] if the torque does not suffice at
-/// any speed.
+/// [`PlanError::Limit`] and [`PlanError::Range`] for limits that permit no motion, [`PlanError::NotFinite`] and
+/// [`PlanError::Position`] for waypoint 1 (`from`) or 2 (`to`), [`PlanError::Torque`] if the torque is too small at
+/// every speed.
 pub fn point_to_point(
     from: &JointVec,
     to: &JointVec,
@@ -35,7 +36,7 @@ pub fn point_to_point(
     Ok(reasons::explained(verify::finished(motion, limits, arm)?, limits, arm))
 }
 
-/// Like [`point_to_point`], without torque.
+/// Like [`point_to_point`], ignoring torque.
 fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     if from == to {
         return Ok(standing(from, to, 2));
@@ -46,7 +47,7 @@ fn fastest(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pl
     ruckig(from, to, limits)
 }
 
-/// Returns a rest from a position to an equivalent one, with `waypoints` waypoints.
+/// Returns a short rest between two equivalent positions, with `waypoints` waypoints.
 pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Motion {
     let piece = Piece::between(0.0, STANDING, &State::rest(*from), &State::rest(*to));
     let mut times = vec![0.0; waypoints];
@@ -56,7 +57,7 @@ pub(crate) fn standing(from: &JointVec, to: &JointVec, waypoints: usize) -> Moti
     Motion::new(vec![piece], *to, times)
 }
 
-/// Plans by Ruckig; the joint with the longest distance decides whether the others can follow it on a straight line.
+/// Plans with Ruckig. The motion is a straight line if the other joints can follow the joint with the longest distance.
 fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, PlanError> {
     let mut input = InputParameter::<JOINTS>::new(None);
     input.current_position = DataArrayOrVec::Stack(*from);
@@ -84,12 +85,12 @@ fn ruckig(from: &JointVec, to: &JointVec, limits: &Limits) -> Result<Motion, Pla
     Ok(Motion::new(pieces.collect(), *to, vec![0.0, end]))
 }
 
-/// Returns the part of a trajectory in which no joint's jerk changes.
+/// Returns the part of a trajectory in which the jerk of every joint is constant.
 fn constant_jerk(trajectory: &Trajectory<JOINTS>, start: f64, length: f64) -> Piece {
     let zeros = || DataArrayOrVec::Stack([0.0; JOINTS]);
     let (mut p, mut v, mut a, mut jerk) = (zeros(), zeros(), zeros(), zeros());
     trajectory.at_time(start, &mut Some(&mut p), &mut Some(&mut v), &mut Some(&mut a), &mut None, &mut None);
-    // Its middle selects the jerk: at the start it may still be the previous one.
+    // The jerk is read in the middle: at the start it may still be the jerk of the previous part.
     let middle = start + 0.5 * length;
     trajectory.at_time(middle, &mut None, &mut None, &mut None, &mut Some(&mut jerk), &mut None);
     let coefficients = std::array::from_fn(|j| [p[j], v[j], 0.5 * a[j], jerk[j] / 6.0, 0.0, 0.0]);

@@ -1,7 +1,7 @@
 //! Paths through joint space, without time.
 use crate::JointVec;
 
-/// A point on a path, with derivatives by the path's parameter.
+/// A point on a path, with derivatives with respect to the path's parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PathPoint {
     /// Position, rad.
@@ -12,7 +12,8 @@ pub struct PathPoint {
     pub second: JointVec,
 }
 
-/// A path through joint space: positions over a parameter from 0 to [`end`](Path::end), with two derivatives by it.
+/// A path through joint space: positions as a function of a parameter from 0 to [`end`](Path::end), with two
+/// derivatives.
 ///
 /// The first derivative is continuous except at [`stops`](Path::stops), and the position is three times differentiable
 /// between two [`breaks`](Path::breaks). Any parameter is possible; a parameter proportional to the joint movements
@@ -21,26 +22,28 @@ pub trait Path {
     /// Returns the last value of the parameter, above 0.
     fn end(&self) -> f64;
 
-    /// Returns position and derivatives at `s`, which is between 0 and the end. At a break they may belong to either side.
+    /// Returns position and derivatives at `s`, which is between 0 and the end. At a break the derivatives may be those
+    /// of either side.
     fn at(&self, s: f64) -> PathPoint;
 
-    /// Returns the waypoint of `s` for errors: the last one passed, counted from 1.
+    /// Returns the waypoint for errors at `s`: the last one passed, counted from 1.
     fn waypoint(&self, _s: f64) -> Option<usize> {
         None
     }
 
-    /// Parameters, rising, between 0 and the end, at which a derivative jumps or the path changes its form. Between two
-    /// neighbours the path should look like one simple curve: it is sampled at a fixed number of places between them.
+    /// Parameters in ascending order, between 0 and the end, at which a derivative jumps or the path changes its form.
+    /// Between two of them the path should be one simple curve, because it is sampled at a fixed number of places.
     fn breaks(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Parameters, rising, between 0 and the end, at which a motion must come to rest. These stops count as breaks.
+    /// Parameters in ascending order, between 0 and the end, at which a motion must come to rest. Each stop is also a
+    /// break.
     fn stops(&self) -> Vec<f64> {
         Vec::new()
     }
 
-    /// Returns the parameters, rising, nearest to each waypoint, including the ends.
+    /// Returns the parameter nearest to each waypoint, in ascending order, including both ends.
     fn waypoints(&self) -> Vec<f64> {
         vec![0.0, self.end()]
     }

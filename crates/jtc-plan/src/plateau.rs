@@ -1,9 +1,9 @@
-//! Plateaus of the highest speeds: between speeding up and slowing down the parameter's acceleration is 0 for a while,
-//! so that it need not change by both in one window.
+//! Plateaus at the speed maxima. Between speeding up and slowing down, the parameter's acceleration is 0 for one
+//! window, so that one averaging window never contains both changes of the acceleration.
 use crate::profile::simplified;
 
-/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until it lasts for `window` seconds, or until it is as low as the
-/// lowest adjacent speed.
+/// Lowers every maximum of a law's `vertices` (parameter, squared speed) until the maximum lasts for `window` seconds
+/// or is as low as the lowest adjacent speed.
 pub(crate) fn flattened(vertices: &[(f64, f64)], window: f64) -> Vec<(f64, f64)> {
     let mut walk = Walk { done: Vec::with_capacity(vertices.len()), ahead: vertices, next: 0 };
     while walk.next < vertices.len() {
@@ -37,7 +37,7 @@ impl Top {
         if self.level > 0.0 { (self.to - self.from) / self.level.sqrt() } else { f64::INFINITY }
     }
 
-    /// Returns the plateau at the lower `level`; the sides lead to `left` and `right`.
+    /// Returns the plateau lowered to `level`; its sides end at `left` and `right`.
     fn at(&self, level: f64, left: (f64, f64), right: (f64, f64)) -> Self {
         let side = |x: f64, foot: (f64, f64)| {
             let height = self.level - foot.1;
@@ -48,7 +48,7 @@ impl Top {
 }
 
 impl Walk<'_> {
-    /// Lowers the highest speed that ends at the last processed vertex, if it is one.
+    /// Lowers the speed maximum that ends at the last processed vertex, if there is one.
     fn lower(&mut self, window: f64) {
         let Some((x, level)) = self.done.pop() else { return };
         let mut top = Top { from: x, to: x, level };
@@ -87,7 +87,7 @@ impl Walk<'_> {
     }
 }
 
-/// Returns the highest level, between that of `top` and `lowest`, that lasts for the window.
+/// Returns the plateau with the highest level, between the level of `top` and `lowest`, that lasts for the window.
 fn enough(top: &Top, lowest: f64, left: (f64, f64), right: (f64, f64), window: f64) -> Top {
     let (mut low, mut high) = (lowest, top.level);
     for _ in 0..60 {

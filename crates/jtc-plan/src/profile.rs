@@ -1,7 +1,8 @@
-//! The fastest time law under limits of the parameter's speed and acceleration alone, which are constant in cells of the path.
+//! The fastest time law under limits of the parameter's speed and acceleration only. The limits are constant in each
+//! cell of the path.
 //!
-//! A law that is averaged over a window afterwards keeps a cell's limits only if it also keeps them half a window
-//! before and after the cell: therefore cells are extended beyond their ends.
+//! The law may be averaged over a window afterwards. To keep a cell's limits then, it must keep them half a window
+//! before and after the cell too. Cells are therefore extended beyond their ends.
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -19,15 +20,15 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Returns the bounds extended by half a window at both ends, at their own highest speed.
+    /// Returns the bounds extended at both ends by the distance covered in half a window at their highest speed.
     fn widened(&self, window: f64, end: f64) -> Self {
         let reach = 0.5 * window * self.cap.sqrt();
         Self { from: (self.from - reach).max(0.0), to: (self.to + reach).min(end), ..*self }
     }
 }
 
-/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest, between which the squared
-/// speed is linear; each of its highest speeds lasts for `window` seconds.
+/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest. Between them the squared speed
+/// is linear; each speed maximum lasts for `window` seconds.
 pub(crate) fn fastest(cells: &[Bounds], window: f64) -> Vec<(f64, f64)> {
     let end = cells.last().map_or(0.0, |c| c.to);
     let widened: Vec<Bounds> = cells.iter().map(|c| c.widened(window, end)).collect();
@@ -42,7 +43,7 @@ fn key(x: f64) -> u64 {
     x.max(0.0).to_bits()
 }
 
-/// Returns the lowest of all limits in every part in which they are constant.
+/// Splits the range into parts with constant limits, and returns the lowest limits in each part.
 fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     let mut order: Vec<usize> = (0..bounds.len()).collect();
     order.sort_by(|&a, &b| bounds[a].from.total_cmp(&bounds[b].from));
@@ -75,7 +76,8 @@ fn lowest(bounds: &[Bounds]) -> Vec<Bounds> {
     parts
 }
 
-/// Returns the highest squared speeds at the ends of the parts that can be reached from the start and stopped before the end.
+/// Returns the highest squared speeds at the ends of the parts that can be reached from the start and from which a stop
+/// at the end is possible.
 fn speeds(parts: &[Bounds]) -> Vec<f64> {
     let mut nodes = vec![0.0; parts.len() + 1];
     for (i, part) in parts.iter().enumerate() {
@@ -89,7 +91,7 @@ fn speeds(parts: &[Bounds]) -> Vec<f64> {
     nodes
 }
 
-/// Returns the vertices of all parts: up, along the cap if it is reached, and down.
+/// Returns the vertices of all parts: acceleration, constant speed if the cap is reached, and deceleration.
 fn vertices(parts: &[Bounds], nodes: &[f64]) -> Vec<(f64, f64)> {
     let mut vertices = vec![(0.0, 0.0)];
     for (part, pair) in parts.iter().zip(nodes.windows(2)) {

@@ -7,7 +7,7 @@ use crate::cells::{Cell, End, Room};
 use crate::path::PathPoint;
 use crate::{ArmDynamics, JOINTS, Limits};
 
-/// Number of rows per point: acceleration and torque of each joint, both directions.
+/// Number of rows per point: acceleration and torque of each joint in both directions.
 const ROWS: usize = 4 * JOINTS;
 
 /// Tolerance of squared speeds, relative to the highest.
@@ -20,8 +20,8 @@ struct Rows {
     limit: [f64; ROWS],
 }
 
-/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Its squared
-/// speed is at most `caps`, and its accelerations and torques are at most `shares` of their limits.
+/// Returns the vertices (parameter, squared speed) of the fastest law from rest to rest along the cells. Squared speeds
+/// are at most `caps`; accelerations and torques are at most `shares` of their limits.
 pub(crate) fn fastest(
     cells: &[Cell],
     caps: &[f64],
@@ -37,14 +37,14 @@ pub(crate) fn fastest(
         left.min(right).clamp(1e-18, 1e18)
     };
     let caps_of_places: Vec<f64> = (0..count).map(cap).collect();
-    // In a unit of time in which the highest speed is 1, because copp's tolerances are absolute.
+    // The unit of time is chosen such that the highest speed is 1, because copp's tolerances are absolute.
     let unit = caps_of_places.iter().copied().fold(0.0, f64::max);
     let in_units: Vec<f64> = caps_of_places.iter().map(|cap| cap / unit).collect();
     let mut constraints = Constraints::with_capacity(JOINTS, count);
     let failed = |e: copp::diag::ConstraintError| e.to_string();
     constraints.with_s(places.as_slice()).map_err(failed)?;
     constraints.with_constraint_1order(in_units.as_slice(), 0).map_err(failed)?;
-    // A place belongs to the cell after it, and, if its derivatives differ there, also to the cell before it.
+    // A place belongs to the cell after it. If its derivatives differ there, it also belongs to the cell before it.
     let share = |i: usize| shares[i.saturating_sub(1)].min(shares[i.min(count - 2)]);
     let end = |i: usize| cells.get(i).map_or(&cells[count - 2].ends[1], |cell| &cell.ends[0]);
     let rows = |end: &End, i: usize| Rows::new(end, share(i), caps_of_places[i], limits, arm).in_units(unit);
@@ -90,7 +90,7 @@ fn append(constraints: &mut Constraints, rows: &[Rows], first: usize) -> Result<
 }
 
 impl Rows {
-    /// Returns the rows with squared speeds and accelerations of the parameter in this unit, scaled to about 1.
+    /// Returns the rows with the parameter's squared speeds and accelerations in this unit, scaled to about 1.
     fn in_units(mut self, unit: f64) -> Self {
         for row in 0..ROWS {
             let size =

@@ -5,28 +5,29 @@ use crate::binding::{Binding, LimitKind};
 use crate::motion::Motion;
 use crate::{ArmDynamics, JOINTS, Limits, verify};
 
-/// Share of a limit from which it counts as binding.
+/// Share of a limit from which the limit is considered binding.
 const BINDS: f64 = 0.985;
-/// Distance of the samples, s, and their maximum number.
+/// Time between samples, s, and maximum number of samples.
 const STEP: f64 = 0.002;
 const SAMPLES_MAX: f64 = 4000.0;
-/// Maximum distance in time of the binding limit from a moment, s: the ramps of the acceleration are that long, and
-/// before a corner the motion is slow because of the limit ahead.
+/// Maximum time between a moment and its binding limit, s. Ramps of the acceleration last that long, and before a
+/// corner the motion is slow because of the limit ahead.
 const NEAR: f64 = 0.05;
-/// Share of the torque limit below which the torque counts as holding torque, which no speed changes.
+/// Below this share of the torque limit, the torque is considered to be holding torque, which does not depend on the
+/// speed.
 const TORQUE: f64 = 0.9;
-/// Intervals shorter than this, s, are merged into the one before.
+/// Intervals shorter than this, s, are merged into the previous interval.
 const SHORT: f64 = 0.004;
 
-/// A limit and its use, as a share of the speed at which it is reached.
+/// A limit and its use: the share of the speed at which the limit would be reached.
 type Use = (f64, Joint, LimitKind);
 
 /// Binding limits of a motion.
 pub(crate) struct Reasons {
-    /// Limits that are used up.
+    /// Limits that are reached.
     pub used_up: Vec<Binding>,
-    /// At all times: the limit for which the whole motion was slowed down, or else the limit that comes closest around
-    /// that time.
+    /// Reason in the remaining time: the limit that required slowing down the whole motion, or else the limit closest
+    /// to being reached around that time.
     otherwise: Vec<Binding>,
 }
 
@@ -55,10 +56,10 @@ pub(crate) fn find(motion: &Motion, limits: &Limits, arm: Option<&ArmDynamics>) 
     Reasons { used_up: runs(used_up, step), otherwise }
 }
 
-/// Returns the limit with the highest use at `time`, and the limit that is reached.
+/// Returns the limit with the highest use at `time`, and the limit that is reached, if any.
 fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) -> (Use, Option<Use>) {
     let state = motion.at(time);
-    // The holding torque is computed only if the torque is near the limit less the margin.
+    // The holding torque is computed only if the torque is near the usable limit.
     let torque = arm.map(|arm| {
         let torque = arm.torque(&state);
         let least = |j: usize| (1.0 - limits.margin[j]) * limits.torque[j];
@@ -93,7 +94,7 @@ fn uses(motion: &Motion, time: f64, limits: &Limits, arm: Option<&ArmDynamics>) 
 
 /// Returns the highest use within `reach` samples of each sample.
 fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
-    // Indices with falling uses: the first one is the highest within reach.
+    // Indices with descending uses; the first one is the highest within reach.
     let mut falling: std::collections::VecDeque<usize> = std::collections::VecDeque::new();
     let mut next = 0;
     let at = |i: usize| {
@@ -112,7 +113,7 @@ fn highest(uses: &[(Use, Option<Use>)], reach: usize) -> Vec<Use> {
     (0..uses.len()).map(at).collect()
 }
 
-/// Returns runs of equal consecutive samples.
+/// Merges equal consecutive samples into intervals.
 fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) -> Vec<Binding> {
     let mut runs: Vec<Binding> = Vec::new();
     for (i, sample) in samples.enumerate() {
@@ -129,7 +130,7 @@ fn runs(samples: impl Iterator<Item = Option<(Joint, LimitKind)>>, step: f64) ->
 }
 
 impl Reasons {
-    /// Returns one list for a motion that takes `duration` s: the limits that are used up, and between them the other
+    /// Returns one list for a motion that takes `duration` s: the limits that are reached, and between them the other
     /// binding limits.
     pub fn joined(&self, duration: f64) -> Vec<Binding> {
         let mut all: Vec<Binding> = Vec::new();

@@ -13,18 +13,19 @@ use crate::{
 const ON_TIME: f64 = 5e-4;
 /// Maximum number of corrections of the speeds between given times.
 const CORRECTIONS: usize = 60;
-/// Share of the wanted time for which the speed is lowered; the remainder is reached by running the part slower.
+/// Aimed share of the wanted time when the speed is lowered. The remaining time is reached by slowing the part down
+/// uniformly.
 const AIM: f64 = 0.98;
-/// Factor that makes a refused time certainly possible, if the time was refused only because its neighbours leave no
-/// margin.
+/// Factor for the shortest time in an error, if the given time was refused only because the adjacent legs leave no
+/// margin. With this factor the time is certainly possible.
 const SURE: f64 = 1.05;
-/// Share of the speed that is used if no time is given: the factor for each failed attempt, and the lowest share.
+/// Speed factor for parts without a given time: the factor for each failed attempt, and the lowest value.
 const ROOM: f64 = 0.97;
 const ROOM_MIN: f64 = 0.8;
-/// Largest number of times in a row that a part may take too long at full speed while its neighbours' speeds are
-/// corrected.
+/// Largest number of consecutive attempts in which a part may take too long at full speed, while the speeds of its
+/// neighbours are corrected.
 const LATE_MAX: usize = 4;
-/// Slowest share of the speed.
+/// Lowest speed factor.
 const SLOWEST: f64 = 1e-4;
 
 /// A waypoint.
@@ -42,20 +43,21 @@ impl From<JointVec> for Waypoint {
     }
 }
 
-/// Plans a motion from the first waypoint to the last, as fast as the limits allow, on straight legs whose corners are
-/// rounded within `blend` rad (see [`BlendedPath`]); 0: a stop at each waypoint. If that is faster, the arm stops at a
-/// corner, or waypoints closer to each other than the blend are passed on a straighter line, within the blend of each
-/// of them. Waypoints that are all the same give a rest of 10 ms.
+/// Plans a motion from the first waypoint to the last, as fast as the limits permit, on straight legs. Corners are
+/// rounded within `blend` rad (see [`BlendedPath`]); with 0 the arm stops at each waypoint. If it is faster, the arm
+/// stops at a corner. Also if it is faster, waypoints closer to each other than the blend are passed on a straighter
+/// line, within the blend of each of them. If all waypoints are the same, the motion is a rest of 10 ms.
 ///
 /// A waypoint with a time is passed at that time, to half a millisecond. If it could be passed earlier, the motion
-/// since the previous waypoint with a time is slowed down; between waypoints at one place the arm rests. Legs without a
-/// time after them are as fast as possible.
+/// since the previous waypoint with a time is slowed down. If both waypoints are at the same place, the arm rests
+/// between them. Legs after the last given time are as fast as possible.
 ///
 /// # Errors
 ///
 /// [`PlanError::TooFew`] for fewer than two waypoints, [`PlanError::NotFinite`] and [`PlanError::Position`] for a
-/// waypoint that is invalid or outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not rise
-/// from 0, [`PlanError::TooEarly`] for a time that the limits do not allow, and the errors of [`along`](crate::along).
+/// waypoint that is invalid or outside the limits, [`PlanError::Blend`]; [`PlanError::Time`] for times that do not
+/// increase from 0, [`PlanError::TooEarly`] for a time that the limits do not permit, and the errors of
+/// [`along`](crate::along).
 pub fn through(
     waypoints: &[Waypoint],
     blend: f64,
@@ -93,12 +95,12 @@ pub fn through(
     }
 }
 
-/// Plans a motion from the first waypoint of a route to its last, as fast as the limits permit. `times` are the times
-/// of its waypoints, as in [`Waypoint`]; they are kept as in [`through`].
+/// Plans a motion from the first waypoint of a route to its last, as fast as the limits permit. `times` contains the
+/// times of its waypoints, with the same meaning as in [`Waypoint`] and [`through`].
 ///
 /// # Errors
 ///
-/// As [`through`].
+/// Same as [`through`].
 pub fn on_route(
     route: &Route,
     times: &[Option<f64>],
@@ -117,7 +119,7 @@ pub fn on_route(
     if given.len() < 2 { along(route, limits, arm) } else { on_time(route, &given, limits, arm) }
 }
 
-/// Returns a rest at equal waypoints, until the last given time.
+/// Returns a rest at equal waypoints that ends at the last given time.
 fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     let mut rest = p2p::standing(&positions[0], &positions[positions.len() - 1], positions.len());
     let last = given[given.len() - 1];
@@ -129,7 +131,7 @@ fn rest(positions: &[JointVec], given: &[(usize, f64)]) -> Motion {
     rest
 }
 
-/// Returns index and time of the waypoints that have a time; the first one is always at 0.
+/// Returns index and time of the waypoints with a time. The first waypoint always has the time 0.
 fn given_times(waypoints: &[Waypoint]) -> Result<Vec<(usize, f64)>, PlanError> {
     let mut given: Vec<(usize, f64)> = vec![(0, 0.0)];
     for (i, waypoint) in waypoints.iter().enumerate() {
@@ -153,9 +155,9 @@ struct Stretch {
     to: usize,
     /// Wanted time, s.
     wanted: f64,
-    /// Share of the speed.
+    /// Speed factor.
     share: f64,
-    /// Number of times in a row that the stretch took too long at full speed.
+    /// Number of consecutive attempts in which the stretch took too long at full speed.
     late: usize,
 }
 
@@ -165,7 +167,7 @@ impl Stretch {
     }
 }
 
-/// Corrects the speed between each two given times until all times are kept.
+/// Corrects the speeds between consecutive given times until all times are kept.
 fn on_time(
     path: &impl Waypointed,
     given: &[(usize, f64)],
@@ -193,8 +195,8 @@ fn on_time(
     Ok(motion)
 }
 
-/// Keeps the times of stretches in which the arm moves. Lowers the speed of each until its duration is nearly the
-/// wanted one; a change of rate corrects the remainder.
+/// Keeps the times of stretches in which the arm moves. Lowers the speed of each stretch until its duration is nearly
+/// the wanted one, then corrects the remainder by a change of rate.
 fn moving_on_time(
     path: &impl Waypointed,
     stretches: &mut [Stretch],
@@ -202,7 +204,7 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Share of the speed if no time is given: lower if changing the rates leaves no margin.
+    // Speed factor for parts without a given time. It is lowered if the changes of rate leave no margin.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {
@@ -214,7 +216,7 @@ fn moving_on_time(
             let is_late = s.share >= 1.0 && s.takes(&motion) > s.wanted + ON_TIME;
             s.late = if is_late { s.late + 1 } else { 0 };
         }
-        // The neighbours may still become faster, but not those of the fastest motion.
+        // The neighbours may still become faster, except in the first attempt, which is the fastest motion.
         let most = if attempt == 0 { 0 } else { LATE_MAX };
         if let Some(late) = stretches.iter().find(|s| s.late > most) {
             return Err(too_early(late, motion, limits, arm));
@@ -224,7 +226,7 @@ fn moving_on_time(
         if stretches.iter().all(|s| is_near(s) || between_rests(s)) {
             let warped = warp::warped(&motion, &parts(stretches, &motion), limits);
             let warped = verify::finished(warped, limits, arm)?;
-            // Errors accumulate.
+            // Timing errors of the stretches add up.
             let mut off = 0.0;
             let on_time = stretches.iter().all(|s| {
                 off += s.takes(&warped) - s.wanted;
@@ -241,7 +243,7 @@ fn moving_on_time(
             s.share = (s.share * damped).clamp(SLOWEST, 1.0);
         }
     }
-    // A stretch at full speed leaves no margin for the transition from one rate to the next.
+    // A stretch at full speed leaves no margin for changing from one rate to the next.
     let motion = along_at(path, limits, arm, &|_| 1.0, &mut choices)?;
     let tightness = |s: &&Stretch| s.takes(&motion) / s.wanted;
     match stretches.iter().max_by(|a, b| tightness(a).total_cmp(&tightness(b))) {
@@ -250,7 +252,7 @@ fn moving_on_time(
     }
 }
 
-/// Returns the stretches as parts of a motion, with the parts without a time between them.
+/// Returns the stretches as parts of a motion, and the parts without a given time between them.
 fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     let times = &motion.waypoint_times;
     let mut parts = Vec::with_capacity(stretches.len() + 1);
@@ -268,7 +270,7 @@ fn parts(stretches: &[Stretch], motion: &Motion) -> Vec<warp::Part> {
     parts
 }
 
-/// Returns the error for a stretch that takes longer than it may, with the limit that binds it.
+/// Returns the error for a stretch that takes longer than permitted, with the limit that binds it.
 fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDynamics>) -> PlanError {
     let motion = reasons::explained(motion, limits, arm);
     let (from, to) = (motion.waypoint_times[late.from], motion.waypoint_times[late.to]);
@@ -291,7 +293,7 @@ fn too_early(late: &Stretch, motion: Motion, limits: &Limits, arm: Option<&ArmDy
     }
 }
 
-/// If no limit is reached, the given times bind.
+/// Where no limit is reached, adds the given times as the binding limit.
 fn with_given_times(binding: &mut Vec<Binding>, motion: &Motion, stretches: &[Stretch]) {
     let mut all: Vec<Binding> = Vec::new();
     for s in stretches {

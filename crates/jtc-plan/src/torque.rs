@@ -4,11 +4,12 @@ use jtc_dynamics::{ArmModel, Dynamics};
 
 use crate::{JOINTS, JointVec, Limits, State};
 
-/// Share of a joint's torque limit that holding the joint may use, without friction: 98 % have been observed to fall.
+/// Share of a joint's torque limit that holding the joint may use, without friction. At 98 %, joints have been observed
+/// to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of the torque left by holding that a motion may use for every margin, and its least value as a share of the
-/// limit.
+/// Share of the torque available above holding that a motion may use whatever the margin, and its minimum as a share of
+/// the limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;
 
@@ -19,7 +20,7 @@ pub struct ArmDynamics<'a> {
     dynamics: Dynamics,
     rotor: JointVec,
     friction: Option<&'a Friction>,
-    /// Bearing temperatures, °C: the one with the higher torque counts.
+    /// Bearing temperatures, °C. The temperature that gives the higher torque is used.
     temperatures: [f64; 2],
     sign_width: f64,
     ranges: FrictionRanges,
@@ -28,7 +29,7 @@ pub struct ArmDynamics<'a> {
 /// Number of speed steps for which the range of a joint's friction is stored.
 const STEPS: usize = 128;
 
-/// Per joint, the lowest and highest friction (N·m) of all speeds from 0 up to each step, backward and forward.
+/// Lowest and highest friction (N·m) of each joint over all speeds from 0 up to each step, backward and forward.
 #[derive(Clone, Debug)]
 struct FrictionRanges {
     /// Step of speed, rad/s.
@@ -37,8 +38,8 @@ struct FrictionRanges {
 }
 
 impl<'a> ArmDynamics<'a> {
-    /// Creates the model from the arm `model` with the payload, gravity and rotors of `config`, and `friction` if it is
-    /// compensated for, at a bearing temperature of 30 °C.
+    /// Creates the model from the arm `model`, the payload, gravity and rotors of `config`, and `friction` if the
+    /// controller compensates for it, at a bearing temperature of 30 °C.
     pub fn new(config: &Config, model: &ArmModel, friction: Option<&'a Friction>) -> Self {
         let step = config.joints.each_ref().map(|j| j.velocity_max / STEPS as f64);
         let arm = Self {
@@ -57,8 +58,8 @@ impl<'a> ArmDynamics<'a> {
         self.at_temperatures([temperature; 2])
     }
 
-    /// Returns the model at two bearing temperatures, °C. The temperature with the higher torque counts in every state:
-    /// cold bearings need more to speed up, and warm bearings more to slow down.
+    /// Returns the model at two bearing temperatures, °C. In every state the temperature with the higher torque is
+    /// used: cold bearings need more torque to speed up, warm bearings more to slow down.
     pub fn at_temperatures(self, temperatures: [f64; 2]) -> Self {
         Self { temperatures, ..self }.with_ranges()
     }
@@ -98,13 +99,13 @@ impl<'a> ArmDynamics<'a> {
         if step <= STEPS {
             return (low, high);
         }
-        // Beyond the highest speed of the arm.
+        // Above the highest speed of the arm.
         let friction = self.frictions(j, fastest);
         (low.min(friction.0), high.max(friction.1))
     }
 
-    /// Returns a continuous friction: low and high, with the values of the next step interpolated linearly, and the
-    /// slopes of both by the speed.
+    /// Returns the lowest and highest friction up to a speed, interpolated linearly between two steps so that they are
+    /// continuous, and the slopes of both with respect to the speed.
     pub(crate) fn friction_line(&self, j: usize, fastest: f64) -> (f64, f64, f64, f64) {
         if self.friction.is_none() {
             return (0.0, 0.0, 0.0, 0.0);
@@ -116,7 +117,7 @@ impl<'a> ArmDynamics<'a> {
         let (u, (low, high), (low_after, high_after)) = if at < STEPS {
             (steps + 1.0 - at as f64, ranges[at], ranges[at + 1])
         } else {
-            // Beyond the highest speed of the arm.
+            // Above the highest speed of the arm.
             let (u, step) = (steps.fract(), self.ranges.step[j].copysign(fastest));
             let with = |speed: f64| {
                 let (friction, (low, high)) = (self.frictions(j, speed), ranges[STEPS]);
@@ -137,10 +138,10 @@ impl<'a> ArmDynamics<'a> {
         torque
     }
 
-    /// Returns the torque that a motion may use of the joint with index `j` if holding the arm takes `hold`, N·m: its
-    /// limit less the margin. If gravity and the friction of the first movement leave less, the result is their sum
-    /// plus a quarter of the remaining limit, and at least plus 2 % of the limit: a pose that can be held can be left
-    /// and reached.
+    /// Returns the torque that a motion may use of the joint with index `j` if holding the arm takes `hold`, N·m: the
+    /// limit minus the margin. If gravity and breakaway friction leave less, it is their sum plus a quarter of the
+    /// remaining limit, or plus 2 % of the limit if that is more. The arm can then always enter and leave a pose that
+    /// it can hold.
     pub fn usable_torque(&self, limits: &Limits, j: usize, hold: f64) -> f64 {
         let (whole, margin) = (limits.torque[j], limits.margin[j]);
         if margin == 0.0 {
@@ -166,14 +167,14 @@ impl<'a> ArmDynamics<'a> {
     }
 
     /// Returns the torque that compensates for the friction of the joint with index `j` at `velocity` (rad/s), N·m, at
-    /// the temperature with the larger total of friction and `rigid`. Velocities outside the table count as the nearest
-    /// one in it.
+    /// the temperature with the larger total of friction and `rigid`. A velocity outside the table uses the nearest
+    /// value in it.
     pub(crate) fn friction(&self, j: usize, velocity: f64, rigid: f64) -> f64 {
         let (low, high) = self.frictions(j, velocity);
         if (rigid + high).abs() >= (rigid + low).abs() { high } else { low }
     }
 
-    /// Returns the lower and the higher friction of both temperatures.
+    /// Returns the friction at both temperatures, the lower value first.
     fn frictions(&self, j: usize, velocity: f64) -> (f64, f64) {
         let [first, second] = self.temperatures;
         let friction = self.friction_at(j, velocity, first);
@@ -198,8 +199,8 @@ impl<'a> ArmDynamics<'a> {
         }
     }
 
-    /// Returns the highest speed of the joint with index `j` in the friction table in both directions, rad/s (J-36);
-    /// infinite without a table.
+    /// Returns the highest speed that the friction table covers for the joint with index `j` in both directions, rad/s
+    /// (J-36); infinite without a table.
     pub(crate) fn velocity_max(&self, j: usize) -> f64 {
         match self.friction {
             Some(Friction::Table(tables)) => {

@@ -1,13 +1,13 @@
-//! Motions without a jerk limit: trapezoids of speed.
+//! Motions without a jerk limit: trapezoidal speed profiles.
 use crate::motion::{Motion, Piece};
 use crate::{JOINTS, JointVec, Limits};
 
-/// A trapezoid of speed from rest to rest.
+/// A trapezoidal speed profile from rest to rest.
 #[derive(Clone, Copy, Debug)]
 struct Trapezoid {
     /// Acceleration, with the sign of the movement.
     acceleration: f64,
-    /// Time to the highest speed and from it, s.
+    /// Time to reach the highest speed, and to stop from it, s.
     ramp: f64,
     /// Time at the highest speed, s.
     cruise: f64,
@@ -29,7 +29,7 @@ impl Trapezoid {
         2.0 * self.ramp + self.cruise
     }
 
-    /// Returns the same path in `factor` times the time.
+    /// Returns the same motion, taking `factor` times as long.
     fn stretched(&self, factor: f64) -> Self {
         Self {
             acceleration: self.acceleration / (factor * factor),
@@ -38,7 +38,8 @@ impl Trapezoid {
         }
     }
 
-    /// Returns distance, speed and acceleration at `t`; the acceleration is the value after `t`.
+    /// Returns distance, speed and acceleration at `t`. If the acceleration jumps at `t`, returns the value after the
+    /// jump.
     fn at(&self, t: f64) -> (f64, f64, f64) {
         let (a, top) = (self.acceleration, self.acceleration * self.ramp);
         let left = self.duration() - t;
@@ -53,7 +54,7 @@ impl Trapezoid {
 }
 
 /// Plans from rest to rest: on a straight line if that takes no longer, else each joint separately in the time of the
-/// slowest.
+/// slowest joint.
 pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits) -> Motion {
     let way: JointVec = std::array::from_fn(|j| to[j] - from[j]);
     let mut parts: [Trapezoid; JOINTS] =
@@ -70,7 +71,7 @@ pub(crate) fn straight_or_joined(from: &JointVec, to: &JointVec, limits: &Limits
     pieces(from, to, &parts)
 }
 
-/// Returns the law of a straight line over shares of the way, 0 to 1.
+/// Returns the profile of a straight line, as a fraction of its length from 0 to 1.
 fn line(way: &JointVec, limits: &Limits) -> Trapezoid {
     let least = |limit: &JointVec| {
         way.iter()

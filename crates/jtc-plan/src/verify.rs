@@ -1,28 +1,29 @@
-//! Checks how much of its limits a motion uses, between samples too, and slows it down until they hold.
+//! Checks which share of its limits a motion uses, including between samples, and slows the motion down until the
+//! limits hold.
 use jtc_wire::Joint;
 
 use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Share of a limit that rounding may add to it.
+/// Share of a limit by which rounding may exceed it.
 const ROUNDING: f64 = 1e-9;
-/// Distance of the samples of the torque, s.
+/// Time between torque samples, s.
 const TORQUE_STEP: f64 = 0.004;
-/// Share of its limit that the torque may reach at the samples: between them it may be higher.
+/// Share of its limit that the torque may reach at the samples. Between samples it may be higher.
 const TORQUE_SHARE: f64 = 0.9985;
-/// Factor of the time above which the limit that caused the slowdown counts as binding.
+/// Time factor above which the limit that required the slowdown is considered binding.
 const MUCH: f64 = 1.01;
-/// Maximum number of torque samples; a longer motion has them further apart.
+/// Maximum number of torque samples. In a longer motion they are further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
-/// Maximum time factor of a motion that is slowed down for its torque.
+/// Maximum time factor with which a motion is slowed down because of its torque.
 const SLOWEST: f64 = 64.0;
 
 /// Returns the limits restricted to the speeds in the friction table (J-36).
 pub(crate) fn with_table(limits: &Limits, arm: Option<&ArmDynamics>) -> Limits {
     let mut limits = limits.clone();
     for (j, velocity) in limits.velocity.iter_mut().enumerate() {
-        // Slightly inside: the last row belongs to the table, but a value rounded beyond it does not.
+        // Slightly below the last row of the table, so that rounding does not lead beyond it.
         let table = arm.map_or(f64::INFINITY, |arm| arm.velocity_max(j) * (1.0 - 1e-4));
         *velocity = velocity.min(table);
     }
@@ -43,7 +44,7 @@ pub(crate) fn finished(
     }
 }
 
-/// Slows a motion down until velocity, acceleration and jerk hold.
+/// Slows a motion down until the velocity, acceleration and jerk limits hold.
 pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motion, PlanError> {
     let stretch = motion.pieces.iter().map(|p| kinematic_stretch(p, limits)).fold(1.0, f64::max);
     if !stretch.is_finite() {
@@ -52,18 +53,19 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the factor for a piece's time that makes velocity, acceleration and jerk hold everywhere in it; below 1 if they already hold.
+/// Returns the time factor with which velocity, acceleration and jerk limits hold in the whole piece; below 1 if they
+/// hold already.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
         let h = piece.length;
-        // In units of the piece's length.
+        // Time is measured in lengths of the piece.
         let [_, c1, c2, c3, c4, c5] = piece.coefficients[j];
         let velocity = [c1, 2.0 * c2 * h, 3.0 * c3 * h * h, 4.0 * c4 * h.powi(3), 5.0 * c5 * h.powi(4)];
         let acceleration = [2.0 * c2, 6.0 * c3 * h, 12.0 * c4 * h * h, 20.0 * c5 * h.powi(3)];
         let jerk = [6.0 * c3, 24.0 * c4 * h, 60.0 * c5 * h * h];
         let of = |p: &[f64], limit: f64| largest(p, limit) / limit;
-        // Values within their limit need no root: most are within it, and roots take time.
+        // Values within their limit need no root. Most values are within it, and roots take time.
         let root = |share: f64, root: fn(f64) -> f64| if share > 1.0 { root(share) } else { share };
         most = most.max(of(&velocity, limits.velocity[j]));
         most = most.max(root(of(&acceleration, limits.acceleration[j]), f64::sqrt));
@@ -77,12 +79,13 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// Returns the factor for a piece's time that makes the torque suffice in it, by a few samples.
-/// Only the part that depends on the speed can be reduced. Returns 1 if the torque suffices, and if no speed would
-/// help.
+/// Returns the time factor with which the torque is sufficient at a few samples of a piece. Only the part of the torque
+/// that depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at every
+/// speed.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
-    // With a jerk limit, no acceleration jumps between pieces, and the end of the previous piece was already checked.
+    // With a jerk limit, no acceleration jumps between pieces, and the start was already checked as the end of the
+    // previous piece.
     let same = usize::from(limits.has_jerk());
     for t in moments(piece, TORQUE_STEP.max(piece.length / 8.0), limits, arm).into_iter().skip(same) {
         let state = piece.at(t);
@@ -107,8 +110,8 @@ pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) 
     most
 }
 
-/// Returns a bound of the largest magnitude of a polynomial on 0..1, exact to a thousandth if it is above `limit`: the
-/// magnitudes of its Bernstein coefficients, whose hull a polynomial never leaves (Farouki 2012).
+/// Returns an upper bound of a polynomial's magnitude on 0..1, exact to a thousandth if it is above `limit`. Uses the
+/// Bernstein coefficients, whose range always contains the polynomial (Farouki 2012).
 fn largest(polynomial: &[f64], limit: f64) -> f64 {
     hull(&bernstein(polynomial)[..polynomial.len()], limit, 6)
 }
@@ -175,7 +178,7 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
     };
     let mut factor = 1.0;
     let mut slowed = None;
-    // Loads that were exceeded so far: most loads have enough torque at every speed.
+    // Loads that exceeded the limit so far. Most loads have enough torque at every speed.
     let mut some: Vec<&Load> = Vec::new();
     loop {
         let before = some.len();
@@ -197,8 +200,8 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
 /// Time, joint, torque and torque limit at a place with too little torque.
 type Over = (f64, Joint, f64, f64);
 
-/// Returns the least factor of the time, above `least`, for which no place is `over`, and the last such joint; `whole`
-/// are the torque limits.
+/// Returns the smallest time factor above `least` with which no place is `over`, and the last joint that was over;
+/// `whole` are the torque limits.
 fn factor_for(
     motion: &Motion,
     whole: &JointVec,
@@ -226,7 +229,7 @@ fn factor_for(
     Ok((slow, joint))
 }
 
-/// Returns the last waypoint passed at `time`, from 1.
+/// Returns the last waypoint passed at `time`, counted from 1.
 fn waypoint_at(motion: &Motion, time: f64) -> usize {
     motion.waypoint_times.partition_point(|t| *t <= time).max(1)
 }
@@ -241,7 +244,7 @@ fn holds_where_it_rests(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> 
     Ok(())
 }
 
-/// Checks that the arm, if given, can be held at a place; `waypoint`, from 1, names it in the error.
+/// Checks that the arm, if there is one, can be held at a place. The error contains `waypoint`, counted from 1.
 pub(crate) fn holds(
     position: &JointVec,
     waypoint: usize,
@@ -260,9 +263,9 @@ pub(crate) fn holds(
     Ok(())
 }
 
-/// Returns the moments of a piece, s from its start, at which its torque is sampled: both ends, because the
-/// acceleration may jump there, moments between them at most `step` apart, and the moments at which a joint becomes so
-/// fast that the sign of its friction reaches ±1. Pieces whose accelerations exceed those of their ends have more
+/// Returns the moments of a piece at which its torque is sampled, s from its start: both ends, because the acceleration
+/// may jump there; moments between them at most `step` apart; and the moments at which the speed of a joint is so high
+/// that the sign of its friction reaches ±1. A piece with higher accelerations inside than at its ends has more
 /// moments.
 fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<f64> {
     let least = if bulges(piece, limits) { 8.0 } else { 2.0 };
@@ -281,7 +284,7 @@ fn moments(piece: &Piece, step: f64, limits: &Limits, arm: &ArmDynamics) -> Vec<
     moments
 }
 
-/// Returns `true` if a joint's acceleration in the piece may be outside of those at its ends.
+/// Returns `true` if a joint's acceleration in the piece may be outside the range between the values at the ends.
 fn bulges(piece: &Piece, limits: &Limits) -> bool {
     let h = piece.length;
     piece.coefficients.iter().zip(&limits.acceleration).any(|([_, _, c2, c3, c4, c5], limit)| {
@@ -296,7 +299,7 @@ fn loads(motion: &Motion, limits: &Limits, arm: &ArmDynamics) -> Vec<Load> {
     let step = TORQUE_STEP.max(motion.duration() / SAMPLES_MAX);
     let mut loads = Vec::new();
     for (i, piece) in motion.pieces.iter().enumerate() {
-        // With a jerk limit no acceleration jumps between pieces.
+        // With a jerk limit, no acceleration jumps between pieces.
         let same = usize::from(i > 0 && limits.has_jerk());
         for t in moments(piece, step, limits, arm).into_iter().skip(same) {
             let s = piece.at(t);

@@ -1,17 +1,18 @@
-//! A motion on the same path at other times: parts of a motion run at their own rates, with smooth transitions between them.
+//! Runs a motion on the same path at other times: each part runs at its own rate, with smooth transitions between the
+//! rates.
 use crate::Limits;
 use crate::compose::Section;
 use crate::law::{Law, Phase};
 use crate::motion::{Motion, Piece};
 use crate::path::{Path, PathPoint};
 
-/// Maximum time of a change from one rate to the next, s, and as a share of the shorter part.
+/// Maximum duration of a change of rate: in s, and as a share of the shorter part.
 const CHANGE: f64 = 0.5;
 const CHANGE_SHARE: f64 = 0.4;
-/// Speed below which a motion is at rest, rad/s.
+/// Speed below which a motion is considered at rest, rad/s.
 const RESTS: f64 = 1e-9;
 
-/// Part of a motion from the previous part to `end` (s), and its wanted duration, s.
+/// Part of a motion, from the end of the previous part to `end` (s), with its wanted duration, s.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
     pub end: f64,
@@ -32,7 +33,8 @@ impl Path for InTime<'_> {
     }
 }
 
-/// Returns the motion with the wanted duration of each part, up to rounding. Its limits must be checked again.
+/// Returns the motion in which each part has its wanted duration, up to rounding. The caller must check the limits
+/// again.
 pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion {
     let parts: Vec<Part> = parts.iter().copied().filter(|p| p.wanted > 0.0).collect();
     let changes = changes(motion, &parts);
@@ -47,16 +49,16 @@ pub(crate) fn warped(motion: &Motion, parts: &[Part], limits: &Limits) -> Motion
     let section = Section { path: &path, from: 0.0, to, parts_of_path: breaks.len() + 1, breaks, waypoints };
     let mut warped = section.motion(&law, limits);
     warped.end = motion.end;
-    // The motion begins exactly at rest.
+    // The motion must begin exactly at rest.
     if let Some(first) = warped.pieces.first_mut() {
         first.coefficients.iter_mut().for_each(|c| c[1] = 0.0);
     }
     warped
 }
 
-/// Stretches each part separately: all parts begin and end at rest.
+/// Stretches each part separately, because all parts begin and end at rest.
 fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
-    // Per part: previous end, start before and after, factor.
+    // For each part: previous end, start before and after stretching, factor.
     let (mut before, mut after) = (0.0, 0.0);
     let mut scales = Vec::with_capacity(parts.len());
     for part in parts {
@@ -77,7 +79,7 @@ fn scaled(motion: &Motion, parts: &[Part]) -> Motion {
     Motion::new(pieces.collect(), motion.end.position, times)
 }
 
-/// Returns the time of the change of rate at the end of each part except the last, s.
+/// Returns the duration of the change of rate at the end of each part except the last, s.
 fn changes(motion: &Motion, parts: &[Part]) -> Vec<f64> {
     let change = |pair: &[Part]| {
         let rests = motion.at(pair[0].end).velocity.iter().all(|v| v.abs() < RESTS);
@@ -86,7 +88,7 @@ fn changes(motion: &Motion, parts: &[Part]) -> Vec<f64> {
     parts.windows(2).map(change).collect()
 }
 
-/// Returns the time in the old motion as a law of the time in the new one.
+/// Returns the old motion's time as a function of the new motion's time.
 fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     let begins = std::iter::once(0.0).chain(parts.iter().map(|p| p.end));
     let lengths: Vec<f64> = parts.iter().zip(begins).map(|(p, begin)| p.end - begin).collect();
@@ -113,11 +115,11 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates at which each part is as long as wanted: half of each change happens in the part before, and half
-/// in the part after it.
+/// Returns the rates with which each part has its wanted duration. Half of each change of rate happens in the part
+/// before it, and half in the part after it.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
-    // A twelfth of the change's time: the contribution of half of it to the distance.
+    // A twelfth of the duration of the change: the effect of half a change on the distance.
     for _ in 0..60 {
         for i in 0..parts.len() {
             let mut way = lengths[i];

@@ -1,4 +1,4 @@
-//! Paths of any form, bad input, long paths, and binding limits.
+//! Paths of any form, invalid input, long paths, and binding limits.
 use std::f64::consts::TAU;
 
 use jtc_core::{Config, Parameters, Payload};
@@ -9,7 +9,7 @@ use jtc_plan::{
 
 use crate::judge;
 
-/// A closed curve of sines, with another frequency in every joint.
+/// A closed curve of sines, with a different frequency in each joint.
 struct Lissajous {
     turns: f64,
     size: f64,
@@ -47,7 +47,7 @@ fn a_curve_is_followed_within_all_limits() {
             let path = Lissajous { turns: 2.0, size };
             let motion = along(&path, &limits, Some(&arm)).unwrap();
             let count = (motion.duration() / H) as usize;
-            // Places of the curve next to the motion, in order.
+            // The places of the curve must be next to the motion, in order.
             let mut s = 0.0;
             for k in 0..=count {
                 let p: [JointVec; 4] = std::array::from_fn(|i| motion.at((k + i) as f64 * H).position);
@@ -71,7 +71,7 @@ fn a_curve_is_followed_within_all_limits() {
     }
 }
 
-/// Distance to the curve near `s`, which becomes the nearest parameter (Newton's method).
+/// Returns the distance from `q` to the curve near `s`, and moves `s` to the nearest parameter (Newton's method).
 fn nearest(path: &Lissajous, q: &JointVec, s: &mut f64) -> f64 {
     for _ in 0..20 {
         let at = path.at(*s);
@@ -148,7 +148,7 @@ fn waypoints_at_one_place_are_a_rest() {
     }
 }
 
-/// J-60: the payload decides whether the arm can be held at the end, and the error names the holding torque.
+/// J-60: it depends on the payload if the arm can be held at the end; the error contains the holding torque.
 #[test]
 fn j60_a_pose_that_cannot_be_held_is_named() {
     let (mut config, parameters) = (Config::avena(), Parameters::avena());
@@ -166,7 +166,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
         assert!(holding && waypoint == 2 && joint.number() == 2 && torque > limit, "{error}");
         assert!(error.to_string().contains("holding the arm there"), "{error}");
     }
-    // If the place is given twice, the error names the first waypoint.
+    // If the position occurs at two consecutive waypoints, the error contains the first of them.
     for blend in [0.0, 0.05] {
         let waypoints = [[0.0; 6], stretched, stretched, [0.0; 6]].map(Waypoint::from);
         let error = through(&waypoints, blend, &limits, Some(&arm)).unwrap_err();
@@ -178,7 +178,7 @@ fn j60_a_pose_that_cannot_be_held_is_named() {
     assert!(point_to_point(&[0.0; 6], &stretched, &limits, Some(&arm)).is_ok());
 }
 
-/// J-36: velocities stay inside the friction table, for all limits.
+/// J-36: with any limits, velocities stay inside the friction table.
 #[test]
 fn j36_velocities_stay_inside_the_friction_table() {
     let (config, parameters) = (Config::avena(), Parameters::avena());
@@ -212,7 +212,7 @@ fn a_long_move_is_bound_by_the_speed_of_the_joint_that_goes_farthest() {
     assert_eq!((first.from, first.limit), (0.0, LimitKind::Jerk));
 }
 
-/// Half of the speed takes twice the time.
+/// At half of the speed a motion takes twice the time.
 #[test]
 fn a_share_of_the_speed_stretches_the_motion() {
     let limits = Limits::of(&Config::avena());
@@ -227,7 +227,7 @@ fn a_share_of_the_speed_stretches_the_motion() {
     }
 }
 
-/// A blend makes no motion slower than a stop at each waypoint does.
+/// A motion with a blend is never slower than a motion with a stop at each waypoint.
 #[test]
 fn rounded_corners_are_faster_than_stops_without_a_limit_of_jerk() {
     let limits = Limits::of(&Config::avena()).without_jerk();

@@ -1,4 +1,4 @@
-//! The fastest option within the blend is used, and each second of a motion has a reason.
+//! The planner uses the fastest option within the blend, and every second of a motion has a binding limit.
 use jtc_core::Config;
 use jtc_plan::{JOINTS, JointVec, LimitKind, Limits, Motion, Waypoint, through};
 use proptest::prelude::*;
@@ -18,7 +18,7 @@ fn moves(case: &Case) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// A stop lies within every blend: corners that may be rounded cost no time.
+    /// A stop is always within the blend, so permission to round corners never costs time.
     #[test]
     fn a_blend_is_never_slower_than_stops(seed in any::<u64>(), small in 1e-9..0.05f64) {
         let case = Case::random(seed);
@@ -31,7 +31,7 @@ proptest! {
         }
     }
 
-    /// Each part of a motion has a reason for its duration.
+    /// Each part of a motion has a limit that explains its duration.
     #[test]
     fn what_binds_is_named_for_all_of_a_motion(seed in any::<u64>()) {
         let case = Case::random(seed);
@@ -43,8 +43,8 @@ proptest! {
         prop_assert!(rising && named >= 0.95 * motion.duration(), "seed {}: {} of {} s", seed, named, motion.duration());
     }
 
-    /// Waypoints that lie densely on a smooth curve are hardly slower than a few of them; all are passed within the
-    /// blend.
+    /// Many waypoints close together on a smooth curve take hardly longer than a few of them, and each is passed within
+    /// the blend.
     #[test]
     fn more_waypoints_on_a_curve_cost_little_time(seed in any::<u64>(), blend in 0.02..0.1f64) {
         let rng = &mut fastrand::Rng::with_seed(seed);
@@ -66,8 +66,8 @@ proptest! {
     }
 }
 
-/// With twice the named limits a motion is faster, in nearly all cases: a jerk-limited law is the best of several
-/// attempts, and other attempts are tried with other limits.
+/// If the limits reported as binding are doubled, a motion is faster in nearly all cases. Exceptions exist because a
+/// jerk-limited law is the best of several attempts, and other limits lead to other attempts.
 #[test]
 fn what_is_named_is_what_binds() {
     let (mut faster, mut all) = (0, 0);
@@ -85,7 +85,7 @@ fn what_is_named_is_what_binds() {
     assert!(all >= 150 && 100 * faster >= 97 * all, "{faster} of {all}");
 }
 
-/// Doubles the binding limits for all joints: other joints may be as close to theirs.
+/// Doubles the binding limits for all joints, because other joints may be as close to their limits.
 fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     let mut relaxed = limits.clone();
     for b in motion.binding() {
@@ -100,7 +100,7 @@ fn relaxed(limits: &Limits, motion: &Motion) -> Limits {
     relaxed
 }
 
-/// Checks that each waypoint is passed within the blend, and that no place is further than that from a waypoint.
+/// Checks that each waypoint is passed within the blend, and that every place is within the blend of a waypoint.
 fn passes_all(motion: &Motion, positions: &[JointVec], blend: f64, seed: u64) -> Result<(), TestCaseError> {
     let distance = |a: &JointVec, b: &JointVec| (0..JOINTS).map(|j| (a[j] - b[j]).abs()).fold(0.0, f64::max);
     let places: Vec<JointVec> =

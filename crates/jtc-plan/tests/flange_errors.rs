@@ -1,4 +1,4 @@
-//! Lines of the flange that the arm cannot follow: the error and its place.
+//! Flange lines that the arm cannot follow: the error and its place.
 use crate::{lines, robots};
 
 use std::f64::consts::PI;
@@ -12,8 +12,8 @@ fn line(model: &ArmModel, q: &JointVec, to: &Pose) -> PoseError {
     FlangePath::new(&Kinematics::new(model, &WIDE), q, &[Leg::Line { to: *to }], 0.0).unwrap_err()
 }
 
-/// A spherical wrist turns about axis 5 through 0: the error occurs on the line, at the angle that counts as near the
-/// singular pose.
+/// A spherical wrist turns about axis 5 through 0. The error occurs on the line, at the angle that is considered near
+/// the singular pose.
 #[test]
 fn a_line_through_a_wrist_singularity_ends_there() {
     let with = |q5: f64| [0.3, -0.8, 0.9, 0.5, q5, 0.4];
@@ -31,7 +31,8 @@ fn a_line_through_a_wrist_singularity_ends_there() {
         let PoseError::Singular(singular) = source else { panic!("{source}") };
         assert_eq!((leg, singular.kind), (1, SingularKind::Wrist));
         assert!(singular.smallest < SINGULAR);
-        // Lengths count 0.25 m a radian; the wrist is in line after 0.4 of 1 rad, within less than 2 degrees.
+        // A turn of 1 rad has the length 0.25 m. The wrist axes are aligned after 0.4 rad of 1 rad, to within less than
+        // 2°.
         let turned = distance / 0.25;
         let chord = difference(&robots::pose(&model, &from), &to).0;
         if chord < 1e-9 {
@@ -51,7 +52,7 @@ fn three_parallel_axes_have_the_same_wrist() {
     assert!(joints.contains(&4) && joints.contains(&6) && !joints.contains(&1), "{joints:?}");
 }
 
-/// A line leads to an arm that is stretched up to half a degree.
+/// A line leads to a pose in which the arm is stretched to within half a degree.
 #[test]
 fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     for (model, stretched) in [(robots::ur5(), 0.01), (robots::kr5(), PI / 2.0 - 0.12f64.atan2(0.62) - 0.01)]
@@ -66,7 +67,7 @@ fn a_line_to_the_stretched_arm_ends_at_the_elbow() {
     }
 }
 
-/// The wrist of a KR 5 passes straight over the axis of joint 1, half of the way along.
+/// Half-way along the line, the wrist of a KR 5 passes straight over the axis of joint 1.
 #[test]
 fn a_line_over_the_base_ends_at_the_shoulder() {
     let model = robots::kr5();
@@ -82,8 +83,8 @@ fn a_line_over_the_base_ends_at_the_shoulder() {
     assert!(half > 0.1 && distance < half && half - distance < 0.05, "{distance} of {half}");
 }
 
-/// Both ends are in reach, but not the positions between them: the column around the axis of joint 1 that a PUMA 560
-/// cannot enter.
+/// Both ends are within reach, but the positions between them are not: they are in the column around the axis of joint
+/// 1 that a PUMA 560 cannot enter.
 #[test]
 fn a_line_through_where_the_arm_cannot_reach_says_where() {
     let model = robots::puma560();
@@ -132,7 +133,7 @@ fn what_is_no_path_is_refused_with_the_waypoint() {
     assert!(matches!(arc(&bent, &far), PoseError::NotFinite { .. }));
     let start = FlangePath::new(&kin, &[f64::NAN; 6], &lines, 0.0).unwrap_err();
     assert!(matches!(start, PoseError::Waypoint { waypoint: 1, .. }), "{start}");
-    // The arm already stands outside.
+    // The arm is already outside its limits.
     let mut limits = WIDE;
     limits[3] = (0.5, 1.0);
     let error = FlangePath::new(&Kinematics::new(&model, &limits), &q, &lines[..1], 0.0).unwrap_err();

@@ -1,4 +1,4 @@
-//! Lines and arcs of the flange, by forward kinematics that share no code with the paths.
+//! Lines and arcs of the flange, checked with forward kinematics that share no code with the paths.
 use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
@@ -9,12 +9,12 @@ use lines::{Vec3, WIDE, cross, dot, moved, norm, on_leg, sub};
 use proptest::prelude::*;
 use robots::difference;
 
-/// Arms with closed forms, and one without.
+/// Arms with closed forms, and one arm without.
 fn arms() -> [(&'static str, ArmModel); 4] {
     [("avena", robots::avena()), ("UR5", robots::ur5()), ("KR 5", robots::kr5()), ("Jaco 2", robots::jaco2())]
 }
 
-/// A start away from singular poses for each arm.
+/// A start position away from singular poses, for each arm.
 fn start() -> impl Strategy<Value = JointVec> {
     (-3.0..3.0f64, -1.2..-0.4f64, 0.6..1.6f64, -1.0..1.0f64, 0.5..1.5f64, -2.0..2.0f64)
         .prop_map(|(a, b, c, d, e, f)| [a, b, c, d, e, f])
@@ -33,7 +33,7 @@ fn path(model: &ArmModel, q: &JointVec, legs: &[Leg], blend: f64) -> Option<Flan
     }
 }
 
-/// Derivatives by differences of positions and of first derivatives: the largest deviation from those of the path.
+/// Returns the largest deviation of the path's derivatives from differences of its positions and first derivatives.
 fn deviation(path: &FlangePath, s: f64) -> f64 {
     let step = 1e-5;
     let (before, here, after) = (path.at(s - step), path.at(s), path.at(s + step));
@@ -47,8 +47,8 @@ fn deviation(path: &FlangePath, s: f64) -> f64 {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(24) })]
 
-    /// Each position is on the straight line between the ends, in even steps, and each orientation is turned in
-    /// proportion about one axis.
+    /// Each position is on the straight line between the ends, in even steps. Each orientation is turned in proportion,
+    /// about one axis.
     #[test]
     fn lines_are_straight(q in start(), shift in small(0.3), turn in small(0.6)) {
         for (name, model) in arms() {
@@ -58,7 +58,8 @@ proptest! {
             prop_assert_eq!(path.waypoints(), vec![0.0, path.end()]);
             let (whole_shift, whole_turn) = difference(&from, &to);
             prop_assert!((path.end() - whole_shift.max(0.25 * whole_turn)).abs() < 1e-9);
-            // Between two breaks the joints turn little: the planner treats this as one simple curve.
+            // Between two breaks the joints turn only a little, because the planner treats this interval as one simple
+            // curve.
             let ends: Vec<f64> = [0.0].into_iter().chain(path.breaks()).chain([path.end()]).collect();
             prop_assert!(ends.windows(2).all(|pair| pair[0] < pair[1]), "{name}: {ends:?}");
             for pair in ends.windows(2) {
@@ -72,7 +73,7 @@ proptest! {
                 let here = robots::pose(&model, &at);
                 let ideal = std::array::from_fn(|i| from.position[i] + share * (to.position[i] - from.position[i]));
                 prop_assert!(norm(sub(here.position, ideal)) < 1e-9, "{name}: {}", norm(sub(here.position, ideal)));
-                // The shortest way from one orientation to another is the only one on which the angles to both ends add up.
+                // The angles to both ends add up only on the shortest rotation from one orientation to the other.
                 let (a, b) = (difference(&from, &here).1, difference(&here, &to).1);
                 prop_assert!((a - share * whole_turn).abs() < 1e-7 && (b - (1.0 - share) * whole_turn).abs() < 1e-7);
                 prop_assert!((0..JOINTS).all(|j| (at[j] - last[j]).abs() < 0.3), "{name}: {last:?} {at:?}");
@@ -98,7 +99,7 @@ proptest! {
             if !at_break {
                 prop_assert!(deviation(&path, s) < 2e-3, "{name}: {} at {s}", deviation(&path, s));
             }
-            // A blended corner leaves no jump in either of them.
+            // A blended corner must cause no jump in either derivative.
             if path.stops().is_empty() {
                 for corner in path.breaks() {
                     let (before, after) = (path.at(corner - 1e-7), path.at(corner + 1e-7));
@@ -112,7 +113,7 @@ proptest! {
         }
     }
 
-    /// The flange stays on the circle that defines the points.
+    /// The flange stays on the circle through the points.
     #[test]
     fn arcs_are_round(
         q in start(), radius in 0.03..0.2f64, plane in small(3.0), angles in (0.3..3.0f64, 0.3..2.5f64), turn in small(0.4)
@@ -174,7 +175,7 @@ proptest! {
         }
     }
 
-    /// A joint that turns back on the path needs the range up to its turning point, and no more.
+    /// A joint that turns back on the path needs the range up to its turning point, but not more.
     #[test]
     fn a_joint_that_turns_back_needs_the_range_up_to_there(q in start(), shift in small(0.3), turn in small(0.5)) {
         let model = robots::avena();
@@ -202,7 +203,7 @@ proptest! {
                 prop_assert!(with(top + 1e-6).is_ok(), "{:?}", with(top + 1e-6));
                 let refused = match with(top - 1e-6) {
                     Ok(other) => {
-                        // Near a singular pose the joints may have another path, which stays inside.
+                        // Near a singular pose the joints may have another path, which stays inside the limits.
                         let at = |k: u32| sign * other.at(other.end() * f64::from(k) / 1000.0).position[joint];
                         prop_assert!((0..=1000).all(|k| at(k) < top));
                         continue;
@@ -212,14 +213,14 @@ proptest! {
                 let (_, distance, source) = on_leg(refused);
                 let PoseError::OutsideLimits { joint: named, .. } = source else { panic!("{source}") };
                 prop_assert_eq!(named.index(), joint);
-                // At a turning point of the joint, or at another one that is as far.
+                // The error is at the turning point of the joint, or at another turning point that is equally far.
                 let short = top - at(distance / free.end());
                 prop_assert!((distance - low * free.end()).abs() < 0.006 || short < 3e-6, "{distance} {low}");
             }
         }
     }
 
-    /// Cuts one joint's range short: the error is at the place at which the unlimited path leaves that range.
+    /// Reduces one joint's range. The error is at the place at which the unlimited path leaves that range.
     #[test]
     fn a_limit_on_the_way_is_found_where_it_is(
         q in start(), shift in small(0.3), turn in small(0.5), joint in 0..JOINTS,
@@ -231,7 +232,7 @@ proptest! {
         let at = |s: f64| free.at(s).position[joint];
         let all: Vec<f64> = (0..=1000).map(|k| at(free.end() * f64::from(k) / 1000.0)).collect();
         let highest = all.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // The motion rises above its ends by enough to be seen.
+        // The position must rise noticeably above its values at both ends.
         prop_assume!(highest - q[joint] > 0.01);
         let mut limits = WIDE;
         limits[joint].1 = q[joint] + share * (highest - q[joint]);
@@ -242,11 +243,11 @@ proptest! {
                 prop_assert_eq!((named.index(), high), (joint, limits[joint].1));
                 prop_assert!((length - free.end()).abs() < 1e-12);
                 prop_assert!((at(distance) - value).abs() < 1e-9 && value > high && value < high + 0.03);
-                // At no earlier place.
+                // No earlier place exceeds the limit.
                 let before = all.iter().enumerate().take_while(|(k, _)| *k as f64 * free.end() / 1000.0 < distance - 0.011);
                 prop_assert!(before.into_iter().all(|(_, q)| *q <= high + 1e-9), "{distance}");
             }
-            // The pose at the end is outside in every solution.
+            // The pose at the end is outside the limits in every solution.
             PoseError::Waypoint { waypoint: 2, source } => {
                 prop_assert!(matches!(*source, PoseError::OutsideLimits { .. }), "{source}");
             }
@@ -255,7 +256,7 @@ proptest! {
     }
 }
 
-/// A motion along a path keeps the flange on its line at any moment, not only at the places that the planner checks.
+/// A motion along a path keeps the flange on its line at all times, not only at the places that the planner checks.
 #[test]
 fn motions_along_lines_and_arcs_stay_on_them() {
     let (config, parameters, model) = (Config::avena(), Parameters::avena(), robots::avena());
@@ -265,7 +266,7 @@ fn motions_along_lines_and_arcs_stay_on_them() {
     let q = [0.3, -0.2, 1.2, 0.4, 0.9, 0.2];
     let from = robots::pose(&model, &q);
     let corner = moved(&from, [-0.3, 0.1, -0.1], [0.2, 0.1, -0.3]);
-    // Half of a circle about the middle of a line upright.
+    // Half a circle, whose centre is in the middle of a vertical line.
     let mut to = moved(&corner, [0.0, 0.0, -0.2], [0.0; 3]);
     to.rotation = from.rotation;
     let centre = moved(&corner, [0.0, 0.0, -0.1], [0.0; 3]).position;

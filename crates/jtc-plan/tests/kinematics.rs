@@ -1,4 +1,4 @@
-//! Inverse kinematics against forward kinematics that share no code with it.
+//! Inverse kinematics, checked with forward kinematics that share no code with it.
 use crate::robots;
 
 use std::f64::consts::{PI, TAU};
@@ -13,7 +13,7 @@ use robots::difference;
 
 /// A whole turn for each joint.
 const TURN: [(f64, f64); JOINTS] = [(-PI, PI); JOINTS];
-/// Smallest singular value of poses that count as away from singular ones.
+/// A pose with a smallest singular value above this is considered away from singular poses.
 const AWAY: f64 = 0.01;
 
 fn positions() -> impl Strategy<Value = JointVec> {
@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// Limits of the closed forms: right angles and stretched arms.
+    /// Extreme poses of the closed forms: right angles and stretched arms.
     #[test]
     fn poses_at_and_near_singular_ones_are_reached(
         quarters in prop::array::uniform6(-2..=2i32), off in prop::array::uniform6(prop_oneof![
@@ -99,7 +99,7 @@ proptest! {
             let (single, all) =
                 (Kinematics::new(&model, &TURN).all(&pose), Kinematics::new(&model, &limits).all(&pose));
             let each = 2usize.pow(wide.iter().filter(|&&wide| wide).count() as u32);
-            // At a position of exactly 0 there are three.
+            // A joint at exactly 0 has three equivalent positions.
             prop_assert_eq!(all.len(), single.len() * each);
             for (n, found) in all.iter().enumerate() {
                 let (shift, turn) = difference(&robots::pose(&model, found), &pose);
@@ -121,13 +121,13 @@ proptest! {
             let pose = robots::pose(&model, &q);
             let found = kin.solve(&pose, &near).unwrap();
             let nearest = kin.all(&pose).iter().map(|q| length(q, &near)).fold(f64::INFINITY, f64::min);
-            // `all` has no turns beyond one; `near` is within one.
+            // `all` contains at most one turn more or less, and `near` is within one turn.
             prop_assert!((length(&found, &near) - nearest).abs() < 1e-6);
             prop_assert!(found.iter().all(|a| a.abs() <= width));
         }
     }
 
-    /// The default arm within its own limits, which not every solution satisfies.
+    /// The default arm within its own limits, which some solutions exceed.
     #[test]
     fn the_default_arm_keeps_to_its_limits(share in prop::array::uniform6(0.01..0.99f64)) {
         let limits = robots::avena_limits();
@@ -150,7 +150,8 @@ proptest! {
         }
     }
 
-    /// An arm after a calibration: a milliradian and a millimetre from the geometry with a closed form.
+    /// An arm with calibration errors of a milliradian and a millimetre from the ideal geometry, which has a closed
+    /// form.
     #[test]
     fn an_arm_off_its_ideal_geometry_is_solved_too(
         q in positions(), off in prop::array::uniform6(prop::array::uniform6(-1e-3..1e-3f64))
@@ -172,7 +173,7 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and as high as both links reach.
+/// The wrist of a PUMA 560 is 0.15005 m beside the axis of joint 1, and at most as high as both links together reach.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);
@@ -186,27 +187,27 @@ fn out_of_reach_says_how_far() {
         "out of reach: 3.000 m from the origin of the base, and the flange comes no nearer to it than 2.1412 m"
     );
     assert!(error.hint().contains("base frame"));
-    // In the hole around the axis of joint 1.
+    // The position is in the unreachable column around the axis of joint 1.
     let error = kin.solve(&at([0.05, 0.0, 0.3]), &[0.0; 6]).unwrap_err();
     let PoseError::OutOfReach { missing, .. } = error else { panic!("{error}") };
     assert!((missing - 0.10005).abs() < 1e-6, "{error}");
 }
 
-/// At the limit of the UR5's reach the flange points outwards or sideways, but not back.
+/// At the limit of the UR5's reach the flange can point outwards or sideways, but not back.
 #[test]
 fn an_orientation_out_of_reach_is_told_from_a_position_out_of_reach() {
     let model = robots::ur5();
     let kin = Kinematics::new(&model, &TURN);
     let q = [0.3, -1.0, 0.1, -1.5, 0.4, 0.0];
     let mut pose = robots::pose(&model, &q);
-    // A place in reach, turned by half a turn about the flange's x axis.
+    // A reachable place with the orientation turned by half a turn about the flange's x axis.
     pose.rotation = pose.rotation.map(|[x, y, z]| [x, -y, -z]);
     let error = kin.solve(&pose, &q).unwrap_err();
     let PoseError::Orientation { distance, missing } = error else { panic!("{error}") };
     assert!((distance - pose.position.iter().map(|x| x * x).sum::<f64>().sqrt()).abs() < 1e-12);
     assert!(missing > 0.01 && missing < PI, "{error}");
-    // Turned back by a little more than that, such an orientation is in reach; turned by less, it is not, for any axis
-    // near.
+    // Turned back by slightly more than the missing angle, such an orientation is within reach. Turned by less, it is
+    // not, about any axis near the right one.
     let turned = |angle: f64| {
         let (s, c) = angle.sin_cos();
         let rotation = pose.rotation.map(|[x, y, z]| [x, c * y + s * z, c * z - s * y]);
@@ -223,7 +224,7 @@ fn a_joint_outside_its_limits_is_named_with_value_and_limits() {
     let all = Kinematics::new(&model, &TURN).all(&pose);
     for joint in 0..JOINTS {
         let mut limits = TURN;
-        // No solution has the joint at that position, and the other joints are free.
+        // No solution has the joint at that position while the other joints are unlimited.
         let (low, high) = (0..60)
             .map(|k| (-3.0 + 0.1 * f64::from(k), -2.99 + 0.1 * f64::from(k)))
             .find(|(low, high)| all.iter().all(|q| q[joint] < low - 0.02 || q[joint] > high + 0.02))
@@ -262,7 +263,7 @@ fn what_is_no_pose_has_no_solution_and_an_error_that_says_so() {
     assert!(kin.solve(&at([1e300, 0.0, 0.0]), &[0.0; 6]).is_err());
 }
 
-/// Numbers of all kinds, most of them invalid.
+/// Numbers of all kinds; most of them are invalid.
 fn any_number() -> impl Strategy<Value = f64> {
     let special =
         vec![0.0, -0.0, 1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, 1e300, 1e-300, 1e9];
@@ -272,7 +273,7 @@ fn any_number() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
-    /// An invalid pose, start or limit gives an error or has no solution; the search never panics, and always ends.
+    /// An invalid pose, start or limit gives an error or no solution. The search never panics, and it always ends.
     #[test]
     fn no_number_does_any_harm(
         position in prop::array::uniform3(any_number()), quaternion in prop::array::uniform4(any_number()),
@@ -302,7 +303,7 @@ proptest! {
     }
 }
 
-/// Singular poses by their definition, for both geometries.
+/// Singular poses, found by their definition, for both geometries.
 #[test]
 fn singular_poses_have_their_names() {
     use SingularKind::{Elbow, Shoulder, Wrist};
@@ -317,7 +318,7 @@ fn singular_poses_have_their_names() {
         (robots::ur5(), "UR5", with(2, 0.0), Elbow, &[2, 3, 4]),
         (robots::puma560(), "PUMA 560", with(4, 0.0), Wrist, &[4, 6]),
         (robots::puma560(), "PUMA 560", with(2, -PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2, 3]),
-        // Folded: both links are as long, and the wrist is next to the axis of joint 2.
+        // Folded arm: both links have the same length, and the wrist is next to the axis of joint 2.
         (robots::puma560(), "PUMA 560", with(2, PI / 2.0 + 0.0203f64.atan2(0.4318)), Elbow, &[2]),
         (robots::kr5(), "KR 5", with(4, PI), Wrist, &[4, 6]),
         (robots::kr5(), "KR 5", over_the_base(), Shoulder, &[1]),
@@ -333,7 +334,7 @@ fn singular_poses_have_their_names() {
     assert!(far.smallest > 0.05, "{far}");
 }
 
-/// A KR 5 with its wrist over the axis of joint 1, found by bisection.
+/// A KR 5 whose wrist is over the axis of joint 1; the position is found by bisection.
 fn over_the_base() -> JointVec {
     let with = |q2: f64| [0.3, q2, 0.3, 0.4, 0.8, 0.2];
     let radius = |q2: f64| {
@@ -398,7 +399,7 @@ fn the_jacobian_is_the_rate_of_the_forward_kinematics() {
                 robots::pose(&model, &moved)
             };
             let (before, here, after) = (at(-h), at(0.0), at(h));
-            // The rate of the rotation times the rotation's transpose: the angular velocity as a skew matrix.
+            // The rate of the rotation matrix times its transpose is the angular velocity as a skew-symmetric matrix.
             let spin = |i: usize, k: usize| {
                 let rate = |m: usize| (after.rotation[i][m] - before.rotation[i][m]) / (2.0 * h);
                 (0..3).map(|m| rate(m) * here.rotation[k][m]).sum::<f64>()

@@ -1,4 +1,4 @@
-//! Point to point, judged by samples of the positions alone.
+//! Point-to-point motions, checked by samples of the positions only.
 use jtc_core::Config;
 use jtc_plan::{Limits, PlanError, point_to_point};
 

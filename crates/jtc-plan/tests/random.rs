@@ -1,6 +1,6 @@
-//! Random motions on random arms, judged by samples of their positions: no limit is exceeded, no corner is cut by more
-//! than the blend, both ends are met exactly and at rest. `cargo run --profile dist -p jtc-plan --example campaign`
-//! judges any number of motions.
+//! Random motions on random arms, checked by samples of their positions: no limit is exceeded, no corner is cut by more
+//! than the blend, and both ends are exact and at rest. `cargo run --profile dist -p jtc-plan --example campaign`
+//! checks any number of motions.
 use jtc_plan::{PlanError, point_to_point, through};
 use proptest::prelude::*;
 
@@ -8,7 +8,7 @@ use crate::judge;
 
 use judge::Case;
 
-/// Errors that are allowed: the arm cannot be held somewhere, or carries too much.
+/// Permitted errors: the arm cannot be held somewhere, or its payload is too heavy.
 fn is_legal(error: &PlanError) -> bool {
     matches!(error, PlanError::Torque { .. })
 }
@@ -41,8 +41,8 @@ proptest! {
         }
     }
 
-    /// Position and state at a moment are consistent: velocities are the slopes of positions, accelerations those of
-    /// velocities.
+    /// The states of a motion are consistent: velocities are the slopes of positions, and accelerations are the slopes
+    /// of velocities.
     #[test]
     fn velocity_and_acceleration_are_the_slopes(seed in any::<u64>()) {
         const H: f64 = 1e-5;

@@ -1,4 +1,4 @@
-//! Routes through waypoints, by forward kinematics that share no code with the paths.
+//! Routes through waypoints, checked with forward kinematics that share no code with the paths.
 use crate::{lines, robots};
 
 use jtc_core::{Config, Parameters};
@@ -32,8 +32,8 @@ fn route(points: &[RoutePoint], blends: (f64, f64)) -> Result<Route, PlanError> 
     Route::new(&kinematics().0, points, &[0.0; JOINTS], blends)
 }
 
-/// A path in joint space, two lines, an arc of half a circle about the middle of an upright line, and a path in joint
-/// space.
+/// A path in joint space, two lines, an arc of half a circle whose centre is in the middle of a vertical line, and a
+/// path in joint space.
 struct Mixed {
     points: Vec<RoutePoint>,
     corners: [Pose; 3],
@@ -62,7 +62,7 @@ fn mixed() -> Mixed {
     Mixed { points, corners: [first, corner, top], centre }
 }
 
-/// States between two waypoints (from 1), the ends included.
+/// States between two waypoints (counted from 1), including both ends.
 fn between(motion: &Motion, from: usize, to: usize) -> Vec<State> {
     let (from, to) = (motion.waypoint_times()[from - 1], motion.waypoint_times()[to - 1]);
     assert!(from < to, "{:?}", motion.waypoint_times());
@@ -96,7 +96,7 @@ fn each_leg_is_of_its_kind_and_the_arm_rests_where_they_change() {
         for n in [1, 2, 6, 7] {
             assert!(speed(n) < 1e-6, "waypoint {n}: {}", speed(n));
         }
-        // The point on an arc is passed without a stop, and so are blended corners.
+        // The arc passes its via point without a stop; blended corners are passed without a stop too.
         assert!(speed(5) > 0.1);
         assert_eq!(speed(3) > 0.05, blend_m > 0.0);
         let line = |state: &State, k: usize| off_line(state, &corners[k], &corners[k + 1]);
@@ -119,7 +119,7 @@ fn each_leg_is_of_its_kind_and_the_arm_rests_where_they_change() {
         }
         let there = at(&motion.at(times[4]).position).position;
         assert!(norm(sub(there, [centre[0] - RADIUS, centre[1], centre[2]])) < 1e-4, "{there:?}");
-        // Straight in joint space, to the exact target.
+        // The last leg is straight in joint space and ends exactly at the target.
         let (a, b) = (motion.at(times[5]).position, motion.at(motion.duration()).position);
         assert_eq!(Target::Joints(b), points[6].target);
         for state in between(&motion, 6, 7) {
@@ -128,7 +128,7 @@ fn each_leg_is_of_its_kind_and_the_arm_rests_where_they_change() {
                 assert!((state.position[j] - a[j] - share * (b[j] - a[j])).abs() < 1e-7);
             }
         }
-        // No jump at any place.
+        // The motion has no jump at any place.
         let mut before = motion.at(0.0);
         for k in 1..=20_000 {
             let state = motion.at(motion.duration() * f64::from(k) / 20_000.0);
@@ -170,8 +170,8 @@ fn times_of_waypoints_on_lines_are_kept() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(32) })]
 
-    /// A line to joint positions ends at them if they belong to the configuration at its start; otherwise the error
-    /// names the joint.
+    /// A line to joint positions ends at them if they are in the configuration at its start. Otherwise the error
+    /// contains the joint.
     #[test]
     fn joint_positions_at_the_end_of_a_line_are_of_its_configuration(shift in prop::array::uniform3(-0.15..0.15f64)) {
         prop_assume!(norm(shift) > 1e-3);
@@ -197,7 +197,7 @@ proptest! {
     }
 }
 
-/// Numbers of waypoints count the points on the way of arcs, too.
+/// Waypoint numbers in errors include the via points of arcs.
 #[test]
 fn errors_name_the_waypoints_of_the_route() {
     let Mixed { points, .. } = mixed();
@@ -222,7 +222,7 @@ fn errors_name_the_waypoints_of_the_route() {
         let (number, source) = far(index);
         assert!(number == index + 1 && matches!(source, PoseError::OutOfReach { .. }), "{index}: {source}");
     }
-    // An arc whose point on the arc is out of reach.
+    // An arc whose via point is out of reach.
     let mut changed = points.clone();
     let Target::Flange(via) = points[4].target else { panic!("a pose") };
     changed[4] = flange(moved(&via, [-3.0, 0.0, 0.0], [0.0; 3]), LegKind::Via);
@@ -237,7 +237,7 @@ fn errors_name_the_waypoints_of_the_route() {
     assert_eq!(route(&points, (0.0, -1.0)).unwrap_err(), PoseError::Blend { radius: -1.0 }.into());
 }
 
-/// Legs without motion keep their waypoints.
+/// A leg without motion still has its own waypoint, passed at the same time.
 #[test]
 fn waypoints_at_one_place_are_passed_at_one_time() {
     let there = moved(&at(&Q), [-0.1, 0.0, 0.0], [0.0; 3]);

@@ -1,11 +1,11 @@
-//! Limits at a point of a path, in the coefficients of a spline.
+//! Limits at a point of a path, expressed in the coefficients of a spline.
 use crate::along::Plan;
 use crate::{JOINTS, JointVec};
 
-/// Weights of three neighbouring coefficients from an index on that make up a value.
+/// Weights of three neighbouring coefficients, which add up to a value.
 pub(super) type Three = [f64; 3];
 
-/// A point at which limits hold: an end of a cell.
+/// A point at which limits must hold, such as the end of a cell.
 pub(super) struct Place {
     /// Index of the first coefficient.
     pub at: usize,
@@ -13,13 +13,14 @@ pub(super) struct Place {
     pub b: Three,
     pub slope: Three,
     pub bend: Three,
-    /// Coefficients by bend, slope and squared speed, as shares of the limits: jerk without the factor of speed, and
-    /// acceleration (without bend).
+    /// Coefficients of bend, slope and squared speed, as shares of the limits: for the jerk (without the speed factor)
+    /// and for the acceleration (which does not depend on the bend).
     pub jerk: [JointVec; 3],
     pub acceleration: [JointVec; 2],
-    /// Highest squared speed, if speed, acceleration and torque are limited here.
+    /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weights of the reciprocal speed here and at the middle of the cell in the time, with the squared speed at the middle.
+    /// Weights with which the reciprocal speed, here and at the middle of the cell, adds to the time; and the squared
+    /// speed at the middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -32,7 +33,7 @@ pub(super) struct Torque {
     pub mass: JointVec,
     /// Coefficient of the squared speed.
     pub speed: JointVec,
-    /// Torque left without friction, up and down, N·m.
+    /// Available torque without friction, up and down, N·m.
     pub high: JointVec,
     pub low: JointVec,
 }
@@ -42,25 +43,25 @@ fn dot(three: &Three, c: &[f64]) -> f64 {
 }
 
 impl Place {
-    /// Returns shares of the jerk limits, without the factor of speed.
+    /// Returns the jerks as shares of their limits, without the speed factor.
     fn jerks(&self, b: f64, slope: f64, bend: f64) -> JointVec {
         let [by_bend, by_slope, by_b] = &self.jerk;
         std::array::from_fn(|j| by_bend[j] * bend + by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Returns shares of the acceleration limits.
+    /// Returns the accelerations as shares of their limits.
     fn accelerations(&self, b: f64, slope: f64) -> JointVec {
         let [by_slope, by_b] = &self.acceleration;
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// At rest there is only jerk along the path.
+    /// Adapts the place to rest, where only jerk along the path exists.
     pub fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Returns this place's part of the time, and of the sum of the logarithms of the remaining margins; `None` outside
-    /// the limits.
+    /// Returns this place's part of the time and of the sum of the logarithms of the margins to the limits; `None`
+    /// outside the limits.
     pub fn value(&self, plan: &Plan, c: &[f64]) -> Option<(f64, f64)> {
         let c = &c[self.at..self.at + 3];
         let b = dot(&self.b, c);
@@ -100,7 +101,8 @@ impl Place {
         is_inside.then(|| (time, product.ln()))
     }
 
-    /// Adds the contribution to the derivatives of the time and of `barrier` times the barriers by the coefficients.
+    /// Adds this place's part to the derivatives of the time plus `barrier` times the barriers, with respect to the
+    /// coefficients.
     pub fn add_to(
         &self,
         gradient: &mut [f64],
@@ -145,7 +147,8 @@ impl Place {
         }
     }
 
-    /// Returns the first derivatives of the barriers by squared speed, slope and bend, and the second ones (00, 11, 22, 01, 02, 12).
+    /// Returns the derivatives of the barriers with respect to squared speed, slope and bend: first, and second (00,
+    /// 11, 22, 01, 02, 12).
     fn barriers(&self, plan: &Plan, b: f64, slope: f64, bend: f64) -> ([f64; 3], [f64; 6]) {
         let speed = b.sqrt();
         let (mut g, mut h) = ([0.0f64; 3], [0.0f64; 6]);

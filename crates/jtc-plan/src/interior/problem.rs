@@ -1,4 +1,4 @@
-//! Limits of a plan's cells as points.
+//! Limits in a plan's cells, evaluated at points.
 use super::Problem;
 use super::place::{Place, Three, Torque};
 use super::spline::knot;
@@ -32,11 +32,11 @@ impl Span {
     }
 }
 
-/// Share of the limits of acceleration and jerk at the ends of the cells.
+/// Share of the acceleration and jerk limits that is used at the ends of the cells.
 const SHARE: f64 = 0.995;
 
 impl<'a> Problem<'a> {
-    /// Creates the problem; `slower` contains the factors of the time in each cell.
+    /// Creates the problem; `slower` contains the time factor of each cell.
     pub fn new(plan: &'a Plan, slower: &[f64]) -> Option<Self> {
         let cells = plan.cells;
         let count = cells.len();
@@ -51,7 +51,7 @@ impl<'a> Problem<'a> {
         let ties =
             (1.0 / (1.0 + 2.0 * h_first / (3.0 * x_first)), 1.0 / (1.0 + 2.0 * h_last / (3.0 * x_last)));
         let mut problem = Self { plan, places: Vec::with_capacity(2 * count), knots, ties, limits: 0.0, end };
-        // From rest.
+        // Starts from rest.
         let power = |x: f64, sign: f64| (sign * 4.0 / (3.0 * x), 4.0 / (9.0 * x * x));
         let (slope, bend) = power(x_first, 1.0);
         let one = |index: usize, value: f64| -> Three {
@@ -85,8 +85,8 @@ impl<'a> Problem<'a> {
         Some(problem)
     }
 
-    /// Adds the jerk limit at one end of a cell. If `whole` has a duration, also adds the other limits with that
-    /// weight.
+    /// Adds the jerk limit at one end of a cell. If `whole` has a duration, also adds the other limits, with the
+    /// duration as the weight.
     fn push(
         &mut self,
         (cell, side): (usize, usize),

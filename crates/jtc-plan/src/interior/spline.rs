@@ -1,9 +1,8 @@
-//! Knots of a spline, and its time law.
+//! Knots and time law of a spline.
 use super::Problem;
 use crate::law::{Law, Phase};
 
-/// Largest change of speed in two phases of a law, as a share, and largest number of phase pairs into which a cell is
-/// divided.
+/// Largest relative change of speed in two phases of a law, and largest number of phase pairs per cell.
 const ALIKE: f64 = 0.2;
 const PARTS_MAX: f64 = 4.0;
 
@@ -28,7 +27,7 @@ impl Problem<'_> {
         phases.push(Phase { length: start, jerk: acceleration / start, ..Phase::default() });
         for pair in states.windows(2) {
             let (from, to) = (pair[0], pair[1]);
-            // A phase has constant jerk; the jerk of the spline grows with the speed.
+            // A phase has constant jerk, whereas the jerk of the spline grows with the speed.
             let parts = ((to.1 - from.1).abs() / (ALIKE * from.1.min(to.1))).ceil().clamp(1.0, PARTS_MAX);
             let mut before = from;
             for part in 1..=parts as usize {
@@ -44,7 +43,7 @@ impl Problem<'_> {
     }
 }
 
-/// Returns parameter, speed and acceleration of a spline at a share of a cell with these ends.
+/// Returns parameter, speed and acceleration of a spline at a fraction of a cell with these ends.
 fn between(from: (f64, f64, f64), to: (f64, f64, f64), share: f64) -> (f64, f64, f64) {
     let way = share * (to.0 - from.0);
     let acceleration = from.2 + share * (to.2 - from.2);

@@ -43,9 +43,10 @@ pub(crate) fn logarithm(rotation: &Matrix3<f64>) -> Vector3<f64> {
 #[derive(Clone, Debug)]
 pub(crate) struct Chain {
     dynamics: Dynamics,
-    /// Divisor of lengths in the Jacobian and in residuals, m: length of the stretched arm from its first axis to the flange.
+    /// Divisor of lengths in the Jacobian and in residuals, m: the length of the stretched arm from its first axis to
+    /// the flange.
     pub length: f64,
-    /// The arm at the joint positions 0, the basis of the closed forms.
+    /// Axes at the joint positions 0, on which the closed forms are based.
     pub zero: Axes,
 }
 
@@ -84,7 +85,8 @@ impl Chain {
         Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
     }
 
-    /// Returns the geometric Jacobian of the flange with translations over [`Chain::length`], so that its singular values are meaningful.
+    /// Returns the geometric Jacobian of the flange with translations divided by [`Chain::length`], so that its
+    /// singular values are comparable.
     pub fn scaled_jacobian(&self, axes: &Axes) -> Matrix6<f64> {
         let mut jacobian = axes.jacobian();
         jacobian.fixed_rows_mut::<3>(0).scale_mut(1.0 / self.length);
@@ -139,8 +141,7 @@ mod tests {
     use crate::kinematics::test_arms;
     use proptest::prelude::*;
 
-    /// Returns central differences of the frame from the forward kinematics, (translation, rotation) per unit of the
-    /// parameter.
+    /// Returns central differences of the frame per unit of the parameter: (translation, rotation).
     fn difference(before: &Frame, after: &Frame, step: f64) -> Vector6<f64> {
         let shift = (after.position - before.position) / (2.0 * step);
         let turn = logarithm(&(after.rotation * before.rotation.transpose())) / (2.0 * step);

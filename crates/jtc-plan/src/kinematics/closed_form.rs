@@ -1,10 +1,11 @@
 //! Inverse kinematics in closed form, for two geometries that cover most arms.
 //!
-//! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and of the first three axes two neighbours are parallel
-//!   or meet. The first three joints bring the point to its place, the last three give the orientation.
+//! * **Spherical wrist**: the last three axes meet in a point (Pieper 1968), and two adjacent axes of the first three
+//!   are parallel or meet. The first three joints bring the point to its place, the last three give the orientation.
 //! * **Three parallel axes**: the second, third and fourth axis are parallel, and the fifth meets the sixth, as in the
-//!   arms of Universal Robots (Hawkins 2013). The first joint brings the intersection of axes 5 and 6 to its place
-//!   along the parallel axes, the fifth and the sixth turn the flange, and the three parallel joints are a planar arm.
+//!   arms of Universal Robots (Hawkins 2013). The first joint brings the intersection of axes 5 and 6 to the right
+//!   coordinate along the parallel axes, the fifth and the sixth turn the flange, and the three parallel joints are a
+//!   planar arm.
 //!
 //! Everything is computed in the base frame from the axes at the joint positions 0 (product of exponentials, Brockett
 //! 1984; decomposition by Elias and Wen, IK-Geo, 2022), so the choice of the frames on the axes does not matter.
@@ -14,11 +15,11 @@ use nalgebra::{Matrix3, Vector3};
 use super::chain::{Axes, Frame, turn};
 use super::subproblems::{across, turn_onto, turn_to_length, turn_to_value, turned};
 
-/// Sine of an angle, and distance in m, that count as zero when a geometry is recognised: the rounding errors of a
-/// robot description. Solutions for the ideal geometry are refined with the actual arm.
+/// Largest sine of an angle, and largest distance in m, that are treated as zero when a geometry is recognised. Larger
+/// than the rounding errors of a robot description. Solutions for the ideal geometry are refined with the actual arm.
 pub(crate) const EXACT: f64 = 1e-5;
-/// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry: the closed form gives good starting
-/// values for a search.
+/// Like [`EXACT`], for an arm whose calibration differs from its ideal geometry. The closed form then gives good
+/// starting values for a search.
 pub(crate) const NEAR: f64 = 0.02;
 
 /// A geometry with a closed form.
@@ -44,7 +45,7 @@ pub(crate) enum Shoulder {
 }
 
 impl Geometry {
-    /// Returns the geometry of an arm, with deviations up to `tolerance`.
+    /// Returns the geometry of an arm, allowing deviations up to `tolerance`.
     pub fn of(zero: &Axes, tolerance: f64) -> Option<Self> {
         let parallel = |a: usize, b: usize| zero.axis[a].cross(&zero.axis[b]).norm() < tolerance;
         if let Some(centre) = meeting(zero, 3, 4, tolerance)
@@ -69,7 +70,8 @@ impl Geometry {
     }
 
     /// Returns joint positions that bring the flange to `goal`, up to rounding and the deviations from the ideal
-    /// geometry. There are at most eight, and some may not fit. Joints that the goal leaves free stay at `hint`.
+    /// geometry. There are at most eight; some of them may not reach the goal. A joint that the goal leaves free stays
+    /// at `hint`.
     pub fn solve(&self, zero: &Axes, goal: &Frame, hint: &JointVec) -> Vec<JointVec> {
         let rotation = goal.rotation * zero.flange.rotation.transpose();
         let motion = Motion { rotation, shift: goal.position - rotation * zero.flange.position };
@@ -133,8 +135,8 @@ impl Shoulder {
     ) -> Vec<[f64; 3]> {
         let (h, p) = (&zero.axis, &zero.point);
         let (forearm, reach) = (centre - p[2], target - p[0]);
-        // Joint 1 from the required position of z along axis 2, and joint 3 from that of y, each in m from the point of
-        // its own axis.
+        // Joint 1 follows from the required coordinate of z along axis 2, and joint 3 from the coordinate of y. Both
+        // are in m from the point of the joint's own axis.
         let first = |along: f64| {
             let found = turn_to_value(&h[1], &h[0], &reach, along - h[1].dot(&p[0]), -hint[0]);
             found.into_iter().map(|angle| -angle).collect::<Vec<_>>()
@@ -179,7 +181,7 @@ impl Shoulder {
     }
 }
 
-/// Adds the last three joints for both ways to turn the flange.
+/// Adds solutions of the last three joints, for both signs of joint 5.
 fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, found: &mut Vec<JointVec>) {
     let h = &zero.axis;
     let before = turn(&h[0], arm[0]) * turn(&h[1], arm[1]) * turn(&h[2], arm[2]);
@@ -213,7 +215,7 @@ fn three_parallel(
     for back in turn_to_value(along, &h[0], &(goal.apply(centre) - p[0]), height, -hint[0]) {
         let q1 = -back;
         let rest = turn(&h[0], back) * goal.rotation;
-        // These joints do not change the angle between their axes and the last one either.
+        // These joints do not change the angle between their axes and the last axis.
         for q5 in turn_to_value(along, &h[4], &h[5], along.dot(&(rest * h[5])), hint[4]) {
             let fifth = turn(&h[4], q5);
             let q6 = -turn_onto(&h[5], &(fifth.transpose() * along), &(rest.transpose() * along), -hint[5]);
@@ -226,7 +228,8 @@ fn three_parallel(
     }
 }
 
-/// Solves joints 2, 3 and 4, whose axes are parallel: axis 4 reaches the point `to`, and the total turn about axis 2 is `sum` (rad).
+/// Solves joints 2, 3 and 4, whose axes are parallel. Axis 4 must reach the point `to`, and the total turn about axis 2
+/// is `sum` (rad).
 fn planar_arm(
     zero: &Axes,
     to: &Vector3<f64>,

@@ -27,7 +27,7 @@ pub enum PoseError {
         /// Largest entry of RᵀR − 1, or 2 for a reflection.
         deviation: f64,
     },
-    /// The arm is too short, or too bulky, to bring the flange to the position in any orientation.
+    /// The arm cannot bring the flange to the position in any orientation: the position is too far away or too close.
     #[error(
         "out of reach: {distance:.3} m from the origin of the base, and the flange comes no nearer to it than {missing:.4} m"
     )]
@@ -51,7 +51,7 @@ pub enum PoseError {
     /// The arm would reach the pose only with a joint outside its limits.
     #[error("{joint} would be at {value:.4} rad, its limits are {low:.4} and {high:.4} rad")]
     OutsideLimits {
-        /// Joint that is farthest outside, in the solution that is least outside.
+        /// Joint that is farthest outside, in the solution that exceeds the limits least.
         joint: Joint,
         /// Position of the joint there, rad.
         value: f64,
@@ -63,7 +63,7 @@ pub enum PoseError {
     /// A line of the flange leads through or past a singular pose.
     #[error("{0}")]
     Singular(Singularity),
-    /// A line of the flange requires a large turn of a joint within a short distance.
+    /// A line of the flange requires a joint to turn far within a short distance.
     #[error("{joint} would have to turn by {step:.3} rad within {distance:.6} m")]
     JointStep {
         /// Joint.
@@ -84,18 +84,18 @@ pub enum PoseError {
     /// Two orientations that are half a turn apart.
     #[error("the orientation is half a turn from that of the waypoint before: which way to turn is open")]
     HalfTurn,
-    /// A point on an arc without an arc after it.
+    /// An arc's `via` point without an arc after it.
     #[error("a point on the way of an arc (`via`), and the waypoint behind it is not the end of an arc")]
     NoArc,
-    /// An arc without the point that it passes.
+    /// An arc without its `via` point.
     #[error("the end of an arc, and the waypoint before it is not a point on the arc's way (`via`)")]
     NoVia,
-    /// Joint positions at the end of a line that the arm does not reach in its configuration.
+    /// Joint positions at the end of a line that the arm does not have in its current configuration.
     #[error(
         "the line ends there with {joint} at {value:.4} rad, not at {wanted:.4} rad: the arm keeps its configuration along a line"
     )]
     Configuration {
-        /// Joint that is farthest away.
+        /// Joint with the largest difference.
         joint: Joint,
         /// Position of the joint at the end of the line, rad.
         value: f64,
@@ -111,7 +111,7 @@ pub enum PoseError {
     /// A path without a leg that moves the flange.
     #[error("the path has no leg that moves the flange")]
     NoMotion,
-    /// Error at one of several waypoints.
+    /// An error at one of several waypoints.
     #[error("waypoint {waypoint}: {source}")]
     Waypoint {
         /// Waypoint, counted from 1.
@@ -119,13 +119,13 @@ pub enum PoseError {
         /// Error at the waypoint.
         source: Box<PoseError>,
     },
-    /// Error on one of several legs.
+    /// An error on one of several legs.
     #[error("leg {leg} (to waypoint {}), {distance:.4} m of {length:.4} m along it: {source}", leg + 1)]
     Leg {
         /// Leg, counted from 1; it leads from the waypoint with the same number to the next.
         leg: usize,
-        /// Distance along the leg, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS) m if that is more than the
-        /// distance).
+        /// Distance along the leg, m. A turn of 1 rad is counted as [`RADIUS`](super::RADIUS) m, if the turn is then
+        /// longer than the distance.
         distance: f64,
         /// Length of the leg, in the same unit.
         length: f64,
@@ -140,7 +140,7 @@ impl PoseError {
         Self::Waypoint { waypoint, source: Box::new(self) }
     }
 
-    /// Returns the waypoint that the message names, counted from 1, if it names one: for a leg, the waypoint at its
+    /// Returns the waypoint in the message, counted from 1, if there is one. For a leg, this is the waypoint at its
     /// end.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
@@ -150,7 +150,7 @@ impl PoseError {
         }
     }
 
-    /// Returns a hint for the correction.
+    /// Returns advice on how to correct the error.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::NotFinite { .. } => {

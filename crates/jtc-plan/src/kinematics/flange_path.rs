@@ -1,4 +1,4 @@
-//! Paths through joint space on which the flange keeps to straight lines and arcs.
+//! Paths through joint space on which the flange follows straight lines and arcs.
 use jtc_dynamics::{JOINTS, JointVec, Pose};
 use jtc_wire::Joint;
 use nalgebra::{Vector3, Vector6};
@@ -11,42 +11,42 @@ use super::trace::Trace;
 use super::{Kinematics, PoseError, outside};
 use crate::{Path, PathPoint};
 
-/// Largest turn of a joint between two samples, rad. Within this turn a singular pose cannot be missed, and the
-/// iteration stays with its solution.
+/// Largest turn of a joint between two samples, rad. With steps this small, the iteration stays with its solution and
+/// does not miss a singular pose.
 const TURN: f64 = 0.02;
 /// Largest and smallest distance between two samples, m.
 const STEP: (f64, f64) = (0.01, 1e-7);
-/// Turn of a joint between two breaks up to which the curve counts as simple, rad.
+/// Largest turn of a joint between two breaks, rad. Up to this turn the curve is simple enough.
 const SIMPLE: f64 = 0.25;
-/// Number of points on the remaining leg that are tried to determine if it leaves the arm's reach.
+/// Number of points on the rest of the leg that are tested to find out if it leaves the arm's reach.
 const LOOK_AHEAD: usize = 40;
 
 /// A path through joint space on which the flange moves on straight lines and arcs, with corners blended within a radius.
 ///
-/// Its parameter is the length of the legs, m (a turn of 1 rad counts as [`RADIUS`](super::RADIUS)); with a blend
-/// radius of 0 it has a stop at each corner. Positions are computed by inverse kinematics for each query, so the flange
-/// is on its line up to rounding; derivatives come from the Jacobian and its rate.
+/// Its parameter is the length of the legs, m (a turn of 1 rad is counted as [`RADIUS`](super::RADIUS)). With a blend
+/// radius of 0 the path stops at each corner. Each query computes the position by inverse kinematics, so the flange is
+/// on its line up to rounding; derivatives come from the Jacobian and its rate.
 ///
 /// The arm keeps its initial configuration (elbow, wrist, shoulder).
 #[derive(Clone, Debug)]
 pub struct FlangePath {
     chain: Chain,
     trace: Trace,
-    /// Joint positions along the path, by rising parameter, from which the iteration starts.
+    /// Joint positions along the path, in the order of the parameter, from which the iteration starts.
     samples: Vec<(f64, JointVec)>,
     breaks: Vec<f64>,
 }
 
 impl FlangePath {
-    /// Creates the path from the joint positions `start` (rad) along `legs`, with corners blended within `blend` m (at
-    /// most half of each leg; 0: a stop). The first waypoint is the start, so that leg 1 leads to waypoint 2. Legs
-    /// without motion are skipped.
+    /// Creates the path from the joint positions `start` (rad) along `legs`. Corners are blended within `blend` m, at
+    /// most half of each leg; with 0 the path stops there. The first waypoint is the start, so leg 1 leads to waypoint
+    /// 2. Legs without motion are skipped.
     ///
     /// # Errors
     ///
     /// [`PoseError::Waypoint`] for an invalid pose or a pose without a solution within the limits, [`PoseError::Leg`]
-    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Both name the first
-    /// such place; waypoints come first.
+    /// for an error along a leg: a joint at its limit, a singular pose, the end of the arm's reach. Both report the
+    /// first place with an error; waypoints are checked first.
     pub fn new(
         kinematics: &Kinematics,
         start: &JointVec,
@@ -69,7 +69,8 @@ impl FlangePath {
         Ok(Self { chain: chain.clone(), trace, samples, breaks })
     }
 
-    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point; a rounded corner may cut it off.
+    /// Returns the parameter at which leg `number` (from 1), an arc, passes its `via` point. A rounded corner may cut
+    /// the point off.
     pub(crate) fn via(&self, number: usize) -> Option<f64> {
         self.trace.via(number)
     }
@@ -125,7 +126,7 @@ fn newton(chain: &Chain, goal: &Frame, mut q: JointVec) -> (JointVec, Axes) {
         if left.norm() < residual.norm() {
             (q, axes, residual) = (tried, there, left);
         } else {
-            // Down to rounding, or not a finite number.
+            // Converged down to rounding, or not a finite number.
             break;
         }
     }
@@ -141,7 +142,8 @@ fn derivatives(axes: &Axes, place: &Place) -> Option<(Vector6<f64>, Vector6<f64>
     Some((first, factors.solve(&rest)?))
 }
 
-/// Returns the places of a change of form, and enough places in between that no joint turns far.
+/// Returns the places at which the path changes its form, and places in between, so that no joint turns far between two
+/// of them.
 fn breaks(trace: &Trace, samples: &[(f64, JointVec)]) -> Vec<f64> {
     let mut all = trace.breaks();
     let mut turned = [0.0; JOINTS];
@@ -201,14 +203,14 @@ impl<'a> Follower<'a> {
         Ok(samples)
     }
 
-    /// Advances to `s` if no joint turns too far on the way; returns an error if the path ends there.
+    /// Advances to `s`. Returns `None` if a joint would turn too far on the way, and an error if the path ends there.
     fn try_step(&mut self, s: f64) -> Result<Option<()>, PoseError> {
         let chain = &self.kinematics.chain;
         let place = self.trace.at(s);
         let (q, axes) = newton(chain, &place.frame, self.q);
         let (joint, turn) = largest_turn(&self.q, &q);
         let left = chain.residual(&place.frame, &axes);
-        // Written so that NaN does not count as arrival.
+        // Written so that NaN is not accepted as arrival.
         let arrived = left.norm() <= TOLERANCE;
         if arrived && turn <= TURN {
             self.check(s, &q, &axes)?;
@@ -244,7 +246,7 @@ impl<'a> Follower<'a> {
 
     /// Checks the limits at every turning point of a joint between here and `s`.
     fn check_between(&self, s: f64, q: &JointVec, axes: &Axes) -> Result<(), PoseError> {
-        // Just inside, so that a corner's derivatives are taken on this side.
+        // Slightly inside, so that a corner's derivatives are evaluated on this side.
         let inset = 1e-3 * (s - self.s);
         let rate = |at: f64, axes: &Axes| derivatives(axes, &self.trace.at(at)).unwrap_or_default().0;
         let (before, after) = (rate(self.s + inset, &self.axes), rate(s - inset, axes));
@@ -260,7 +262,8 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// Returns the error for a singular pose at `s`: the end of the arm's reach if the rest of the leg has no solution.
+    /// Returns the error for a singular pose at `s`. It reports the end of the arm's reach if the rest of the leg has
+    /// no solution.
     fn singular(&self, s: f64, axes: &Axes) -> PoseError {
         let (_, along, length) = self.trace.whereabouts(s);
         for k in 0..=LOOK_AHEAD {

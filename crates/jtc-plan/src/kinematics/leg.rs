@@ -7,36 +7,36 @@ use super::chain::{Frame, exponential, logarithm};
 use super::orientation::checked;
 use super::subproblems::turned;
 
-/// Length of a leg that a turn of the flange by 1 rad counts as, m, if that is more than the flange's translation: the
-/// length of a leg that mostly turns the flange is its turn.
+/// Length in m that a turn of the flange by 1 rad is counted as. If the turn is longer than the translation, it is the
+/// length of the leg.
 pub const RADIUS: f64 = 0.25;
 
-/// Length below which a leg counts as no movement, m.
+/// Length below which a leg is considered as no movement, m.
 pub(crate) const SHORTEST: f64 = 1e-9;
-/// Distance of the second of three points from the line through the others, m, below which they are in line.
+/// Three points are considered to be in line if the second is closer than this to the line through the others, m.
 const IN_LINE: f64 = 1e-6;
 /// Deviation from half a turn below which the direction of a turn is ambiguous, rad.
 const HALF_TURN: f64 = 1e-6;
 
-/// Leg of a path of the flange, which starts at the end of the previous leg. The orientation turns evenly about one
-/// axis, the short way (spherical linear interpolation).
+/// Leg of a flange path, which starts at the end of the previous leg. The orientation turns at a constant rate about
+/// one axis, in the shorter direction (spherical linear interpolation).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Leg {
     /// A straight line to a pose.
     Line {
-        /// End of the leg, in the base frame.
+        /// Pose at the end of the leg, in the base frame.
         to: Pose,
     },
     /// An arc of a circle to a pose.
     Arc {
         /// A point on the arc, m in the base frame, without an orientation.
         via: [f64; 3],
-        /// End of the leg, in the base frame.
+        /// Pose at the end of the leg, in the base frame.
         to: Pose,
     },
 }
 
-/// A point of the flange on its path, with derivatives by the path's parameter.
+/// A point of the flange on its path, with derivatives with respect to the path's parameter.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub frame: Frame,
@@ -50,10 +50,10 @@ pub(crate) struct Place {
     pub spin_rate: Vector3<f64>,
 }
 
-/// An evaluated leg: a point for each parameter from 0 to its length.
+/// A leg that can be evaluated at each parameter from 0 to its length.
 #[derive(Clone, Debug)]
 pub(crate) struct Drawn {
-    /// Number of the leg as given, counted from 1.
+    /// Number of the leg in the request, counted from 1.
     pub number: usize,
     /// Length, m.
     pub length: f64,

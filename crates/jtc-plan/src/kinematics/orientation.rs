@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use super::PoseError;
 use super::chain::Frame;
 
-/// Maximum deviation of the length of a quaternion from 1, because it is written with few digits.
+/// Maximum deviation of the length of a quaternion from 1. It allows for quaternions written with few digits.
 const UNIT: f64 = 1e-3;
 /// Maximum deviation of the entries of RᵀR from the unit matrix.
 const ROTATION: f64 = 1e-6;
@@ -13,8 +13,8 @@ const ROTATION: f64 = 1e-6;
 /// An orientation, as given for a pose of the flange.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
-    /// A unit quaternion x, y, z, w, scalar last as in ROS. Its length may deviate from 1 by a thousandth, because it
-    /// is written with few digits.
+    /// A unit quaternion x, y, z, w with the scalar last, as in ROS. Its length may deviate from 1 by a thousandth, to
+    /// allow for few digits.
     Quaternion([f64; 4]),
     /// Roll, pitch, yaw, rad: about the fixed axes x, y and z in this order, Rz(yaw)·Ry(pitch)·Rx(roll), as in a URDF.
     Rpy([f64; 3]),
@@ -70,7 +70,7 @@ pub fn rpy_of(pose: &Pose) -> [f64; 3] {
 
 const POSITION: [&str; 3] = ["position x", "position y", "position z"];
 
-/// Checks a given pose and returns it with an exact rotation.
+/// Checks a pose and returns it with an exact rotation matrix.
 ///
 /// # Errors
 ///
@@ -86,7 +86,7 @@ pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     if frame.rotation.determinant() < 0.0 {
         return Err(PoseError::NotRotation { deviation: 2.0 });
     }
-    // A step of Newton's iteration to the nearest rotation squares the deviation.
+    // One step of Newton's iteration to the nearest rotation matrix squares the deviation.
     let rotation =
         frame.rotation * (Matrix3::identity() * 3.0 - frame.rotation.tr_mul(&frame.rotation)) * 0.5;
     Ok(Frame { rotation, ..frame })
@@ -106,7 +106,7 @@ mod tests {
 
     const S: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-    /// Returns the rows of Rz(yaw)·Ry(pitch)·Rx(roll), written out.
+    /// Returns the rows of Rz(yaw)·Ry(pitch)·Rx(roll), computed from the written-out formula.
     fn written_out([roll, pitch, yaw]: [f64; 3]) -> [[f64; 3]; 3] {
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll.sin_cos(), pitch.sin_cos(), yaw.sin_cos());
         [
@@ -147,7 +147,7 @@ mod tests {
         let long = at(Orientation::Quaternion([0.0, 0.0, 1.0, 1.0])).unwrap_err();
         assert_eq!(long, PoseError::NotUnit { length: 2f64.sqrt() });
         assert_eq!(long.to_string(), "the quaternion has the length 1.414214, that of an orientation has 1");
-        // Three digits are enough.
+        // Three digits are precise enough.
         at(Orientation::Quaternion([0.0, 0.0, 0.707, 0.707])).unwrap();
         let nan = at(Orientation::Rpy([0.0, f64::NAN, 0.0])).unwrap_err();
         assert!(matches!(nan, PoseError::NotFinite { what: "pitch", .. }), "{nan}");

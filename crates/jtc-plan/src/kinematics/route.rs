@@ -17,9 +17,9 @@ pub enum LegKind {
     Joint,
     /// With the flange on a straight line.
     Line,
-    /// A point that the arc to the next waypoint passes; its orientation is ignored.
+    /// A point that the arc to the next waypoint passes. Its orientation is ignored.
     Via,
-    /// With the flange on an arc, through the previous waypoint, which is [`LegKind::Via`].
+    /// With the flange on an arc through the previous waypoint, which must be [`LegKind::Via`].
     Arc,
 }
 
@@ -32,13 +32,13 @@ pub struct RoutePoint {
     pub leg: LegKind,
 }
 
-/// A path through waypoints, straight in joint space or with the flange on lines and arcs. Between the two kinds the path stops.
-///
+/// A path through waypoints, straight in joint space or with the flange on lines and arcs. The path stops between
+/// sections of different kinds.
 /// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has at the start of the first
-/// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must belong to
-/// it. Any other flange pose is reached with the solution nearest to the previous waypoint.
+/// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must be in the
+/// same configuration. Any other flange pose is reached with the solution nearest to the previous waypoint.
 ///
-/// The parameter concatenates those of the sections: rad in joint space, m along lines and arcs.
+/// The parameter continues from section to section: rad in joint space, m along lines and arcs.
 #[derive(Clone, Debug)]
 pub struct Route {
     sections: Vec<Section>,
@@ -51,8 +51,8 @@ pub struct Route {
 struct Section {
     way: Way,
     begin: f64,
-    /// Places at which the path changes its form, ends included: by the route's parameter and by the section's own. A sum
-    /// of parameters is rounded, and this rounding must not move a place to the other side of a mark.
+    /// Places at which the path changes its form, including the ends: by the route's parameter and by the section's own
+    /// parameter. The sum of parameters is rounded; the rounding must not move a place to the other side of a change.
     marks: Vec<(f64, f64)>,
 }
 
@@ -83,7 +83,7 @@ impl Section {
         Self { way, begin, marks }
     }
 
-    /// Returns the section's own parameter for one of the route's.
+    /// Converts the route's parameter to the section's own parameter.
     fn own(&self, s: f64) -> f64 {
         let behind = self.marks.partition_point(|mark| mark.0 <= s);
         match (behind.checked_sub(1).map(|i| self.marks[i]), self.marks.get(behind)) {
@@ -98,14 +98,15 @@ impl Section {
 }
 
 impl Route {
-    /// Creates the route through `points`. For a flange pose at the first point the joint positions nearest to `near`
-    /// (rad) are used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]),
-    /// corners between lines and arcs within `blend_m` m (see [`FlangePath`]); 0: stops.
+    /// Creates the route through `points`. If the first point is a flange pose, the solution nearest to `near` (rad) is
+    /// used. Corners between two legs in joint space are rounded within `blend` rad (see [`BlendedPath`]), corners
+    /// between lines and arcs within `blend_m` m (see [`FlangePath`]). With 0 the path stops at the corner.
     ///
     /// # Errors
     ///
-    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the impossible waypoint, or leg and
-    /// distance on it: see [`PoseError`]; [`PoseError::NoMotion`] if all waypoints are at one position.
+    /// [`PlanError::TooFew`], [`PlanError::Blend`], and [`PlanError::Flange`] with the impossible waypoint, or with the
+    /// leg and the distance on it (see [`PoseError`]). [`PoseError::NoMotion`] if all waypoints are at the same
+    /// position.
     pub fn new(
         kinematics: &Kinematics,
         points: &[RoutePoint],
@@ -136,7 +137,8 @@ impl Route {
         if route.sections.is_empty() { Err(PoseError::NoMotion.into()) } else { Ok(route) }
     }
 
-    /// Returns the joint positions at the waypoints, rad; at a rounded corner, those of the corner.
+    /// Returns the joint positions at the waypoints, rad. For a rounded corner these are the positions of the corner
+    /// itself.
     pub fn positions(&self) -> &[JointVec] {
         &self.positions
     }
@@ -155,7 +157,7 @@ impl Route {
         self.positions.last().copied().unwrap_or_default()
     }
 
-    /// Appends a section whose waypoints after its first are at `waypoints` of its own parameter.
+    /// Appends a section; `waypoints` are the section's own parameters at its waypoints, except the first.
     fn push(&mut self, way: Way, waypoints: &[f64]) {
         let section = Section::new(way, self.end);
         self.waypoints.extend(waypoints.iter().map(|own| self.end + own));
@@ -163,7 +165,7 @@ impl Route {
         self.sections.push(section);
     }
 
-    /// Appends waypoints that are reached without movement.
+    /// Appends `count` waypoints that need no movement.
     fn stay(&mut self, count: usize) {
         self.waypoints.extend(std::iter::repeat_n(self.end, count));
     }
@@ -201,7 +203,7 @@ impl Route {
         let legs = legs(kinematics, points, first)?;
         let start = self.last();
         let path = |blend: f64| FlangePath::new(kinematics, &start, &legs.legs, blend);
-        // The positions of the waypoints are known without blends.
+        // Waypoint positions are taken from a path without blends.
         let sharp = match path(0.0) {
             Err(PoseError::NoMotion) => None,
             other => Some(other.map_err(|e| legs.numbered(e))?),
@@ -222,7 +224,7 @@ impl Route {
                     same(&reached, &wanted).map_err(|e| e.at_waypoint(first + k))?;
                     wanted
                 }
-                // A solution is exact only to rounding.
+                // A solution has rounding errors.
                 _ => std::array::from_fn(|j| {
                     let (low, high) = kinematics.limits()[j];
                     reached[j].clamp(low, high)
@@ -245,7 +247,7 @@ impl Route {
 struct Legs {
     legs: Vec<Leg>,
     ends: Vec<usize>,
-    /// Number of the waypoint that the first leg leads to, or passes.
+    /// Number of the waypoint at the end of the first leg, or of its `via` point.
     first: usize,
 }
 
@@ -255,7 +257,7 @@ impl Legs {
         self.ends.partition_point(|end| *end < self.first + index) + 1
     }
 
-    /// Returns an error of these legs with the numbers of the route.
+    /// Returns an error of these legs with the waypoint and leg numbers of the route.
     fn numbered(&self, error: PoseError) -> PoseError {
         let end = |leg: usize| leg.checked_sub(1).and_then(|i| self.ends.get(i)).copied();
         match error {
@@ -272,7 +274,7 @@ impl Legs {
     }
 }
 
-/// Returns the legs to points; the first point has the number `first`.
+/// Returns the legs to `points`; the first of them is waypoint number `first`.
 fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<Legs, PoseError> {
     let (mut legs, mut ends, mut via) = (Vec::new(), Vec::new(), None);
     for (k, point) in points.iter().enumerate() {
@@ -303,7 +305,7 @@ fn legs(kinematics: &Kinematics, points: &[RoutePoint], first: usize) -> Result<
     Ok(Legs { legs, ends, first })
 }
 
-/// Checks that the arm is at the wanted joint positions, and not in another configuration.
+/// Checks that the arm reaches the wanted joint positions, not another configuration.
 fn same(reached: &JointVec, wanted: &JointVec) -> Result<(), PoseError> {
     let (joint, away) = furthest_joint(reached, wanted);
     if away > SAME {
@@ -365,7 +367,7 @@ mod tests {
     use super::*;
     use jtc_dynamics::JOINTS;
 
-    /// A parameter on one side of a change of form stays on that side in the section, too.
+    /// A parameter on one side of a change of form is on the same side in the section.
     #[test]
     fn rounding_does_not_lead_across_a_mark() {
         let ends = [[0.0; JOINTS], [0.7, 0.1, 0.0, 0.0, 0.0, 0.0], [0.1, 0.3, 0.0, 0.0, 0.0, 0.0]];

@@ -8,12 +8,12 @@ use super::chain::{Chain, Frame};
 
 /// Maximum residual of a solution, m and rad.
 pub(crate) const TOLERANCE: f64 = 1e-9;
-/// Squared residual (over the arm's length, and rad) that counts as rounding.
+/// Squared residual (translation divided by the arm's length, rotation in rad) that is attributed to rounding.
 const ROUNDING: f64 = 1e-29;
-/// Largest step of a joint in an iteration, rad: beyond it the linearisation has no meaning.
+/// Largest step of a joint in an iteration, rad. The linearisation is useless for larger steps.
 const STEP: f64 = 0.7;
-/// Two solutions are the same if no joint differs by more, rad. Closer solutions are next to a singularity, and the flange moves only by
-/// nanometres between them.
+/// Two solutions are considered the same if no joint differs by more than this, rad. Solutions this close are near a
+/// singularity, and the flange moves only by nanometres between them.
 pub(crate) const SAME: f64 = 1e-4;
 /// Largest number of solutions of an arm with six revolute joints, except in singular poses (Primrose 1986).
 const SOLUTIONS: usize = 16;
@@ -27,8 +27,9 @@ pub(crate) struct Reached {
     pub residual: Vector6<f64>,
 }
 
-/// Moves `q` to the least residual weighted by `weights`, in at most `iterations`: Levenberg-Marquardt with a damping
-/// proportional to the squared residual (Sugihara 2011), which converges quadratically and is stable in singular poses.
+/// Moves `q` to the minimum of the residual weighted by `weights`, in at most `iterations` steps. Uses
+/// Levenberg-Marquardt with a damping proportional to the squared residual (Sugihara 2011), which converges
+/// quadratically and is stable in singular poses.
 pub(crate) fn descend(
     chain: &Chain,
     goal: &Frame,
@@ -74,7 +75,8 @@ pub(crate) fn descend(
     Reached { q, squared, residual }
 }
 
-/// Returns the solution to which the iteration from `q` converges, if it does: principal values, within (−π, π].
+/// Returns the solution to which the iteration from `q` converges, if it converges. Its joint positions are within (−π,
+/// π].
 pub(crate) fn converge(chain: &Chain, goal: &Frame, q: &JointVec, iterations: usize) -> Option<JointVec> {
     let reached = descend(chain, goal, *q, &Vector6::repeat(1.0), iterations);
     fits(chain, &reached).then(|| reached.q.map(principal))
@@ -93,7 +95,7 @@ pub(crate) fn principal(angle: f64) -> f64 {
     if turned <= -PI { turned + TAU } else { turned }
 }
 
-/// Adds a solution if it is a new one.
+/// Adds a solution unless it is already in the list; returns `true` if it was added.
 pub(crate) fn add(solutions: &mut Vec<JointVec>, q: JointVec) -> bool {
     let same = |other: &JointVec| q.iter().zip(other).all(|(a, b)| principal(a - b).abs() < SAME);
     let new = !solutions.iter().any(same);
@@ -103,8 +105,8 @@ pub(crate) fn add(solutions: &mut Vec<JointVec>, q: JointVec) -> bool {
     new
 }
 
-/// Adds the solutions that the iteration finds from many fixed starting values, until it has found no new one for a
-/// long time. With an odd number of solutions it continues, because they are roots of a polynomial of even degree.
+/// Adds the solutions that the iteration finds from many fixed starting values, until many values in a row find no new
+/// one. With an odd number of solutions it continues, because they are roots of a polynomial of even degree.
 pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>) {
     let mut last = 0;
     for n in 1..=SEEDS.1 {
@@ -116,7 +118,7 @@ pub(crate) fn search(chain: &Chain, goal: &Frame, solutions: &mut Vec<JointVec>)
             && add(solutions, q)
         {
             last = n;
-            // A new solution within the tolerance is refined down to rounding.
+            // A new solution is only within the tolerance, and is refined down to rounding.
             if let (Some(newest), Some(refined)) = (solutions.last_mut(), converge(chain, goal, &q, 40)) {
                 *newest = refined;
             }
@@ -130,7 +132,7 @@ pub(crate) fn is_reachable(chain: &Chain, goal: &Frame, near: &JointVec) -> bool
     reached(near) || (1..=SEEDS.0).any(|n| reached(&seed(n)))
 }
 
-/// Returns the n-th starting value: Halton's sequence, which fills the space of all joint positions evenly.
+/// Returns the n-th starting value of Halton's sequence, which fills the space of all joint positions evenly.
 pub(crate) fn seed(n: usize) -> JointVec {
     const BASES: [usize; JOINTS] = [2, 3, 5, 7, 11, 13];
     BASES.map(|base| {

@@ -9,34 +9,34 @@ use super::chain::{Axes, Chain};
 use super::closed_form::{Geometry, Shoulder};
 use super::subproblems::across;
 
-/// Smallest singular value of the Jacobian on a path of the flange (see [`Singularity::smallest`]): half a degree from
-/// aligned wrist axes, and a few degrees from the stretched arm.
+/// Smallest singular value of the Jacobian that is permitted on a path of the flange (see [`Singularity::smallest`]):
+/// half a degree from aligned wrist axes, and a few degrees from the stretched arm.
 pub const SINGULAR: f64 = 0.01;
 
 /// Kind of singular pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SingularKind {
-    /// The wrist: the axes of joints 4 and 6 are parallel; joint 5 is at 0 or half a turn from there.
+    /// The wrist: the axes of joints 4 and 6 are parallel, with joint 5 at 0 or half a turn away.
     Wrist,
     /// The elbow: the arm is stretched, or folded.
     Elbow,
-    /// The shoulder: the wrist is over the axis of joint 1, or joint 1 cannot move it sideways.
+    /// The shoulder: the wrist centre is on the axis of joint 1, or joint 1 cannot move it sideways.
     Shoulder,
-    /// Any other singular pose, or that of an arm whose geometry has no such names.
+    /// Any other singular pose, or a singular pose of an arm without a known geometry.
     Other,
 }
 
 /// The singular pose that the arm is in or next to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Singularity {
-    /// Kind.
+    /// Kind of the singular pose.
     pub kind: SingularKind,
     /// Joints that can move with the flange almost at rest.
     pub joints: Vec<Joint>,
-    /// Smallest singular value of the Jacobian, translations counted in lengths of the stretched arm: the least motion
-    /// of the flange while the joints move by 1 rad altogether. 0 in the singular pose, NaN for joint positions that
-    /// are NaN or infinite.
+    /// Smallest singular value of the Jacobian, with translations divided by the length of the stretched arm: the
+    /// smallest motion of the flange for joint motions of 1 rad in total (the root of the sum of squares). 0 in the
+    /// singular pose, NaN if a joint position is NaN or infinite.
     pub smallest: f64,
 }
 
@@ -69,16 +69,17 @@ impl fmt::Display for Singularity {
     }
 }
 
-/// Share of the largest entry above which a joint counts as moving.
+/// Entries above this share of the largest entry belong to joints that move.
 const TAKES_PART: f64 = 0.2;
-/// Sine of the wrist angle below which a singular pose of an arm without a planar elbow counts as a wrist singularity.
+/// If the sine of the wrist angle is smaller than this, a singular pose of an arm without a planar elbow is reported as
+/// a wrist singularity.
 const NAMED: f64 = 0.1;
 
-/// Returns the smallest singular value of the Jacobian, and the unit vector of its joint motions; NaN and 0 if a joint
-/// position is NaN or infinite.
+/// Returns the smallest singular value of the Jacobian and the unit vector of its joint motions. If a joint position is
+/// NaN or infinite, returns NaN and 0.
 pub(crate) fn weakest(chain: &Chain, axes: &Axes) -> (f64, Vector6<f64>) {
     let jacobian = chain.scaled_jacobian(axes);
-    // The iteration for singular values would not end.
+    // The iteration for singular values would not end with such values.
     if !jacobian.iter().all(|entry| entry.is_finite()) {
         return (f64::NAN, Vector6::zeros());
     }
@@ -96,10 +97,10 @@ pub(crate) fn nearest(chain: &Chain, geometry: Option<&Geometry>, axes: &Axes) -
     Singularity { kind: geometry.map_or(SingularKind::Other, |g| kind(chain, g, axes)), joints, smallest }
 }
 
-/// Returns the name of the factor of the Jacobian's determinant that is nearest to 0.
+/// Returns the kind that belongs to the factor of the Jacobian's determinant nearest to 0.
 fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     let (h, p) = (&axes.axis, &axes.point);
-    // Share of its value with joint 5 a quarter turn away.
+    // Divided by its value with joint 5 a quarter turn away.
     let full = h[3].cross(&h[4]).norm() * h[4].cross(&h[5]).norm();
     let wrist = h[3].dot(&h[4].cross(&h[5])).abs() / full.max(f64::MIN_POSITIVE);
     let (centre, is_planar) = match geometry {
@@ -109,7 +110,7 @@ fn kind(chain: &Chain, geometry: &Geometry, axes: &Axes) -> SingularKind {
     if !is_planar {
         return if wrist < NAMED { SingularKind::Wrist } else { SingularKind::Other };
     }
-    // The meeting point of the last axes is on axis 5, which carries it along.
+    // The last axes meet in a point on axis 5, which moves with that axis.
     let along = chain.zero.axis[4].dot(&(centre - chain.zero.point[4]));
     let centre = axes.point[4] + h[4] * along;
     let end = if matches!(geometry, Geometry::ThreeParallel { .. }) { p[3] } else { centre };

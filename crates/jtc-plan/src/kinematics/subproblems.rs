@@ -1,15 +1,15 @@
 //! Rotations that solve one equation of a closed form (the subproblems of Paden and Kahan).
 //!
-//! Each takes a `hint`: the angle to return if the geometry leaves the angle free, as in singular poses. A slightly
-//! missed target (as requested for a nearly ideal arm) is replaced by the nearest reachable one: the result is refined,
-//! and dropped if it does not fit.
+//! Each function takes a `hint`: the angle to return if the geometry leaves the angle free, as in singular poses. If a
+//! target is missed slightly (which happens for a nearly ideal arm), the nearest reachable target is used. The result
+//! is refined later, and dropped if it does not reach the goal.
 use nalgebra::Vector3;
 
 use super::chain::turn;
 
-/// Share of the vectors' lengths below which a direction is lost in rounding, and the angle is free.
+/// If a direction is shorter than this share of the vectors' lengths, it is lost in rounding, and the angle is free.
 const FREE: f64 = 1e-9;
-/// Maximum excess of a target over the largest value, as a share of the vectors' lengths.
+/// Largest excess of a target over the largest reachable value, as a share of the vectors' lengths.
 const SLACK: f64 = 1e-3;
 
 /// Returns the angle of a rotation about `axis` that turns `from` to the direction of `to`, as seen along the axis.
@@ -21,12 +21,12 @@ pub(crate) fn turn_onto(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f
     axis.dot(&a.cross(&b)).atan2(a.dot(&b))
 }
 
-/// Returns the part of a vector across an axis.
+/// Returns the component of a vector perpendicular to an axis.
 pub(crate) fn across(axis: &Vector3<f64>, vector: &Vector3<f64>) -> Vector3<f64> {
     vector - axis * axis.dot(vector)
 }
 
-/// Returns the zero to two angles with `direction`·R(axis, angle)·`vector` = `value`.
+/// Returns the angles, at most two, at which `direction`·R(axis, angle)·`vector` = `value`.
 pub(crate) fn turn_to_value(
     direction: &Vector3<f64>,
     axis: &Vector3<f64>,

@@ -12,13 +12,13 @@ pub enum Target {
     Flange(Pose),
 }
 
-/// Returns joint positions for each target: for a pose, the solution that is nearest to the previous target, and to
-/// `start` (rad) for the first.
+/// Returns joint positions for each target. For a pose, this is the solution nearest to the previous target; for the
+/// first target, the solution nearest to `start` (rad).
 ///
 /// # Errors
 ///
-/// [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and the reason: see
-/// [`Kinematics::solve`]. Joint positions must be within the limits too.
+/// [`PoseError::Waypoint`] with the number of the first target without a solution, counted from 1, and the reason (see
+/// [`Kinematics::solve`]). Joint positions must also be within the limits.
 pub fn resolve(
     kinematics: &Kinematics,
     targets: &[Target],
@@ -33,7 +33,7 @@ pub fn resolve(
     Ok(found)
 }
 
-/// Returns joint positions for a target; for a pose, those nearest to `before`.
+/// Returns joint positions for a target; for a pose, the solution nearest to `before`.
 pub(crate) fn one(
     kinematics: &Kinematics,
     target: &Target,

@@ -1,27 +1,29 @@
 //! Path of the flange: consecutive legs with blended corners.
 //!
-//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of the previous leg
-//! runs out while that of the next leg starts. With w rising smoothly from 0 to 1 and W = ∫w, the place is that of the previous leg at τ −
-//! W plus the displacement of the next leg by W, τ from −r to r. Position and orientation have continuous second derivatives. The position
-//! stays within the triangle of the corner if the legs are straight.
+//! A blend begins at the distance r before the corner and ends at the distance r after it. In between, the parameter of
+//! the previous leg slows down to a stop while the parameter of the next leg starts. Let τ run from −r to r, let w rise
+//! smoothly from 0 to 1, and W = ∫w. The place is then the place of the previous leg at τ − W plus the displacement of
+//! the next leg by W. Position and orientation have continuous second derivatives. The position stays within the
+//! triangle of the corner if the legs are straight.
 use nalgebra::Vector3;
 
 use super::PoseError;
 use super::chain::Frame;
 use super::leg::{Drawn, Leg, Place, RADIUS, SHORTEST};
 
-/// Cosine of the angle between two legs below which the path turns back, so that no blend keeps a motion going.
+/// If the cosine of the angle between two legs is below this, the path turns back. No blend can keep the flange moving
+/// there.
 const WAY_BACK: f64 = -0.98;
 
-/// Path of the flange over a parameter that is the length of its legs, m.
+/// Path of the flange. Its parameter is the length of the legs, m.
 #[derive(Clone, Debug)]
 pub(crate) struct Trace {
     legs: Vec<Drawn>,
-    /// Start of each leg; plus an entry for the end.
+    /// Parameter at the start of each leg, and at the end of the path.
     begins: Vec<f64>,
     /// Blend radius after each leg, m; 0 for a stop.
     blends: Vec<f64>,
-    /// Number of legs given; some may have no motion.
+    /// Number of legs in the request; some may have no motion.
     given: usize,
 }
 
@@ -96,7 +98,8 @@ impl Trace {
         Some(self.begins[k] + self.legs[k].via()?)
     }
 
-    /// Returns the parameters nearest to each waypoint, ends included: legs without motion have equal ends.
+    /// Returns the parameter nearest to each waypoint, including the ends. A leg without motion has the same parameter
+    /// at both ends.
     pub fn waypoints(&self) -> Vec<f64> {
         let passed = |n: usize| self.legs.partition_point(|leg| leg.number <= n);
         (0..=self.given).map(|n| self.begins[passed(n)]).collect()
@@ -115,7 +118,7 @@ fn radius(before: &Drawn, behind: &Drawn, blend: f64) -> f64 {
     if radius > SHORTEST { radius } else { 0.0 }
 }
 
-/// Returns the point on a blend of radius `r` at `tau`, both m.
+/// Returns the point on a blend of radius `r` at `tau`, both in m.
 fn blended(before: &Drawn, behind: &Drawn, r: f64, tau: f64) -> Place {
     let t = (tau + r) / (2.0 * r);
     let w = t * t * (3.0 - 2.0 * t);
@@ -159,7 +162,7 @@ mod tests {
         ]
     }
 
-    /// Returns the largest difference of a point's derivatives from the differences of its neighbours.
+    /// Returns the largest difference between a point's derivatives and the finite differences of its neighbours.
     fn wrong(trace: &Trace, s: f64) -> f64 {
         let step = 1e-5;
         let (before, here, after) = (trace.at(s - step), trace.at(s), trace.at(s + step));
@@ -178,7 +181,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Also across the ends of the blends: a second derivative that jumps there would show as half of the jump.
+        /// The places include the ends of the blends: a second derivative that jumps there would show as half of the
+        /// jump.
         #[test]
         fn derivatives_are_those_of_the_places_and_continuous(
             start in pose(), legs in prop::collection::vec(leg(), 2..5), blend in 0.05..0.3f64, at in 0.0..1.0f64
@@ -188,7 +192,7 @@ mod tests {
             let at_ends = trace.breaks();
             for s in at_ends.into_iter().chain([at * trace.end()]) {
                 let s = s.clamp(1e-5, trace.end() - 1e-5);
-                // At the ends of a blend the third derivative jumps; arcs may be tight, and then differences are imprecise.
+                // At the ends of a blend the third derivative jumps. Finite differences are imprecise on tight arcs.
                 let tight = trace.at(s).acceleration.norm() + trace.at(s).velocity.norm();
                 prop_assert!(wrong(&trace, s) < 0.03 + 1e-3 * tight.powi(3), "{} at {s}: {trace:?}", wrong(&trace, s));
             }

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use jtc_dynamics::{JOINTS, JointVec};
 use jtc_wire::Joint;
 
-/// Distance beyond a limit up to which a position counts as at the limit, rad: a solution is exact only to rounding.
+/// Distance beyond a limit that is tolerated, rad, because solutions have rounding errors.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
 type Limits = [(f64, f64); JOINTS];
@@ -14,13 +14,15 @@ fn within(angle: f64, (low, high): (f64, f64)) -> Option<f64> {
     (low <= high && low - ROUNDING <= angle && angle <= high + ROUNDING).then(|| angle.clamp(low, high))
 }
 
-/// Turns each joint of `q` by whole turns as near to `near` as the limits permit; returns `None` if a joint is outside in every turn.
+/// Moves each joint of `q` by whole turns as near to `near` as the limits permit. Returns `None` if a joint is outside
+/// its limits in every turn.
 pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<JointVec> {
     let mut found = *q;
     for (j, angle) in found.iter_mut().enumerate() {
         let turned = *angle + TAU * ((near[j] - *angle) / TAU).round();
         let ends = [limits[j].0, limits[j].1].map(|end| *angle + TAU * ((end - *angle) / TAU).round());
-        // The nearest turn may be outside; then one of the turns next to the limits is the nearest, if any is inside.
+        // The turn nearest to `near` may be outside. Then a turn next to one of the limits is the nearest, if any is
+        // inside.
         let candidates = [turned, ends[0], ends[0] + TAU, ends[1], ends[1] - TAU];
         let inside = candidates.into_iter().filter_map(|angle| within(angle, limits[j]));
         *angle = inside.min_by(|a, b| (a - near[j]).abs().total_cmp(&(b - near[j]).abs()))?;
@@ -28,8 +30,7 @@ pub(crate) fn nearest(q: &JointVec, near: &JointVec, limits: &Limits) -> Option<
     Some(found)
 }
 
-/// Returns `q`, whose joints are within (−π, π], with each joint unchanged, one turn less and one turn more, if the
-/// limits allow.
+/// Returns the variants of `q` within the limits: each joint, which is within (−π, π], unchanged or turned by ±2π.
 pub(crate) fn variants(q: &JointVec, limits: &Limits) -> Vec<JointVec> {
     let mut all = vec![*q];
     for j in 0..JOINTS {
@@ -52,7 +53,7 @@ pub(crate) struct Outside {
     pub beyond: f64,
 }
 
-/// Returns the joint that is farthest outside, each in the turn that is least outside.
+/// Returns the joint that is farthest outside. For each joint the turn that is least outside is used.
 pub(crate) fn outside(q: &JointVec, limits: &Limits) -> Outside {
     let mut worst = Outside { joint: Joint::ALL[0], value: q[0], beyond: f64::NEG_INFINITY };
     for (joint, (&angle, &(low, high))) in Joint::ALL.into_iter().zip(q.iter().zip(limits)) {
@@ -89,7 +90,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Compares with a trial of every turn in a wide range.
+        /// Compares with the result of testing every turn in a wide range.
         #[test]
         fn the_nearest_turn_is_the_nearest_of_all(
             angle in -3.1..3.1f64, near in -20.0..20.0f64, low in -15.0..10.0f64, width in 0.1..14.0f64

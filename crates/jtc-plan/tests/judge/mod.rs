@@ -1,5 +1,5 @@
-//! Random arms and waypoints, and a judge of motions that is independent of the planner: it samples positions and takes
-//! differences.
+//! Random arms and waypoints, and a check of motions that is independent of the planner: it samples positions and
+//! computes differences.
 
 use std::fmt::Write as _;
 
@@ -7,9 +7,9 @@ use jtc_core::{Config, Friction, Parameters, Payload, friction};
 use jtc_dynamics::{ArmModel, Dynamics};
 use jtc_plan::{ArmDynamics, JOINTS, JointVec, Limits, Motion, Waypoint};
 
-/// Distance of the samples, s.
+/// Time between samples, s.
 const H: f64 = 5e-4;
-/// Tolerance of the limits for differences, because positions are rounded.
+/// Tolerance of limits that are checked by differences, because positions are rounded.
 const ROUNDING: f64 = 1e-6;
 
 /// An arm with limits, and waypoints.
@@ -29,7 +29,7 @@ fn between(rng: &mut fastrand::Rng, low: f64, high: f64) -> f64 {
 }
 
 impl Case {
-    /// The arm of arms/avena.toml with other masses, limits, payload, and random waypoints.
+    /// The arm of arms/avena.toml with random masses, limits, payload and waypoints.
     pub fn random(seed: u64) -> Self {
         let rng = &mut fastrand::Rng::with_seed(seed);
         let parameters = Parameters::avena();
@@ -77,7 +77,7 @@ impl Case {
         self.waypoints.iter().copied().map(Waypoint::from).collect()
     }
 
-    /// Joint torques without and with friction at these differences.
+    /// Joint torques for these differences, without and with friction.
     pub fn torque(&self, dynamics: &Dynamics, q: &JointVec, v: &JointVec, a: &JointVec) -> JointVec {
         let mut torque = dynamics.inverse(q, v, a);
         for j in 0..JOINTS {
@@ -87,8 +87,8 @@ impl Case {
         torque
     }
 
-    /// Returns all errors of a motion through the waypoints, along the legs between them if requested (`on_legs`), and
-    /// the largest share of velocity, acceleration, jerk and torque.
+    /// Returns all errors of a motion through the waypoints, and the highest used shares of the velocity, acceleration,
+    /// jerk and torque limits. With `on_legs`, also checks that the motion stays on the legs.
     pub fn judge(&self, motion: &Motion, on_legs: bool) -> (String, [f64; 4]) {
         let mut wrong = String::new();
         self.ends(motion, &mut wrong);
@@ -122,9 +122,9 @@ impl Case {
     fn differences(&self, motion: &Motion, wrong: &mut String) -> [f64; 4] {
         let dynamics = Dynamics::with_payload(&self.model, self.config.gravity, &self.config.payload);
         let breakaway = self.breakaway();
-        // The arm rests before and after.
+        // The samples include the rest before and after the motion.
         let count = (motion.duration() / H).ceil() as i64 + 4;
-        // Long motions are sampled in stretches.
+        // In long motions only some stretches are sampled.
         let stride = if count > 400_000 { count / 4_000 } else { 0 };
         let mut used = [0.0f64; 4];
         let mut k = -4;
@@ -156,7 +156,7 @@ impl Case {
                 let rounding = 4e-15 + 4.0 * f64::EPSILON * time * v[j].abs();
                 take(2, "jerk", jerk[j], self.limits.jerk[j], rounding / (H * H * H));
                 if let (Some(torque), Some(usable)) = (torque, usable) {
-                    // Rounding of positions over the square of that time.
+                    // Tolerance for rounding of positions, divided by the square of that time.
                     take(3, "torque", torque[j], usable[j], 1e-4);
                 }
                 if !(low - 1e-9..=high + 1e-9).contains(&p[1][j]) && wrong.len() < 2000 {
@@ -168,7 +168,7 @@ impl Case {
         used
     }
 
-    /// Largest friction of each joint up to a little more than the speed at which its sign reaches ±1.
+    /// Largest friction of each joint, up to a speed slightly above the one at which its sign reaches ±1.
     fn breakaway(&self) -> JointVec {
         std::array::from_fn(|j| {
             let fastest = self.config.friction_sign_width + self.config.joints[j].velocity_max / 128.0;
@@ -177,8 +177,8 @@ impl Case {
         })
     }
 
-    /// Torque that a motion may use: the limit without its margin, but at least the holding torque and a small part of
-    /// the torque left.
+    /// Torque that a motion may use: the limit minus its margin, but at least the holding torque plus a small part of
+    /// the remaining torque.
     fn usable(&self, dynamics: &Dynamics, q: &JointVec, breakaway: &JointVec) -> JointVec {
         let hold = dynamics.inverse(q, &[0.0; JOINTS], &[0.0; JOINTS]);
         std::array::from_fn(|j| {
@@ -198,7 +198,7 @@ impl Case {
         }
     }
 
-    /// Torque by differences over a time so short that acceleration and friction hardly change in it.
+    /// Torque from differences over a time so short that acceleration and friction hardly change.
     fn torque_at(&self, dynamics: &Dynamics, motion: &Motion, time: f64) -> JointVec {
         const H: f64 = 1e-5;
         let [a, b, c] = [time - H, time, time + H].map(|t| motion.at(t).position);
@@ -235,8 +235,8 @@ impl Case {
         distance(q, &std::array::from_fn(|j| a[j] + u * way[j]))
     }
 
-    /// Returns `true` if the place is within the blend of one of several close waypoints around a leg, and in the box
-    /// of all of them.
+    /// Returns `true` if the place is within the blend of one of several close waypoints around a leg, and in the
+    /// bounding box of all of them.
     fn is_in_row(&self, leg: usize, q: &JointVec) -> bool {
         [leg, leg + 1].into_iter().any(|at| {
             let row = &self.waypoints[row(&self.waypoints, at, self.blend)];
@@ -260,7 +260,7 @@ impl Case {
     }
 }
 
-/// Waypoints closer to each other than the blend: some may be left out.
+/// Range of waypoints closer to each other than the blend, some of which may be left out.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);
@@ -273,7 +273,7 @@ fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusiv
     from.saturating_sub(1)..=(to + 1).min(waypoints.len() - 1)
 }
 
-/// A walk inside the position limits with some waypoints that repeat, go straight on or go back.
+/// A random walk inside the position limits. Some waypoints repeat, continue straight on, or go back.
 fn waypoints(rng: &mut fastrand::Rng, count: usize, limits: &Limits) -> Vec<JointVec> {
     let size = *rng.choice(&[0.002, 0.05, 0.3, 1.0]).unwrap_or(&0.3);
     let inside = |q: JointVec| -> JointVec {

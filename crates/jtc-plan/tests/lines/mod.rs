@@ -31,10 +31,10 @@ pub fn moved(pose: &Pose, shift: Vec3, turn: Vec3) -> Pose {
     Pose { rotation, position: std::array::from_fn(|i| pose.position[i] + shift[i]) }
 }
 
-/// Two turns for each joint.
+/// A range of two turns for each joint.
 pub const WIDE: [(f64, f64); JOINTS] = [(-2.0 * PI, 2.0 * PI); JOINTS];
 
-/// Returns leg, distance, and error on the leg.
+/// Returns the leg, the distance along it, and the error on the leg.
 pub fn on_leg(error: PoseError) -> (usize, f64, PoseError) {
     match error {
         PoseError::Leg { leg, distance, source, .. } => (leg, distance, *source),

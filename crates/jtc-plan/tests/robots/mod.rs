@@ -1,4 +1,4 @@
-//! Arms for the tests: the default one, and others by published Denavit-Hartenberg parameters.
+//! Arms for the tests: the default arm, and others from published Denavit-Hartenberg parameters.
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 
 use jtc_core::{Config, Parameters};
@@ -15,7 +15,7 @@ pub fn avena_limits() -> [(f64, f64); JOINTS] {
     std::array::from_fn(|joint| config.position_range(joint))
 }
 
-/// An arm by classic Denavit-Hartenberg parameters, for each joint d (m), a (m), α (rad).
+/// An arm from classic Denavit-Hartenberg parameters: d (m), a (m) and α (rad) for each joint.
 pub fn by_dh(parameters: [[f64; 3]; JOINTS]) -> ArmModel {
     let mut model = ArmModel::default();
     for (joint, [d, a, alpha]) in model.joints[1..].iter_mut().zip(parameters) {
@@ -60,9 +60,10 @@ pub fn kr5() -> ArmModel {
     ])
 }
 
-/// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200): no closed form.
+/// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
 pub fn jaco2() -> ArmModel {
-    // Half the angle between two axes of the wrist makes an offset along each of 1/√3 of a link.
+    // The curved link offsets both of its axes by sin(a)/sin(2a) = 1/√3 of a link, where a = 30° is half of the angle
+    // between them.
     let part = 0.0741 / 3f64.sqrt();
     by_dh([
         [0.2755, 0.0, FRAC_PI_2],
@@ -88,8 +89,8 @@ pub fn crooked() -> ArmModel {
     ArmModel { joints: joints.map(|(xyz, rpy)| Origin { xyz, rpy }), ..ArmModel::default() }
 }
 
-/// Arms for the geometries that the others do not have: a spherical wrist after axes 2 and 3 that meet, or after axes 1
-/// and 2 that are parallel; the parameters are our own.
+/// Arms for the geometries that the other arms do not have: a spherical wrist after axes 2 and 3 that meet, or after
+/// axes 1 and 2 that are parallel. The parameters are invented.
 pub fn more_closed_forms() -> [(&'static str, ArmModel); 2] {
     let half = FRAC_PI_2;
     let wrist = [[0.4, 0.0, -half], [0.0, 0.0, half], [0.1, 0.0, 0.0]];
@@ -126,12 +127,12 @@ fn product(a: &Mat3, b: &Mat3) -> Mat3 {
 /// Returns the distance of two poses, m and rad.
 pub fn difference(a: &Pose, b: &Pose) -> (f64, f64) {
     let shift = (0..3).map(|i| (a.position[i] - b.position[i]).powi(2)).sum::<f64>().sqrt();
-    // The chord between rotations is 2·√2·sin of half the angle.
+    // The chord between two rotations is 2·√2·sin of half the angle.
     let chord = a.rotation.as_flattened().iter().zip(b.rotation.as_flattened()).map(|(a, b)| (a - b).powi(2));
     (shift, 2.0 * (chord.sum::<f64>().sqrt() / 8f64.sqrt()).min(1.0).asin())
 }
 
-/// Returns the pose of the flange by forward kinematics as J-40 writes it, independent of the project's.
+/// Returns the pose of the flange by forward kinematics as specified in J-40, independent of the project's code.
 pub fn pose(model: &ArmModel, q: &JointVec) -> Pose {
     let about = |axis: usize, angle: f64| {
         let (s, c) = angle.sin_cos();
@@ -141,7 +142,7 @@ pub fn pose(model: &ArmModel, q: &JointVec) -> Pose {
             _ => [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]],
         }
     };
-    // Within 2 µrad of a multiple of a right angle is that multiple.
+    // An angle within 2 µrad of a multiple of a right angle is rounded to it.
     let squared = |angle: f64| {
         let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
         if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }

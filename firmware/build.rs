@@ -1,9 +1,9 @@
-//! Linker script, build id and baud rate. Rejects builds that would look right but not work.
+//! Linker script, build id and baud rate. Rejects builds that would compile but not work on the board.
 use std::path::PathBuf;
 use std::process::Command;
 use std::{env, fs};
 
-/// J-01.
+/// Default of rule J-01.
 const BAUD_DEFAULT: u32 = 115_200;
 const BAUD_MAX: u32 = 15_000_000;
 
@@ -45,8 +45,8 @@ fn main() {
     }
 }
 
-/// Returns the commit that is built, with `+` at its end if files were changed since. Always thirteen characters, so
-/// that the log takes the same time in every build and figures of builds can be compared.
+/// Returns the commit that is built, followed by `+` if files were changed since. It always has thirteen characters, so
+/// that logging takes the same time in every build and measurements of builds can be compared.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;

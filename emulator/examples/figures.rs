@@ -1,8 +1,7 @@
-//! Figures of a board's program, counted on the emulated chip: instructions, latencies of interrupts, stack.
+//! Measurements of a board's program, counted on the emulated chip: instructions, interrupt latencies, stack.
 //!
-//! `cargo run --release --example figures -- ELF [--cycles]` prints lines that are the same on every machine.
-//! `--cycles` adds the estimate of llvm-mca's model of the Cortex-M7 for one control step, which depends on the version
-//! of LLVM.
+//! `cargo run --release --example figures -- ELF [--cycles]` prints the same lines on every machine. `--cycles` adds an
+//! estimate for one control step, from llvm-mca's model of the Cortex-M7, which depends on the version of LLVM.
 #[path = "figures/cycles.rs"]
 mod cycles;
 #[path = "../tests/rig/mod.rs"]
@@ -19,7 +18,7 @@ use openjtc_emulator::{BoardConfig, Elf, FIRST_LINE};
 use rig::Rig;
 use session::{Session, Steps};
 
-/// Handlers of the program, with their number in the vector table and their priority.
+/// Interrupt handlers of the program, with their exception number and priority.
 const HANDLERS: [(&str, usize); 8] = [
     ("TIM7, the tick", FIRST_LINE + 55),
     ("TIM5, time of the links", FIRST_LINE + 50),
@@ -31,12 +30,12 @@ const HANDLERS: [(&str, usize); 8] = [
     ("DMA1 stream 3", FIRST_LINE + 14),
 ];
 
-/// Longest time from the tick's timer to its first instruction, ns.
+/// Longest time from the tick's timer event to the first instruction of the tick, ns.
 const LATENCY_MAX: u64 = 1_000;
 
-/// Time for which every instruction is checked, ms.
+/// Time during which every instruction is checked, ms.
 const MASK_MS: u64 = 150;
-/// Bytes of stack that must never be used.
+/// Number of stack bytes that must never be used.
 const STACK_SPARE: u32 = 4_096;
 
 fn main() -> ExitCode {
@@ -85,7 +84,7 @@ fn run() -> Result<(), Box<dyn Error>> {
     let observers = &machine.chip().observers;
     println!("  with a host at {} Bd on each line, the arm moving:", version.baud);
     handlers(observers)?;
-    // The tick begins at once unless interrupts are masked.
+    // The tick is delayed only while interrupts are masked.
     let late = mask * 1_000_000_000 / u64::from(version.core_hz);
     println!("    interrupts are masked for at most {mask} instructions = {late} ns");
     if late > LATENCY_MAX {
@@ -98,15 +97,15 @@ fn run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the first address above the stack, and its last.
+/// Returns the first address above the stack, and the lowest address of the stack.
 fn stack(elf: &Elf) -> Result<(u32, u32), Box<dyn Error>> {
     let word = elf.segments.iter().find(|(at, _)| *at == 0x0800_0000).ok_or("no vector table")?;
     let top = u32::from_le_bytes(word.1[..4].try_into()?);
-    // The stack fills the tightly coupled memory from its beginning.
+    // The stack begins at the lowest address of the tightly coupled memory.
     Ok((top, 0x2000_0000))
 }
 
-/// Prints each handler: its instructions without those of handlers that interrupt it, its latency, its stack.
+/// Prints for each handler its instructions (without handlers that interrupt it), its latency and its stack.
 fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     for (name, number) in HANDLERS {
         let (count, latency) = (observers.handlers[number], observers.latencies[number]);
@@ -126,8 +125,8 @@ fn handlers(observers: &Observers) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Prints the stack use of each context, with the frames of the exceptions that interrupt it. Handlers of a higher
-/// priority may interrupt each context.
+/// Prints the stack use of each context, including the exception frames. Each context can be interrupted by handlers of
+/// a higher priority.
 fn stacks(observers: &Observers, (top, bottom): (u32, u32)) -> Result<(), Box<dyn Error>> {
     let size = top - bottom;
     let mut sum = top - observers.lowest_sp[0];

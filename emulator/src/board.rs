@@ -1,5 +1,5 @@
-//! The board in its environment: firmware, simulated arm with drives and gripper on the joint bus, a host on a serial
-//! line.
+//! The board and its environment: firmware, a simulated arm with drives and gripper on the joint bus, and a host on a
+//! serial line.
 use std::cell::{Ref, RefCell};
 use std::rc::Rc;
 
@@ -14,32 +14,32 @@ use crate::gpio::Pin;
 use crate::machine::Machine;
 use crate::usart::WireByte;
 
-/// Safety input and output of the Nucleo boards.
+/// Pins of the safety input and output on the Nucleo boards.
 const SAFETY: (Pin, Pin) = (Pin('D', 3), Pin('D', 4));
 
 /// A serial port of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Port {
-    /// Serial port next to the connector of the host.
+    /// Serial port at the host connector.
     Usart2,
-    /// The ST-LINK's virtual port.
+    /// Virtual serial port of the ST-LINK.
     Usart3,
 }
 
 /// Settings of a [`Board`].
 #[derive(Clone, Debug)]
 pub struct BoardConfig {
-    /// Arm, drives and gripper; settings of the simulator's own controller and line are not used.
+    /// Arm, drives and gripper. The settings of the simulator's own controller and serial line are not used.
     pub sim: SimConfig,
-    /// `true` if the joint bus has no other members.
+    /// `true` if no other node is on the joint bus.
     pub no_bus: bool,
-    /// Rate of the hosts, bit/s.
+    /// Rate of the hosts' serial lines, bit/s.
     pub baud: u32,
     /// Safety input and safety output.
     pub safety_pins: (Pin, Pin),
     /// Seed of the initial contents of RAM.
     pub seed: u64,
-    /// Previous contents of bank 2 of the flash; the program's own part overwrites them.
+    /// Previous contents of flash bank 2; the program's own part overwrites them.
     pub bank2: Bank2,
 }
 
@@ -56,7 +56,7 @@ impl Default for BoardConfig {
     }
 }
 
-/// The plant as members of the bus.
+/// The plant as nodes of the bus.
 struct Nodes {
     plant: Rc<RefCell<Plant>>,
     answers: Vec<jtc_sim::ReadyAnswer>,
@@ -70,7 +70,7 @@ impl CanPeers for Nodes {
         for (delay, answer) in self.answers.drain(..) {
             let frame =
                 Id::standard(u32::from(answer.id)).and_then(|id| CanFrame::fd_padded(id, answer.data()));
-            // Every frame of the joint bus has such an id and length.
+            // Every frame of the joint bus has a valid identifier and length.
             let Ok(frame) = frame else { continue };
             answers.push((end + u64::from(delay) * MICROSECOND, frame.with_brs(true)));
         }
@@ -81,7 +81,7 @@ impl CanPeers for Nodes {
     }
 }
 
-/// Machine and plant, advanced one millisecond at a time.
+/// The machine and the plant, which advance one millisecond at a time.
 pub struct Board {
     /// The machine.
     pub machine: Machine,
@@ -92,7 +92,7 @@ pub struct Board {
 }
 
 impl Board {
-    /// Switches the power on everywhere.
+    /// Creates the board and the plant, and switches on the power of both.
     pub fn new(elf: Elf, config: &BoardConfig) -> Self {
         let plant = Rc::new(RefCell::new(Plant::new(&config.sim)));
         let mut machine = Machine::with_bank2(elf, config.seed, config.bank2.clone());
@@ -113,7 +113,7 @@ impl Board {
         self.ms
     }
 
-    /// Advances everything by one millisecond: first the machine and the bus, then drives and arm.
+    /// Advances everything by one millisecond: first the machine and the bus, then the drives and the arm.
     pub fn step(&mut self) {
         self.ms += 1;
         self.machine.run_until(self.ms * MILLISECOND);
@@ -133,8 +133,8 @@ impl Board {
         self.plant.borrow()
     }
 
-    /// Begins a fault of a node, of the arm, of the safety input or of the bus; `FaultKind`s of the simulator's own
-    /// serial line and tick have no effect here.
+    /// Begins a fault of a node, of the arm, of the safety input or of the bus. Faults (`FaultKind`) of the simulator's
+    /// own serial line and tick have no effect here.
     pub fn inject(&mut self, kind: FaultKind) {
         self.plant.borrow_mut().begin(kind);
         self.faults.push(kind);
@@ -161,13 +161,13 @@ impl Board {
         chip.drive_pin(self.safety.0, Some(input));
     }
 
-    /// Drives the safety input; `None`: the wire is broken.
+    /// Drives the safety input; `None` means a broken wire.
     pub fn set_safety_input(&mut self, level: Option<bool>) {
         let pin = self.safety.0;
         self.machine.chip().drive_pin(pin, level);
     }
 
-    /// Returns the level of the safety output; `None` while the pin is not driven.
+    /// Returns the level of the safety output; `None` if the pin is not driven.
     pub fn safety_output(&mut self) -> Option<bool> {
         let pin = self.safety.1;
         self.machine.chip().gpio.output(pin)
@@ -185,29 +185,29 @@ impl Board {
         self.machine.chip().usarts[Self::index(port)].host_baud = baud;
     }
 
-    /// Returns the rate that the firmware has set at a port, bit/s; 0: none.
+    /// Returns the rate that the firmware has set at a port, bit/s; 0 if it has set none.
     pub fn firmware_baud(&self, port: Port) -> u32 {
         self.machine.uc.get_data().usarts[Self::index(port)].baud()
     }
 
-    /// Sends bytes of the host, after those that already wait.
+    /// Sends bytes from the host, after bytes that are already waiting.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         let chip = self.machine.chip();
         let now = chip.now();
         chip.usarts[Self::index(port)].host_write(now, bytes);
     }
 
-    /// Returns the number of bytes of the host that have not passed the line yet.
+    /// Returns the number of host bytes that have not been transmitted on the line yet.
     pub fn pending(&self, port: Port) -> usize {
         self.machine.uc.get_data().usarts[Self::index(port)].host_pending()
     }
 
-    /// Returns the bytes that have reached the host since the last call, with their times.
+    /// Returns the bytes that the host has received since the last call, with their times.
     pub fn read_timed(&mut self, port: Port) -> Vec<WireByte> {
         self.machine.chip().usarts[Self::index(port)].take_output().collect()
     }
 
-    /// Returns the bytes that have reached the host since the last call.
+    /// Returns the bytes that the host has received since the last call.
     pub fn read(&mut self, port: Port) -> Vec<u8> {
         self.read_timed(port).into_iter().map(|b| b.byte).collect()
     }

@@ -1,4 +1,4 @@
-//! Everything around the core: peripherals by address, their clocks, their interrupt lines, and virtual time.
+//! Everything around the core: the peripherals' address map, clocks and interrupt lines, and virtual time.
 mod access;
 mod map;
 
@@ -31,39 +31,39 @@ const USART_LINES: [usize; 2] = [38, 39];
 /// Interrupt lines of FDCAN1.
 const FDCAN_LINES: [usize; 2] = [19, 21];
 
-/// Number of accesses to a register that these models do not implement.
+/// Number of accesses to a register without a model.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Access {
     /// Reads.
     pub reads: u32,
     /// Writes.
     pub writes: u32,
-    /// Address of the last instruction that accessed it.
+    /// Address of the last instruction that accessed the register.
     pub pc: u32,
-    /// Value that was written last.
+    /// Value written last.
     pub value: u32,
 }
 
-/// State of the core that the hook of every instruction accesses.
+/// State of the core that the hook before every instruction accesses.
 #[derive(Default)]
 pub struct Core {
     /// Instructions executed.
     pub instructions: u64,
-    /// Count at which the hook checks more.
+    /// Instruction count at which the hook makes further checks.
     pub look_at: u64,
-    /// Count before which the machine must stop.
+    /// Instruction count before which the machine must stop.
     pub stop_at: u64,
-    /// Address of the last instruction that began.
+    /// Address of the last instruction that was started.
     pub pc: u32,
-    /// Addresses of the members of the last IT block.
+    /// Addresses of the instructions in the last IT block.
     pub it_block: Range<u32>,
     /// `true` if a stop was requested.
     pub stopping: bool,
-    /// `true` after a change that the loop must handle before the next instruction.
+    /// `true` after a change that the main loop must handle before the next instruction.
     pub attention: bool,
     /// `true` if a pending exception is blocked only by masks.
     pub masked: bool,
-    /// `true` if the instruction before may have lowered the stack pointer.
+    /// `true` if the previous instruction may have lowered the stack pointer.
     pub check_sp: bool,
     /// Event register.
     pub event: bool,
@@ -71,9 +71,9 @@ pub struct Core {
     pub raised: Option<u32>,
     /// Address of an access that failed.
     pub fault_address: u32,
-    /// Address of an access that the bus or the protection unit refused.
+    /// Address of an access that the bus or the protection unit rejected.
     pub refused: Option<u32>,
-    /// Exceptions that run, innermost last.
+    /// Active exceptions, the innermost last.
     pub contexts: Vec<usize>,
 }
 
@@ -81,17 +81,17 @@ pub struct Core {
 pub struct Chip {
     /// Core.
     pub core: Core,
-    /// Classes of the instructions.
+    /// Classes of the instructions in memory.
     pub code: Code,
     /// Interrupts.
     pub nvic: Nvic,
-    /// The core's registers.
+    /// Registers of the core.
     pub scs: Scs,
     /// Clocks and resets.
     pub rcc: Rcc,
     /// Pins.
     pub gpio: Gpio,
-    /// Edges of pins.
+    /// Edge detection of pins.
     pub exti: Exti,
     /// DMA1, DMA2.
     pub dma: Dma,
@@ -112,7 +112,7 @@ pub struct Chip {
     pub unknown: BTreeMap<u32, Access>,
     /// Accesses to peripherals whose clock is off.
     pub unclocked: BTreeMap<u32, Access>,
-    /// `true` if the set of usable D2 SRAM has changed.
+    /// `true` if the usable D2 SRAM has changed.
     pub remap: bool,
     base_time: Time,
     base_instructions: u64,
@@ -158,7 +158,7 @@ impl Chip {
         self.base_time + (self.core.instructions - self.base_instructions) * self.cycle
     }
 
-    /// Returns the core clock cycles, sleep included.
+    /// Returns the number of core clock cycles, including sleep.
     pub fn cycles(&self) -> u64 {
         self.base_cycles + (self.core.instructions - self.base_instructions)
     }
@@ -202,7 +202,7 @@ impl Chip {
         }
     }
 
-    /// Sets everything except memory as after a reset with these flags.
+    /// Sets everything except memory to the state after a reset with these reset flags.
     pub fn reset(&mut self, flags: u32) {
         let now = self.now();
         self.rcc.reset(flags);
@@ -226,7 +226,7 @@ impl Chip {
         self.update_clocks();
     }
 
-    /// Drives a pin from outside; `None` leaves it open. Its edges reach EXTI.
+    /// Drives a pin from outside; `None` leaves it open. EXTI detects the edges.
     pub fn drive_pin(&mut self, pin: Pin, level: Option<bool>) {
         let Some(port) = Gpio::port(pin) else { return };
         let before = self.gpio.levels(port);
@@ -243,7 +243,7 @@ impl Chip {
         }
     }
 
-    /// Executes everything up to now, and sets interrupt lines accordingly.
+    /// Executes all events up to now, and sets the interrupt lines accordingly.
     pub fn advance(&mut self, memory: &mut dyn Memory) {
         let now = self.now();
         for timer in &mut self.timers {

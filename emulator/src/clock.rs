@@ -1,19 +1,19 @@
-//! Virtual time, with a resolution at which a period of every clock of the board is a whole number.
+//! Virtual time. With its resolution, the period of every clock on the board is a whole number.
 
-/// Moment or duration of virtual time in grains: 1 s = [`SECOND`] grains.
+/// Point or duration in virtual time, in grains: 1 s = [`SECOND`] grains.
 pub type Time = u64;
 
-/// Grains in a second: the least common multiple of 64, 85, 400 and 480 MHz, so that core clock, CAN bits and timer ticks
-/// never drift against each other by rounding.
+/// Grains per second: the least common multiple of 64, 85, 400 and 480 MHz, so that core clock, CAN bits and timer
+/// ticks do not drift against each other through rounding.
 pub const SECOND: Time = 81_600_000_000;
-/// Grains in a millisecond.
+/// Grains per millisecond.
 pub const MILLISECOND: Time = SECOND / 1_000;
-/// Grains in a microsecond.
+/// Grains per microsecond.
 pub const MICROSECOND: Time = SECOND / 1_000_000;
 /// Time that is never reached.
 pub const NEVER: Time = Time::MAX;
 
-/// Returns the length of one period of a clock, rounded to the grain.
+/// Returns the period of a clock, rounded to the nearest grain.
 pub fn period(hz: u64) -> Time {
     (SECOND + hz / 2).checked_div(hz).unwrap_or(NEVER)
 }

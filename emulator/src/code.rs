@@ -1,8 +1,8 @@
-//! Properties that the machine must know of an instruction before it runs, stored per address.
+//! Properties of an instruction that the machine must know before executing it, stored per address.
 //!
-//! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the members of an IT
-//! block whose condition is false. Therefore the few instructions that matter are recognised by their first half-words,
-//! the first time an address is executed.
+//! Unicorn executes `SEV` without effect, does not report changes of the stack pointer, and skips the instructions of
+//! an IT block whose condition is false. These few instructions are therefore recognised by their first half-words when
+//! an address is executed for the first time.
 
 /// The address has not been checked yet.
 pub const UNKNOWN: u16 = 0;
@@ -14,12 +14,13 @@ pub const SEV: u16 = 2;
 pub const LOWERS_SP: u16 = 4;
 /// An observer waits for this address.
 pub const WATCHED: u16 = 8;
-/// Begins an IT block, whose members are counted with it: the core fetches and issues them all, regardless of the
-/// condition.
+/// Begins an IT block. All instructions of the block are counted with it, because the core fetches and issues them all,
+/// regardless of the condition.
 pub const IT: u16 = 16;
-/// Member of an IT block.
+/// Instruction inside an IT block.
 pub const MEMBER: u16 = 32;
-/// Position of the number of members, and of the number of their half-words, in the class of an IT instruction.
+/// Bit positions in the class of an IT instruction: number of instructions in the block, and number of their
+/// half-words.
 const MEMBERS: u32 = 8;
 const HALF_WORDS: u32 = 12;
 
@@ -27,7 +28,7 @@ const FLASH: u32 = 0x0800_0000;
 const FLASH_SIZE: u32 = 0x20_0000;
 const ITCM_SIZE: u32 = 0x1_0000;
 
-/// Classes of the instructions in ITCM and flash; elsewhere every instruction is checked each time.
+/// Classes of the instructions in ITCM and flash. Instructions in other memory are classified each time.
 pub struct Code {
     flash: Vec<u16>,
     itcm: Vec<u16>,
@@ -58,14 +59,14 @@ impl Code {
         self.itcm.get_mut(address as usize / 2)
     }
 
-    /// Stores a class; keeps the observers' mark and the mark of an IT block member.
+    /// Stores a class. Keeps the marks for observers and for instructions inside an IT block.
     pub fn learn(&mut self, address: u32, class: u16) {
         if let Some(place) = self.place(address) {
             *place = class | *place & (WATCHED | MEMBER);
         }
     }
 
-    /// Makes the machine stop at an address; returns `false` if code there cannot be watched.
+    /// Makes the machine stop at an address. Returns `false` if code at this address cannot be watched.
     pub fn watch(&mut self, address: u32) -> bool {
         match self.place(address) {
             Some(place) => {
@@ -76,7 +77,7 @@ impl Code {
         }
     }
 
-    /// Drops the classes of bytes that were written from outside; returns `true` if they may be code.
+    /// Removes the classes of bytes that were written from outside. Returns `true` if the bytes may be code.
     pub fn forget(&mut self, address: u32, length: u32) -> bool {
         let mut code = false;
         for at in address..address.saturating_add(length) {
@@ -87,7 +88,7 @@ impl Code {
         code
     }
 
-    /// Drops the classes of ITCM, because it was or will be refilled.
+    /// Removes the classes of ITCM, because its contents have changed or will change.
     pub fn forget_itcm(&mut self) {
         for place in &mut self.itcm {
             *place &= WATCHED;
@@ -95,7 +96,7 @@ impl Code {
     }
 }
 
-/// Returns the class of an instruction by its first two half-words.
+/// Returns the class of an instruction from its first two half-words.
 pub fn classify(first: u16, second: u16) -> u16 {
     let lowers = first & 0xFE00 == 0xB400 // PUSH
         || first & 0xFF80 == 0xB080 // SUB SP, #
@@ -118,24 +119,25 @@ pub fn classify(first: u16, second: u16) -> u16 {
     }
 }
 
-/// Returns the IT block that an instruction of this class begins: number of its members, and their length in bytes.
+/// Returns the size of the IT block that an instruction of this class begins: number of instructions, and length in
+/// bytes.
 pub fn block(class: u16) -> (u32, u32) {
     (u32::from(class >> MEMBERS) & 7, 2 * (u32::from(class >> HALF_WORDS) & 15))
 }
 
-/// Returns the class of an IT instruction with this number of members and bytes.
+/// Returns the class of an IT instruction whose block has this number of instructions and bytes.
 pub fn begins_block(members: u32, bytes: u32) -> u16 {
     IT | ((members << MEMBERS) | ((bytes / 2) << HALF_WORDS)) as u16
 }
 
-/// Returns the number of members of the IT block that an instruction with this first half-word begins; 0: it does not
-/// begin one.
+/// Returns the number of instructions in the IT block that an instruction with this first half-word begins; 0 if it
+/// does not begin one.
 pub fn it_block(first: u16) -> u32 {
-    // The lowest set bit of the mask ends the block; without a set bit the instruction is a hint.
+    // The lowest set bit of the mask ends the block. If no bit is set, the instruction is a hint.
     if first & 0xFF00 == 0xBF00 && first & 0xF != 0 { 4 - (first & 0xF).trailing_zeros() } else { 0 }
 }
 
-/// Returns the length in bytes of an instruction with this first half-word.
+/// Returns the length in bytes of an instruction from its first half-word.
 pub fn length(first: u16) -> u32 {
     if first >= 0xE800 { 4 } else { 2 }
 }
@@ -144,7 +146,7 @@ pub fn length(first: u16) -> u32 {
 mod tests {
     use super::*;
 
-    /// Encodings by the Arm v7-M Architecture Reference Manual, A7.7.38: one to four members.
+    /// Encodings from the Arm v7-M Architecture Reference Manual, A7.7.38, for blocks of one to four instructions.
     #[test]
     fn an_it_block_ends_where_its_mask_does() {
         for (first, members) in

@@ -1,8 +1,8 @@
-//! The Cortex-M7 itself: Unicorn executes instructions; this loop provides time, exceptions and sleep.
+//! The Cortex-M7 core. Unicorn executes the instructions; the loop in this module provides time, exceptions and sleep.
 //!
 //! Every instruction takes one cycle of the core clock. A hook before each instruction counts it and stops the run
-//! exactly when the next event is due. An IT block is counted at its beginning, with all its members, because the
-//! hardware also takes time for members that the condition skips; it is never interrupted.
+//! exactly when the next event is due. An IT block is counted at its beginning with all its instructions, because the
+//! hardware also takes time for instructions that the condition skips. An IT block is never interrupted.
 use unicorn_engine::unicorn_const::{Arch, HookType, Mode, uc_error};
 use unicorn_engine::{ArmCpuModel, RegisterARM, Unicorn};
 
@@ -18,7 +18,7 @@ use crate::nvic::{self, Masks};
 use crate::observe::{FaultKind, Reset, ResetCause};
 use crate::rcc::flag;
 
-/// Numbers that Unicorn gives to exceptions of the core.
+/// Numbers that Unicorn uses for exceptions of the core.
 mod raised {
     pub const SVC: u32 = 2;
     pub const PREFETCH_ABORT: u32 = 3;
@@ -26,15 +26,15 @@ mod raised {
     pub const EXCEPTION_EXIT: u32 = 8;
 }
 
-/// Addresses from here on are exception returns.
+/// Branches to this address and above are exception returns.
 const EXC_RETURN: u32 = 0xFFFF_FFE0;
 
 impl Machine {
-    /// Creates a board with this firmware in its flash and switches the power on. `seed` determines the contents of RAM
-    /// before it is written.
+    /// Creates a board with this firmware in its flash, and switches the power on. `seed` determines the initial
+    /// contents of RAM.
     ///
     /// # Panics
-    /// If Unicorn refuses its set-up, which no input can cause.
+    /// If Unicorn refuses its configuration, which no input can cause.
     pub fn new(elf: Elf, seed: u64) -> Self {
         Self::with_bank2(elf, seed, Bank2::default())
     }
@@ -42,7 +42,7 @@ impl Machine {
     /// Like [`Machine::new`], with the previous contents of bank 2 of the flash.
     ///
     /// # Panics
-    /// As [`Machine::new`].
+    /// Same as [`Machine::new`].
     pub fn with_bank2(elf: Elf, seed: u64, bank: Bank2) -> Self {
         let mut uc = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, Chip::default()).expect("Unicorn");
         uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M7 as i32).expect("the model of the core");
@@ -52,7 +52,7 @@ impl Machine {
         uc.get_data_mut().flash.bank = bank;
         let mut machine = Self { uc, elf, sleep: Sleep::Awake };
         for (address, bytes) in machine.elf.segments.clone() {
-            // Segments for places that this board does not have are ignored: they are the linker's responsibility.
+            // Segments outside the memory of this board are ignored; the linker checks them.
             machine.poke(address, &bytes);
         }
         let reset = Reset { time: 0, cause: ResetCause::PowerOn, pc: 0 };
@@ -61,7 +61,7 @@ impl Machine {
         machine
     }
 
-    /// Runs until a moment of virtual time.
+    /// Runs until a point in virtual time.
     pub fn run_until(&mut self, end: Time) {
         while self.now() < end {
             self.slice(end);
@@ -69,7 +69,7 @@ impl Machine {
         self.catch_up();
     }
 
-    /// Resets the machine, by the reset pin or SYSRESETREQ: RAM and reset flags stay.
+    /// Resets the machine by the reset pin or by SYSRESETREQ. RAM and reset flags are kept.
     pub fn reset(&mut self, cause: ResetCause) {
         let flags = match cause {
             ResetCause::PowerOn => flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU,
@@ -104,7 +104,7 @@ impl Machine {
         self.remap();
     }
 
-    /// Runs up to the next event, but not beyond `end`.
+    /// Runs up to the next event, or to `end` if that is earlier.
     fn slice(&mut self, end: Time) {
         self.catch_up();
         let chip = self.uc.get_data_mut();
@@ -151,7 +151,7 @@ impl Machine {
         self.execute();
     }
 
-    /// Ends a sleep if its condition is met.
+    /// Ends a sleep if its wake-up condition is met.
     fn wake(&mut self, masks: Masks) {
         let chip = self.uc.get_data_mut();
         let pended = core::mem::take(&mut chip.nvic.pended);
@@ -230,7 +230,7 @@ impl Machine {
     }
 }
 
-/// Installs the hooks of instructions, raised exceptions and failed accesses.
+/// Installs the hooks for instructions, raised exceptions and failed accesses.
 fn hook(uc: &mut Unicorn<'static, Chip>) {
     let code = uc.add_code_hook(1, 0, |uc, address, _| {
         let chip = uc.get_data_mut();
@@ -246,7 +246,7 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
         uc.get_data_mut().core.raised = Some(number);
         let _ = uc.emu_stop();
     });
-    // A hook over all of memory would send every store through a slow path.
+    // A hook on all of the memory would slow down every store.
     let invalid = memory::FORBIDDEN.into_iter().all(|(first, last)| {
         let note = |uc: &mut Unicorn<'_, Chip>, _, address: u64, _, _| {
             uc.get_data_mut().core.fault_address = address as u32;
@@ -257,11 +257,11 @@ fn hook(uc: &mut Unicorn<'static, Chip>) {
     assert!(code.is_ok() && raised.is_ok() && invalid, "Unicorn takes hooks");
 }
 
-/// Checks an instruction that needs special handling before it runs.
+/// Handles an instruction that needs special treatment, before it runs.
 fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
     let chip = uc.get_data_mut();
     if chip.core.it_block.contains(&address) {
-        // The instruction was counted at the beginning of its block, and the run must not stop within the block.
+        // The instruction was counted at the beginning of its IT block, and the run must not stop within the block.
         chip.core.pc = address;
         return;
     }
@@ -276,7 +276,7 @@ fn look(uc: &mut Unicorn<'_, Chip>, address: u32) {
         let core = &mut uc.get_data_mut().core;
         core.stopping = true;
         core.look_at = 0;
-        // The instruction before this one is complete: a run may be stopped only here.
+        // The previous instruction is complete. A run may only be stopped here.
         let _ = uc.emu_stop();
         return;
     }
@@ -332,7 +332,7 @@ fn half_word(uc: &Unicorn<'_, Chip>, address: u32) -> u16 {
     u16::from_le_bytes(bytes)
 }
 
-/// Returns `true` if the masks no longer block a waiting exception.
+/// Returns `true` if the masks no longer block a pending exception.
 fn unmasked(uc: &Unicorn<'_, Chip>) -> bool {
     let read = |register: RegisterARM| uc.reg_read(register).unwrap_or(0);
     let masks = Masks {

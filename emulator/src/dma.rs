@@ -1,5 +1,5 @@
-//! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): transfers between a peripheral and memory, one at a time, circular or
-//! not, with their half and full flags.
+//! DMA1, DMA2 and DMAMUX1 (RM0399 chapters 15 to 18): single transfers between a peripheral and memory, circular or
+//! not, with half-transfer and transfer-complete flags.
 
 /// Number of streams of both controllers: DMA1 0..8, DMA2 8..16.
 pub const STREAMS: usize = 16;
@@ -10,7 +10,7 @@ const TO_PERIPHERAL: u32 = 0x40;
 const CIRC: u32 = 0x100;
 const MINC: u32 = 0x400;
 
-/// Flags of a stream within its six bits of LISR, HISR.
+/// Flags of a stream, as positions within its six bits of LISR or HISR.
 const HTIF: u32 = 1 << 4;
 const TCIF: u32 = 1 << 5;
 const TEIF: u32 = 1 << 3;
@@ -18,7 +18,7 @@ const TEIF: u32 = 1 << 3;
 /// Interrupt lines of the streams.
 pub const LINES: [usize; STREAMS] = [11, 12, 13, 14, 15, 16, 17, 47, 56, 57, 58, 59, 60, 68, 69, 70];
 
-/// Memory as a controller accesses it.
+/// Memory as the DMA controllers access it.
 pub trait Memory {
     /// Reads bytes; returns `false` at an unmapped address.
     fn read(&mut self, address: u32, bytes: &mut [u8]) -> bool;
@@ -29,7 +29,7 @@ pub trait Memory {
 #[derive(Clone, Copy, Default)]
 struct Stream {
     cr: u32,
-    /// NDTR as written, and the remaining count.
+    /// NDTR as written, and the number of transfers left.
     total: u32,
     left: u32,
     par: u32,
@@ -73,11 +73,11 @@ impl Stream {
 #[derive(Default)]
 pub struct Dma {
     streams: [Stream; STREAMS],
-    /// Transfers to or from addresses that DMA1 and DMA2 do not reach.
+    /// Number of transfers to or from addresses that DMA1 and DMA2 cannot access.
     pub errors: u32,
 }
 
-/// Returns `true` if DMA1 and DMA2 reach the address: not TCM, which is connected to the core only.
+/// Returns `true` if DMA1 and DMA2 can access the address. They cannot access TCM, which only the core can.
 fn reachable(address: u32) -> bool {
     !(address < 0x0001_0000 || (0x2000_0000..0x2002_0000).contains(&address))
 }
@@ -129,7 +129,7 @@ impl Dma {
                 match (offset - 0x10) % 0x18 {
                     0x00 => {
                         if enabled && value & EN == 0 {
-                            // A stream that is switched off while it runs ends with this flag.
+                            // Switching off a running stream sets this flag.
                             stream.flags |= TCIF;
                         }
                         stream.cr = value;
@@ -214,12 +214,12 @@ impl Dma {
     /// Returns the level of the interrupt line of a stream.
     pub fn line(&self, stream: usize) -> bool {
         let s = &self.streams[stream];
-        // The enable bits TEIE, HTIE, TCIE have the same order as their flags.
+        // The enable bits TEIE, HTIE and TCIE are in the same order as their flags.
         s.flags & (s.cr & 0x1C) << 1 != 0
     }
 }
 
-/// Positions of four streams' flags in a status register.
+/// Bit positions of four streams' flags in a status register.
 const SHIFTS: [u32; 4] = [0, 6, 16, 22];
 
 #[cfg(test)]

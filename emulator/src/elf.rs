@@ -17,11 +17,11 @@ pub enum ElfError {
         /// Similar names.
         near: Vec<String>,
     },
-    /// More than one symbol has this part in its name.
+    /// More than one symbol contains this text in its name.
     Ambiguous {
-        /// Requested part.
+        /// Requested text.
         name: String,
-        /// Names that contain it.
+        /// Names of the symbols that contain it.
         found: Vec<String>,
     },
 }
@@ -51,7 +51,7 @@ impl From<object::Error> for ElfError {
 /// A symbol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Symbol {
-    /// Address, for a function without the Thumb bit.
+    /// Address; for a function, without the Thumb bit.
     pub address: u32,
     /// Size in bytes.
     pub size: u32,
@@ -59,7 +59,7 @@ pub struct Symbol {
     pub code: bool,
 }
 
-/// Contents of the file that are loaded.
+/// The parts of the file that are loaded into memory.
 #[derive(Clone, Debug, Default)]
 pub struct Elf {
     /// Load addresses and contents.
@@ -95,7 +95,7 @@ impl Elf {
         Ok(elf)
     }
 
-    /// Creates a firmware that consists only of these bytes at an address.
+    /// Creates a firmware that consists of these bytes at an address.
     pub fn from_image(address: u32, bytes: Vec<u8>) -> Self {
         Self { segments: vec![(address, bytes)], symbols: BTreeMap::new() }
     }
@@ -106,7 +106,7 @@ impl Elf {
         self
     }
 
-    /// Finds a symbol by its full name, or by a part of the name that no other symbol contains. Rust names are written
+    /// Finds a symbol by its full name, or by a part of the name that no other symbol contains. Rust names are spelled
     /// as in the source, without the hash.
     pub fn symbol(&self, name: &str) -> Result<Symbol, ElfError> {
         if let Some(symbol) = self.symbols.get(name) {

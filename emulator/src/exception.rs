@@ -1,5 +1,5 @@
-//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The frame always has room for the floating-point
-//! registers, which is the larger of the two frames of the hardware.
+//! Entry to and return from exceptions (ARMv7-M B1.5.6 to B1.5.8). The frame always includes the floating-point
+//! registers; it is the larger of the two frames of the hardware.
 use unicorn_engine::RegisterARM::{self, *};
 
 use crate::machine::Machine;
@@ -7,16 +7,16 @@ use crate::observe::FaultKind;
 
 const BASIC: [RegisterARM; 6] = [R0, R1, R2, R3, R12, LR];
 const FLOATS: [RegisterARM; 8] = [D0, D1, D2, D3, D4, D5, D6, D7];
-/// Words of the frame.
+/// Number of words in the frame.
 const WORDS: usize = 26;
 /// Position of FPSCR in the frame.
 const FPSCR_AT: usize = 24;
 
-/// Return to a handler, or to a thread with an extended frame on the main stack.
+/// Return values: to a handler, and to a thread with an extended frame on the main stack.
 const TO_HANDLER: u32 = 0xFFFF_FFE1;
 const TO_THREAD: u32 = 0xFFFF_FFE9;
 
-/// Bit of the stacked xPSR that marks a padding word.
+/// Bit of the stacked xPSR that indicates a padding word.
 const ALIGNED: u32 = 1 << 9;
 
 /// Enters the handler of an exception.
@@ -54,7 +54,7 @@ pub fn enter(machine: &mut Machine, exception: usize) {
     machine.set(PC, handler | 1);
     machine.chip().observers.note_sp(frame_at);
     if !stacked {
-        // The stack has run out of RAM.
+        // The stack has overflowed its RAM.
         machine.chip().core.fault_address = frame_at;
         machine.fault(FaultKind::BadAccess, handler);
     }
@@ -90,7 +90,7 @@ pub fn leave(machine: &mut Machine, to: u32) {
     machine.set(XPSR_NZCVQG, xpsr & !ALIGNED);
     let padding = if xpsr & ALIGNED != 0 { 4 } else { 0 };
     machine.set(SP, sp + 4 * WORDS as u32 + padding);
-    // FAULTMASK is cleared by the return from any exception but NMI.
+    // The return from any exception except NMI clears FAULTMASK.
     machine.set(FAULTMASK, 0);
     machine.set(PC, word(6) | 1);
 }

@@ -1,15 +1,16 @@
-//! Extended interrupt and event controller, for pins only (RM0399, EXTI and SYSCFG_EXTICR1..4): edges of a pin set
-//! pending bits that stay until a 1 is written to them.
+//! Extended interrupt and event controller, for pins only (RM0399, EXTI and SYSCFG_EXTICR1..4). The edges of a pin set
+//! pending bits, which stay set until a 1 is written to them.
 
-/// Lines of pins.
+/// Number of lines that pins can use.
 const LINES: usize = 16;
 
-/// Registers of lines 0..15, those of core 1.
+/// Registers of lines 0..15, as core 1 sees them.
 #[derive(Clone, Debug, Default)]
 pub struct Exti {
     rtsr: u32,
     ftsr: u32,
-    /// Interrupt mask of core 1. A masked line gets no pending bit here, which is the stricter reading of the manual.
+    /// Interrupt mask of core 1. In this model a masked line gets no pending bit, which is the stricter interpretation
+    /// of the manual.
     imr: u32,
     emr: u32,
     pending: u32,
@@ -74,7 +75,7 @@ mod tests {
     #[test]
     fn a_falling_edge_stays_pending_until_a_1_is_written() {
         let mut exti = Exti::default();
-        // Line 3 from port D.
+        // Connects line 3 to port D.
         exti.set_source(0, 3 << 12);
         exti.write(0x04, 1 << 3);
         exti.edges(3, 1 << 3, 0);

@@ -1,6 +1,6 @@
-//! Bank 2 of the embedded flash (RM0399 chapter 4): erasing and programming take time, a read during an operation halts
-//! the core, and a loss of power during an operation leaves undefined contents. Bank 1 holds the program and stays
-//! locked.
+//! Bank 2 of the embedded flash (RM0399 chapter 4). Erasing and programming take time, a read during an operation
+//! stalls the core, and a loss of power during an operation leaves undefined contents. Bank 1 contains the program and
+//! stays locked.
 mod bank;
 
 use crate::clock::{MICROSECOND, SECOND, Time};
@@ -10,7 +10,7 @@ pub use bank::{BANK2, BANK2_SIZE, Bank2, WORD};
 
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// Register offsets of bank 1; those of bank 2 are [`SECOND_BANK`] higher.
+/// Register offsets of bank 1. The offsets of bank 2 are higher by [`SECOND_BANK`].
 mod reg {
     pub const KEYR: u32 = 0x04;
     pub const CR: u32 = 0x0C;
@@ -26,43 +26,43 @@ mod cr {
     pub const SER: u32 = 1 << 2;
     pub const START: u32 = 1 << 7;
     pub const EOPIE: u32 = 1 << 16;
-    /// After a reset: locked, 64 bits at once.
+    /// Value after a reset: locked, 64 bits at once.
     pub const RESET: u32 = 0x31;
 }
 
 /// Bits of SR.
 pub mod sr {
-    /// An operation runs.
+    /// An operation is running.
     pub const BSY: u32 = 1 << 0;
-    /// Some bytes of a word have arrived, but not all.
+    /// Some bytes of a word were written, but not all.
     pub const WBNE: u32 = 1 << 1;
-    /// An operation runs or waits.
+    /// An operation is running or waiting.
     pub const QW: u32 = 1 << 2;
-    /// An operation has ended well, if its interrupt is enabled.
+    /// An operation has ended without an error (only set if its interrupt is enabled).
     pub const EOP: u32 = 1 << 16;
-    /// Write protection.
+    /// A write-protected sector was accessed.
     pub const WRPERR: u32 = 1 << 17;
-    /// Programming without having enabled it.
+    /// A word was written while programming was not enabled.
     pub const PGSERR: u32 = 1 << 18;
     /// A byte was written twice.
     pub const STRBERR: u32 = 1 << 19;
-    /// Bytes of another word before the first was complete.
+    /// Bytes of another word were written before the first word was complete.
     pub const INCERR: u32 = 1 << 21;
     /// The operation failed.
     pub const OPERR: u32 = 1 << 22;
-    /// More bits of a word are wrong than can be corrected.
+    /// A word has more wrong bits than can be corrected.
     pub const DBECCERR: u32 = 1 << 26;
 }
 
-/// Kind of operation of the bank.
+/// Kind of a flash operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OperationKind {
-    /// A sector becomes all ones.
+    /// Erasing a sector, after which all its bits are 1.
     Erase {
         /// Number of the sector.
         sector: usize,
     },
-    /// A word is programmed.
+    /// Programming a word.
     Program {
         /// Address of the word.
         address: u32,
@@ -90,26 +90,26 @@ pub struct Flash {
     pub program_time: Time,
     /// All operations, oldest first.
     pub operations: Vec<Operation>,
-    /// Reads and writes that waited for an operation: the moment, and the time for which the core stood still.
+    /// Reads and writes that waited for an operation: time, and duration for which the core was stalled.
     pub stalls: Vec<(Time, Time)>,
-    /// Number of accesses to the bank as memory that the core may cache or read ahead of the program.
+    /// Number of accesses to the bank while it was configured as memory that the core may cache or prefetch.
     pub ahead: u32,
-    /// Number of words that were programmed again without being erased.
+    /// Number of words that were programmed again without being erased first.
     pub overwrites: u32,
-    /// Longest time within an operation during which the protection unit would have allowed the core to read the bank.
+    /// Longest time during an operation in which the protection unit permitted reads of the bank.
     pub longest_open: Time,
-    /// Bits of SR in which the next operation ends.
+    /// Bits of SR that the next operation sets at its end.
     pub fail_next: u32,
     /// `true` if the program has unlocked bank 1.
     pub bank1_unlocked: bool,
-    /// Number of resets: seed of the contents that an interrupted operation leaves.
+    /// Number of resets, used as the seed of the contents after an interrupted operation.
     torn: u64,
     cr: u32,
     sr: u32,
-    /// Keys that were written; after more than two, unlocking is refused until a reset.
+    /// Number of keys written. After more than two, unlocking is refused until a reset.
     keys: usize,
     running: Option<Operation>,
-    /// Word that is being written: its number, its bytes, and a mask of the bytes that have arrived.
+    /// Word that is being written: its index, its bytes, and a mask of the bytes written so far.
     buffer: Option<(usize, [u8; WORD], u32)>,
     open_since: Option<Time>,
 }
@@ -118,7 +118,7 @@ impl Default for Flash {
     fn default() -> Self {
         Self {
             bank: Bank2::default(),
-            // Typical values of the data sheet, 32 bits at once.
+            // Typical values of the data sheet for programming 32 bits at once.
             erase_time: 2 * SECOND,
             program_time: 130 * MICROSECOND,
             operations: Vec::new(),
@@ -140,7 +140,7 @@ impl Default for Flash {
 }
 
 impl Flash {
-    /// Sets the registers as after a reset; interrupts a running operation.
+    /// Sets the registers to their values after a reset. A running operation is interrupted.
     pub fn reset(&mut self, now: Time) {
         self.torn += 1;
         self.bank = self.cut(now, self.torn);
@@ -148,7 +148,7 @@ impl Flash {
         self.open_since = None;
     }
 
-    /// Returns the contents of the bank if the power fails now.
+    /// Returns the contents of the bank after a power failure at this moment.
     pub fn cut(&self, now: Time, seed: u64) -> Bank2 {
         let mut bank = self.bank.clone();
         if let Some(operation) = self.running.filter(|o| o.start < now) {
@@ -158,12 +158,12 @@ impl Flash {
         bank
     }
 
-    /// Returns the end of the operation that runs now.
+    /// Returns the end of the operation that is running now.
     pub fn busy_until(&self, now: Time) -> Option<Time> {
         self.running.map(|operation| operation.end).filter(|end| *end > now)
     }
 
-    /// Applies the operation that has ended by now.
+    /// Applies the operation if it has ended by now.
     pub fn advance(&mut self, now: Time) {
         let Some(operation) = self.running.take_if(|operation| operation.end <= now) else { return };
         self.guard(operation.end, true);
@@ -187,7 +187,7 @@ impl Flash {
         }
     }
 
-    /// Notes that the protection unit blocks or allows access of the core from now on.
+    /// Records that the protection unit blocks or permits accesses of the core from now on.
     pub fn guard(&mut self, now: Time, closed: bool) {
         if closed {
             let open = self.open_since.take().map_or(0, |since| now.saturating_sub(since));
@@ -208,7 +208,7 @@ impl Flash {
         self.guard(now, closed);
     }
 
-    /// Reads a register; returns `None` for those that are plain memory to every program.
+    /// Reads a register; returns `None` for registers that are modelled as plain memory.
     pub fn read_register(&mut self, offset: u32, now: Time) -> Option<u32> {
         self.advance(now);
         Some(match offset {
@@ -228,8 +228,8 @@ impl Flash {
         })
     }
 
-    /// Writes a register; returns `false` for those that are plain memory. `closed`: the protection unit blocks access
-    /// of the core to the bank.
+    /// Writes a register; returns `false` for registers that are modelled as plain memory. `closed` means that the
+    /// protection unit blocks accesses of the core to the bank.
     pub fn write_register(&mut self, offset: u32, value: u32, now: Time, closed: bool) -> bool {
         self.advance(now);
         match offset {
@@ -272,7 +272,7 @@ impl Flash {
         }
     }
 
-    /// Handles a read by the core; the flag shows that the word cannot be read.
+    /// Handles a read by the core. The flag is `true` if the word is unreadable.
     pub fn load(&mut self, address: u32, size: usize) -> (u32, bool) {
         let at = (address - BANK2) as usize;
         let bad = self.bank.cells[at / WORD] == Cell::Unreadable;
@@ -283,7 +283,7 @@ impl Flash {
         (bytes.rev().fold(0, |value, byte| value << 8 | u32::from(*byte)), bad)
     }
 
-    /// Handles a write by the core; no operation may run.
+    /// Handles a write by the core. No operation may be running.
     pub fn store(&mut self, address: u32, size: usize, value: u32, now: Time, closed: bool) {
         let at = (address - BANK2) as usize;
         let (n, first) = (at / WORD, at % WORD);

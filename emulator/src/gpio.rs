@@ -1,4 +1,4 @@
-//! Pins (RM0399 chapter 12): driven from outside, with a record of every change that the firmware makes.
+//! Pins (RM0399 chapter 12) that can be driven from outside, with a record of every change that the firmware makes.
 use crate::clock::Time;
 
 /// A pin: port letter and number.
@@ -27,14 +27,14 @@ struct Port {
     odr: u32,
     lckr: u32,
     afr: [u32; 2],
-    /// Levels that are driven from outside, at the bits that are set in `driven`.
+    /// Levels driven from outside, valid for the pins whose bits are set in `driven`.
     outside: u16,
     driven: u16,
 }
 
 impl Port {
     fn new(index: usize) -> Self {
-        // After reset the debug pins have their alternate function.
+        // After a reset the debug pins have their alternate function.
         let (moder, pupdr) = match index {
             0 => (0xABFF_FFFF, 0x6400_0000),
             1 => (0xFFFF_FEBF, 0x0000_0100),
@@ -47,7 +47,8 @@ impl Port {
         self.moder >> (2 * pin) & 3 == 1
     }
 
-    /// Returns the levels on the pins: the own output, else the outside level, else the pull resistor.
+    /// Returns the levels on the pins. For each pin this is the port's output, else the outside level, else the pull
+    /// resistor's level.
     fn idr(&self) -> u32 {
         (0..16).fold(0, |word, pin| {
             let outside = u32::from(self.outside) >> pin & 1;
@@ -80,7 +81,7 @@ impl Default for Gpio {
 }
 
 impl Gpio {
-    /// Resets all ports: all pins are inputs again. Levels that are driven from outside stay.
+    /// Resets all ports, so that all pins are inputs again. Levels driven from outside stay.
     pub fn reset(&mut self, now: Time) {
         for index in 0..PORTS {
             let before = self.ports[index].outputs();
@@ -138,7 +139,7 @@ impl Gpio {
         (index < PORTS && pin.1 < 16).then_some((index, u32::from(pin.1)))
     }
 
-    /// Returns the number of a pin's port, 0 for A.
+    /// Returns the port index of a pin, 0 for A.
     pub fn port(pin: Pin) -> Option<usize> {
         Self::place(pin).map(|(port, _)| port)
     }

@@ -1,4 +1,4 @@
-//! Independent watchdog 1 (RM0399 chapter 47): counts LSI periods down and resets the machine at zero.
+//! Independent watchdog 1 (RM0399 chapter 47), which counts LSI periods down and resets the machine at zero.
 use crate::clock::{NEVER, SECOND, Time};
 
 const LSI_HZ: u64 = 32_000;
@@ -11,7 +11,7 @@ pub struct Iwdg {
     window: u32,
     unlocked: bool,
     bites: Time,
-    /// Shortest remaining time at which the firmware fed the watchdog.
+    /// Shortest time left before a reset when the firmware fed the watchdog.
     pub least_left: Time,
 }
 
@@ -22,7 +22,7 @@ impl Default for Iwdg {
 }
 
 impl Iwdg {
-    /// Switches it off, as after any reset.
+    /// Switches the watchdog off, as every reset does.
     pub fn reset(&mut self) {
         *self = Self { least_left: self.least_left, ..Self::default() };
     }
@@ -62,13 +62,13 @@ impl Iwdg {
         }
     }
 
-    /// Returns the time from feeding to the reset.
+    /// Returns the time between feeding and the reset.
     pub fn timeout(&self) -> Time {
         let divider = 4 << self.prescaler.min(6);
         (u64::from(self.reload) + 1) * divider * SECOND / LSI_HZ
     }
 
-    /// Returns the time at which it resets the machine unless it is fed.
+    /// Returns the time at which the watchdog resets the machine if it is not fed.
     pub fn bites(&self) -> Time {
         self.bites
     }

@@ -1,4 +1,4 @@
-//! The machine from outside: registers, memory, faults. The module `cpu` runs it.
+//! Access to the machine from outside: registers, memory, faults. The module `cpu` runs it.
 use unicorn_engine::{RegisterARM, Unicorn};
 
 use crate::chip::Chip;
@@ -19,11 +19,11 @@ pub struct Machine {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sleep {
     Awake,
-    /// In WFI.
+    /// Sleeping in WFI.
     Interrupt,
-    /// In WFE.
+    /// Sleeping in WFE.
     Event,
-    /// Locked up: only a reset helps.
+    /// In lock-up, until a reset.
     Lockup,
 }
 
@@ -37,7 +37,7 @@ impl Machine {
         self.uc.get_data_mut()
     }
 
-    /// Returns the firmware's file.
+    /// Returns the firmware's ELF file.
     pub fn elf(&self) -> &Elf {
         &self.elf
     }
@@ -47,7 +47,7 @@ impl Machine {
         self.uc.get_data().now()
     }
 
-    /// Returns the instructions executed since power-on.
+    /// Returns the number of instructions executed since power-on.
     pub fn instructions(&self) -> u64 {
         self.uc.get_data().core.instructions
     }
@@ -62,19 +62,19 @@ impl Machine {
         self.register(RegisterARM::PC)
     }
 
-    /// Returns `true` if the core stands still after a fault within a fault.
+    /// Returns `true` if the core is in lock-up after a fault within a fault.
     pub fn locked_up(&self) -> bool {
         self.sleep == Sleep::Lockup
     }
 
-    /// Advances the peripherals to the present.
+    /// Advances the peripherals to the current virtual time.
     pub(crate) fn catch_up(&mut self) {
         let mut ram = Ram(self.uc.clone());
         self.uc.get_data_mut().advance(&mut ram);
     }
 
     pub(crate) fn set(&mut self, register: RegisterARM, value: u32) {
-        // Every register named here exists on this core.
+        // Every register in the code exists on this core, so writing cannot fail.
         let _ = self.uc.reg_write(register, u64::from(value));
     }
 
@@ -98,7 +98,8 @@ impl Machine {
         self.uc.mem_read_as_vec(u64::from(address), length).ok()
     }
 
-    /// Changes memory from outside, as a debugger does, code too; returns `false` at an unmapped address.
+    /// Changes memory from outside, as a debugger does; the memory may contain code. Returns `false` at an unmapped
+    /// address.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> bool {
         if in_bank2(address) {
             let fits = address as usize + bytes.len() <= (BANK2 + BANK2_SIZE) as usize;
@@ -109,7 +110,7 @@ impl Machine {
         }
         let written = self.uc.mem_write(u64::from(address), bytes).is_ok();
         if written && self.chip().code.forget(address, bytes.len() as u32) {
-            // Unicorn would otherwise keep running the translation of the old code.
+            // Otherwise Unicorn would continue to run its translation of the old code.
             self.chip().core.it_block = 0..0;
             let _ = self.uc.ctl_flush_tb();
         }
@@ -131,8 +132,8 @@ impl Machine {
         }
     }
 
-    /// Returns the contents of bank 2 of the flash if the power failed now: random, from `seed`, in places of a running
-    /// operation.
+    /// Returns the contents of flash bank 2 after a power failure at this moment. Words that are being erased or
+    /// programmed get random contents from `seed`.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.uc.get_data().flash.cut(self.now(), seed)
     }
@@ -145,13 +146,13 @@ impl Machine {
         }
     }
 
-    /// Maps the D2 SRAM whose clocks are enabled.
+    /// Maps the D2 SRAM blocks whose clocks are enabled.
     pub(crate) fn remap(&mut self) {
         self.chip().remap = false;
         memory::protect(&mut self.uc);
     }
 
-    /// Handles a fault at an instruction: HardFault, or lock-up within it.
+    /// Handles a fault at an instruction: enters HardFault, or lock-up if the core is already in HardFault.
     pub(crate) fn fault(&mut self, kind: FaultKind, pc: u32) {
         let masks = self.masks();
         let chip = self.chip();

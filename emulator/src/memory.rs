@@ -23,7 +23,7 @@ impl Memory for Ram<'_> {
 /// Start of flash bank 1; bank 2 starts 1 MiB after it.
 pub const FLASH: u32 = 0x0800_0000;
 
-/// Bank 1.
+/// Size of bank 1.
 const FLASH_SIZE: u64 = 0x10_0000;
 const SYSTEM: u64 = 0x1FF0_0000;
 const SYSTEM_SIZE: u64 = 0x2_0000;
@@ -34,7 +34,7 @@ const PERIPHERALS_SIZE: u64 = 0x2000_0000;
 const PRIVATE: u64 = 0xE000_0000;
 const PRIVATE_SIZE: u64 = 0x10_0000;
 
-/// RAM that is always usable: ITCM, DTCM, AXI SRAM, SRAM4, backup SRAM.
+/// RAM that is always accessible: ITCM, DTCM, AXI SRAM, SRAM4, backup SRAM.
 const RAM: [(u64, u64); 5] = [
     (0x0000_0000, 0x1_0000),
     (0x2000_0000, 0x2_0000),
@@ -43,7 +43,7 @@ const RAM: [(u64, u64); 5] = [
     (0x3880_0000, 0x1000),
 ];
 
-/// SRAM1..3 of domain D2, each with its own clock.
+/// SRAM1..3 of domain D2, each with its own clock enable.
 const D2: [(u64, u64); 3] = [(0x3000_0000, 0x2_0000), (0x3002_0000, 0x2_0000), (0x3004_0000, 0x8000)];
 
 /// Address ranges that are unmapped or read-only, as first and last address.
@@ -61,14 +61,15 @@ pub const FORBIDDEN: [(u64, u64); 11] = [
     (0xFFFF_FFE0, 0xFFFF_FFFF),
 ];
 
-/// Returns the access rights of data memory. Code is expected in ITCM and flash only: Unicorn looks for translated code
-/// after every store to memory that may hold code, which makes stores slow. Elsewhere the first jump calls
-/// [`allow_code`].
+/// Returns the access rights of data memory. Code is expected only in ITCM and flash: after every store to memory that
+/// may contain code, Unicorn searches for translated code, which makes stores slow. The first jump to other memory
+/// calls [`allow_code`].
 fn data() -> Prot {
     Prot::READ | Prot::WRITE
 }
 
-/// Allows the RAM around an address to hold code; returns `false` if no RAM is there or it is allowed already.
+/// Permits code in the RAM around an address. Returns `false` if there is no RAM at the address, or if code is already
+/// permitted.
 pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
     let regions = uc.mem_regions().unwrap_or_default();
     let holds = |begin: u64, end: u64| (begin..=end).contains(&u64::from(address));
@@ -78,7 +79,7 @@ pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
     uc.mem_protect(region.begin, region.end - region.begin + 1, Prot::ALL).is_ok()
 }
 
-/// Maps all memory; RAM is filled with random data from `seed`.
+/// Maps all memory. RAM is filled with random data from `seed`.
 pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     let mut rng = fastrand::Rng::with_seed(seed ^ 0x7261_6D00);
     for (address, size) in RAM.into_iter().chain(D2) {
@@ -107,7 +108,7 @@ pub fn map(uc: &mut Unicorn<'static, Chip>, seed: u64) {
     }
 }
 
-/// Maps bank 2 of the flash: the core reaches it through the flash interface.
+/// Maps flash bank 2. The core accesses it through the flash interface.
 fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
     let faults_masked = |uc: &Unicorn<'_, Chip>| {
         let mask = uc.reg_read(RegisterARM::FAULTMASK).unwrap_or(0) & 1 == 1;
@@ -129,7 +130,7 @@ fn map_bank2(uc: &mut Unicorn<'static, Chip>) {
     .expect("bank 2");
 }
 
-/// Allows access to the SRAM of D2 whose clocks are enabled.
+/// Permits access to the D2 SRAM blocks whose clocks are enabled.
 pub fn protect(uc: &mut Unicorn<'static, Chip>) {
     for (n, (address, size)) in D2.into_iter().enumerate() {
         let on = uc.get_data().rcc.enabled(Gate::Sram(n as u32 + 1));

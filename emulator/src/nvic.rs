@@ -1,11 +1,11 @@
-//! Exceptions: pending state, permission to run, and order (ARMv7-M B1.5, four priority bits as on STM32).
+//! Exceptions: pending state, enable state and priority order (ARMv7-M B1.5, with the four priority bits of STM32).
 use crate::clock::Time;
 
-/// Interrupt lines of the device.
+/// Number of interrupt lines of the device.
 pub const LINES: usize = 150;
 /// Exception number of the first interrupt line.
 pub const FIRST_LINE: usize = 16;
-/// Number of all exceptions.
+/// Number of exceptions, including interrupts.
 pub const EXCEPTIONS: usize = FIRST_LINE + LINES;
 
 /// Numbers of the core's own exceptions.
@@ -32,7 +32,7 @@ pub struct Masks {
     pub primask: bool,
     /// FAULTMASK.FM.
     pub faultmask: bool,
-    /// BASEPRI; 0: no mask.
+    /// BASEPRI; 0 masks nothing.
     pub basepri: u8,
 }
 
@@ -49,7 +49,7 @@ pub struct Nvic {
     waiting: Vec<usize>,
     /// AIRCR.PRIGROUP.
     pub prigroup: u32,
-    /// `true` if an interrupt became pending since this was last cleared: wakes WFE if SCR.SEVONPEND is set.
+    /// `true` if an interrupt became pending since this flag was cleared. It wakes WFE if SCR.SEVONPEND is set.
     pub pended: bool,
 }
 
@@ -94,13 +94,13 @@ impl Nvic {
         }
     }
 
-    /// Withdraws a pending exception.
+    /// Clears the pending state of an exception.
     pub fn unpend(&mut self, exception: usize) {
         self.pending[exception] = false;
         self.update(exception);
     }
 
-    /// Sets the level of an interrupt line: a rising edge makes the interrupt pending.
+    /// Sets the level of an interrupt line. A rising edge makes the interrupt pending.
     pub fn set_line(&mut self, line: usize, level: bool, now: Time) {
         let exception = FIRST_LINE + line;
         let before = core::mem::replace(&mut self.level[exception], level);
@@ -114,7 +114,7 @@ impl Nvic {
         self.pending[exception]
     }
 
-    /// Returns `true` if the exception runs or is preempted.
+    /// Returns `true` if the exception is running or preempted.
     pub fn is_active(&self, exception: usize) -> bool {
         self.active[exception]
     }
@@ -135,12 +135,12 @@ impl Nvic {
         self.priority[exception]
     }
 
-    /// Sets a priority byte; only the upper four bits exist.
+    /// Sets a priority byte, of which only the upper four bits exist.
     pub fn set_priority(&mut self, exception: usize, priority: u8) {
         self.priority[exception] = priority & 0xF0;
     }
 
-    /// Returns the time since which an exception has been pending.
+    /// Returns the time at which an exception became pending.
     pub fn pending_since(&self, exception: usize) -> Time {
         self.since[exception]
     }
@@ -150,7 +150,7 @@ impl Nvic {
         !self.waiting.is_empty()
     }
 
-    /// Returns the priority of the group: PRIGROUP cuts the lower bits off for preemption.
+    /// Returns the priority for preemption, without the lower bits that PRIGROUP cuts off.
     fn group(&self, priority: i32) -> i32 {
         if priority < 0 { priority } else { priority >> (self.prigroup + 1) << (self.prigroup + 1) }
     }
@@ -163,13 +163,13 @@ impl Nvic {
         }
     }
 
-    /// Returns the priority of the running exception or thread, without the masks.
+    /// Returns the priority of the running exception or thread, ignoring the masks.
     pub fn running_priority(&self) -> i32 {
         let active = (0..EXCEPTIONS).filter(|&e| self.active[e]);
         active.map(|e| self.group(self.raw_priority(e))).min().unwrap_or(THREAD)
     }
 
-    /// Returns the most urgent exception that waits.
+    /// Returns the most urgent waiting exception.
     fn most_urgent(&self) -> Option<usize> {
         self.waiting.iter().copied().min_by_key(|&e| (self.raw_priority(e), e))
     }
@@ -188,19 +188,19 @@ impl Nvic {
         limit
     }
 
-    /// Returns the exception to enter now.
+    /// Returns the exception that must be entered now, if any.
     pub fn next(&self, masks: Masks) -> Option<usize> {
         let exception = self.most_urgent()?;
         let running = self.running_priority();
         (self.group(self.raw_priority(exception)) < self.masked(running, masks)).then_some(exception)
     }
 
-    /// Returns `true` if a waiting exception is blocked only by the masks.
+    /// Returns `true` if only the masks block a waiting exception.
     pub fn held_by_masks(&self, masks: Masks) -> bool {
         self.next(masks).is_none() && self.next(Masks::default()).is_some()
     }
 
-    /// Returns `true` if WFI ends: an exception would run if PRIMASK were not set.
+    /// Returns `true` if WFI ends, because an exception would run if PRIMASK were not set.
     pub fn wakes(&self, masks: Masks) -> bool {
         self.next(Masks { primask: false, ..masks }).is_some()
     }
@@ -211,7 +211,7 @@ impl Nvic {
         self.unpend(exception);
     }
 
-    /// Ends an exception; a line that is still high makes it pending again.
+    /// Ends an exception. If its interrupt line is still high, the exception becomes pending again.
     pub fn leave(&mut self, exception: usize, now: Time) {
         self.active[exception] = false;
         if self.level[exception] {

@@ -1,20 +1,20 @@
-//! Counts of an observer while the firmware runs: instructions of functions and handlers, interrupt latencies, stack
+//! Measurements while the firmware runs: instruction counts of functions and handlers, interrupt latencies, stack
 //! pointers, resets, faults.
 use crate::clock::Time;
 use crate::nvic::EXCEPTIONS;
 
-/// Instructions of a function or a handler, without those of exceptions that interrupted it.
+/// Instruction count of a function or a handler, without exceptions that interrupted it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Count {
-    /// Calls that have returned.
+    /// Number of calls that have returned.
     pub calls: u64,
-    /// Fewest instructions of a call.
+    /// Smallest number of instructions in a call.
     pub min: u64,
-    /// Most instructions of a call.
+    /// Largest number of instructions in a call.
     pub max: u64,
-    /// Instructions of the last call.
+    /// Number of instructions in the last call.
     pub last: u64,
-    /// Instructions of all calls.
+    /// Number of instructions in all calls.
     pub total: u64,
 }
 
@@ -28,14 +28,14 @@ impl Count {
     }
 }
 
-/// Delay from pending to the first instruction of a handler.
+/// Time between an exception becoming pending and the first instruction of its handler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Latency {
     /// Number of entries.
     pub entries: u64,
     /// Longest delay.
     pub worst: Time,
-    /// Time of the longest delay.
+    /// Time at which the longest delay occurred.
     pub at: Time,
     /// Delay of the last entry.
     pub last: Time,
@@ -61,7 +61,7 @@ pub struct Reset {
     pub time: Time,
     /// Cause of the reset.
     pub cause: ResetCause,
-    /// Address of the instruction that ran.
+    /// Address of the last instruction before the reset.
     pub pc: u32,
 }
 
@@ -80,7 +80,7 @@ pub enum FaultKind {
     BadReturn,
 }
 
-/// A fault; the machine continues with HardFault.
+/// A fault, after which the core enters HardFault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// Time of the fault.
@@ -91,7 +91,7 @@ pub struct Fault {
     pub pc: u32,
     /// Address of the access.
     pub address: u32,
-    /// `true` if the fault occurred in HardFault or NMI: the core stands still until a reset.
+    /// `true` if the fault occurred in HardFault or NMI, so that the core is in lock-up until a reset.
     pub lockup: bool,
 }
 
@@ -113,7 +113,7 @@ struct Running {
     exception: usize,
     start: u64,
     excluded: u64,
-    /// Stack pointer at the beginning.
+    /// Stack pointer at the beginning of the exception.
     base: Option<u32>,
 }
 
@@ -126,10 +126,10 @@ pub struct Observers {
     pub handlers: Vec<Count>,
     /// Latencies by exception number.
     pub latencies: Vec<Latency>,
-    /// Lowest stack pointer while exception n ran; 0: no exception.
+    /// Lowest stack pointer while exception n was running; entry 0 is for code outside exceptions.
     pub lowest_sp: Vec<u32>,
-    /// Largest stack use of exception n in one run, bytes, with the frames of exceptions that interrupted it; not
-    /// counted for 0.
+    /// Largest stack use of exception n in one run, bytes, including the frames of exceptions that interrupted it.
+    /// Entry 0 is not used.
     pub deepest: Vec<u32>,
     /// Resets, oldest first.
     pub resets: Vec<Reset>,
@@ -154,13 +154,13 @@ impl Default for Observers {
 }
 
 impl Observers {
-    /// Starts to count instructions from this entry; returns the number of the counter.
+    /// Starts counting the instructions of the function at this entry address; returns the number of the counter.
     pub fn add_probe(&mut self, entry: u32) -> usize {
         self.probes.push(Probe { entry, count: Count::default() });
         self.probes.len() - 1
     }
 
-    /// Returns the count of a counter.
+    /// Returns the counts of a counter.
     pub fn probe(&self, probe: usize) -> Count {
         self.probes[probe].count
     }
@@ -176,7 +176,8 @@ impl Observers {
         self.deepest.fill(0);
     }
 
-    /// Handles a watched instruction; returns the return address to watch if a function begins here.
+    /// Handles a watched instruction. If a function begins there, returns the return address, which must be watched
+    /// next.
     pub fn at(&mut self, pc: u32, sp: u32, lr: u32, instructions: u64) -> Option<u32> {
         let depth = self.running.len();
         while let Some(i) = self.calls.iter().rposition(|c| c.back == pc && c.sp == sp && c.depth == depth) {
@@ -198,7 +199,7 @@ impl Observers {
         self.probes[call.probe].count.add(instructions - call.start - call.excluded);
     }
 
-    /// Notes that an exception begins to run.
+    /// Records that an exception begins to run.
     pub fn enter(&mut self, exception: usize, since: Time, now: Time, instructions: u64) {
         let latency = &mut self.latencies[exception];
         latency.entries += 1;
@@ -210,10 +211,10 @@ impl Observers {
         self.running.push(Running { exception, start: instructions, excluded: 0, base: None });
     }
 
-    /// Notes that the innermost exception returns.
+    /// Records that the innermost exception returns.
     pub fn leave(&mut self, instructions: u64) {
         let depth = self.running.len();
-        // Functions that were handlers themselves end with them.
+        // A counted function that is itself a handler ends with the exception.
         while let Some(i) = self.calls.iter().rposition(|c| c.depth >= depth) {
             self.finish(i, instructions);
         }
@@ -228,7 +229,7 @@ impl Observers {
         }
     }
 
-    /// Notes the stack pointer.
+    /// Records the stack pointer.
     pub fn note_sp(&mut self, sp: u32) {
         let mut context = 0;
         if let Some(running) = self.running.last_mut() {
@@ -239,7 +240,7 @@ impl Observers {
         self.lowest_sp[context] = self.lowest_sp[context].min(sp);
     }
 
-    /// Notes a reset of the machine.
+    /// Records a reset of the machine.
     pub fn note_reset(&mut self, reset: Reset) {
         self.resets.push(reset);
         self.calls.clear();

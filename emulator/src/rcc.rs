@@ -1,5 +1,5 @@
 //! Reset and clock control (RM0399 chapter 9): the clock tree, enable and reset bits, reset flags. Also contains the
-//! few bits of PWR that clocks depend on.
+//! few bits of PWR on which clocks depend.
 use crate::plain::Plain;
 
 const HSI_HZ: u64 = 64_000_000;
@@ -27,7 +27,7 @@ mod reg {
     pub const AHB4ENR: u32 = 0xE0;
     pub const APB1LENR: u32 = 0xE8;
     pub const APB1HENR: u32 = 0xEC;
-    /// First address and end of the registers of core 1, and their distance from the common registers.
+    /// Address range of core 1's register copies, and their offset from the common registers.
     pub const C1: core::ops::Range<u32> = 0x130..0x190;
     pub const C1_OFFSET: u32 = 0x60;
 }
@@ -46,22 +46,22 @@ pub mod flag {
     pub const PIN: u32 = 1 << 22;
     /// Power-on.
     pub const POR: u32 = 1 << 23;
-    /// Software, by core 1.
+    /// Software reset by core 1.
     pub const SFT: u32 = 1 << 24;
     /// Independent watchdog 1.
     pub const IWDG1: u32 = 1 << 26;
     /// Writing RMVF clears all flags.
     pub const REMOVE: u32 = 1 << 16;
-    /// All.
+    /// All flags.
     pub const ALL: u32 = 0xFFFE_0000;
 }
 
-/// Peripheral with a clock enable bit of its own.
+/// Peripheral with its own clock enable bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gate {
-    /// DMA1, DMA2 (from 0).
+    /// DMA1, DMA2 (index from 0).
     Dma(u32),
-    /// GPIOA.. (from 0).
+    /// GPIOA.. (index from 0).
     Gpio(u32),
     /// TIM2..TIM7 by number.
     Timer(u32),
@@ -87,7 +87,7 @@ impl Gate {
     }
 }
 
-/// Frequencies in Hz that follow from the registers; 0 for clocks that are off.
+/// Frequencies in Hz that the registers set; 0 for a clock that is off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clocks {
     /// Core.
@@ -111,12 +111,12 @@ pub struct Rcc {
     hse_hz: u64,
     rsr: u32,
     clocks: Clocks,
-    /// Peripherals whose reset bit was set since the list was last taken.
+    /// Peripherals whose reset bit was set since the list was last read.
     pub resets: Vec<Gate>,
 }
 
 impl Rcc {
-    /// Creates it as after power-on, with a clock at OSC_IN.
+    /// Creates the state after power-on, with a clock at OSC_IN.
     pub fn new(hse_hz: u64) -> Self {
         let rsr = flag::POR | flag::PIN | flag::BOR | flag::D1 | flag::D2 | flag::CPU;
         let mut rcc =
@@ -139,7 +139,7 @@ impl Rcc {
         self.update();
     }
 
-    /// Resets the system; adds the flags of the cause to the flags that are already set.
+    /// Resets the system, and adds the flags of the cause to the flags already set.
     pub fn reset(&mut self, flags: u32) {
         self.plain = Plain::default();
         self.rsr |= flags;
@@ -167,7 +167,8 @@ impl Rcc {
         let offset = if reg::C1.contains(&offset) { offset - reg::C1_OFFSET } else { offset };
         let value = self.plain.read(offset);
         match offset {
-            // Each oscillator is ready as soon as it is on: HSI, CSI, HSI48, HSE, PLL1..3; HSIDIV and domains always.
+            // Each oscillator is ready as soon as it is on (HSI, CSI, HSI48, HSE, PLL1..3). HSIDIV and the domains are
+            // always ready.
             reg::CR => {
                 let ready = (value & 1) << 2
                     | (value >> 7 & 1) << 8
@@ -202,7 +203,7 @@ impl Rcc {
     }
 
     fn note_resets(&mut self, offset: u32, rising: u32) {
-        // The reset registers have the same order as the enable registers.
+        // The reset registers are in the same order as the enable registers.
         let enable = match offset {
             0x80 => reg::AHB1ENR,
             0x88 => reg::AHB4ENR,
@@ -223,7 +224,7 @@ impl Rcc {
         self.resets.extend(hit);
     }
 
-    /// Returns the output of PLL `n` (0..3): P, Q or R by `output` 0..3.
+    /// Returns the frequency of PLL `n` (0..3) at its output P, Q or R (`output` 0..3).
     fn pll(&self, n: u32, output: u32) -> u64 {
         let cr = self.plain.read(reg::CR);
         let select = self.plain.read(reg::PLLCKSELR);
@@ -296,7 +297,7 @@ impl Rcc {
     }
 }
 
-/// Returns the divider of HPRE and D1CPRE.
+/// Returns the divider for a code of HPRE or D1CPRE.
 fn ahb_divider(code: u32) -> u64 {
     match code {
         0..=7 => 1,
@@ -305,7 +306,7 @@ fn ahb_divider(code: u32) -> u64 {
     }
 }
 
-/// Returns the divider of D1PPRE, D2PPRE1, D2PPRE2.
+/// Returns the divider for a code of D1PPRE, D2PPRE1 or D2PPRE2.
 fn apb_divider(code: u32) -> u64 {
     if code < 4 { 1 } else { 2 << (code - 4) }
 }

@@ -1,4 +1,4 @@
-//! The core's own registers from 0xE000_0000: system control block, NVIC, SysTick, MPU, debug cycle counter
+//! The core's own registers, at address 0xE000_0000: system control block, NVIC, SysTick, MPU, debug cycle counter
 //! (ARMv7-M B3).
 use crate::clock::{NEVER, Time};
 use crate::nvic::{EXCEPTIONS, FIRST_LINE, Nvic, exception};
@@ -11,7 +11,7 @@ const AIRCR_KEY: u32 = 0x05FA;
 const CCSIDR_DATA: u32 = 0xF00F_E019;
 /// CCSIDR of a 16 KiB instruction cache: 256 sets, 2 ways, 32-byte lines.
 const CCSIDR_INSTRUCTION: u32 = 0xF01F_E009;
-/// ICSR.PENDSTSET, PENDSVSET.
+/// ICSR.PENDSTSET and ICSR.PENDSVSET.
 const PEND_ST: u32 = 1 << 26;
 const PEND_SV: u32 = 1 << 28;
 const MPU_CTRL: u32 = 0xE000_ED94;
@@ -21,7 +21,7 @@ const MPU_CTRL: u32 = 0xE000_ED94;
 pub struct SysTick {
     ctrl: u32,
     load: u32,
-    /// Cycle count at which VAL was the reload value.
+    /// Cycle count at which VAL had the reload value.
     start: u64,
     /// Cycle count of the next wrap.
     wrap: u64,
@@ -31,17 +31,17 @@ pub struct SysTick {
 /// The core's own registers.
 #[derive(Default)]
 pub struct Scs {
-    /// Vector table.
+    /// Address of the vector table.
     pub vtor: u32,
     /// SCR: bit 4 SEVONPEND, bit 1 SLEEPONEXIT.
     pub scr: u32,
     /// CPACR.
     pub cpacr: u32,
-    /// CFSR, HFSR, MMFAR, BFAR of the last fault.
+    /// CFSR of the last fault.
     pub cfsr: u32,
-    /// HFSR.
+    /// HFSR of the last fault.
     pub hfsr: u32,
-    /// BFAR.
+    /// BFAR of the last fault.
     pub bfar: u32,
     csselr: u32,
     ccr: u32,
@@ -58,22 +58,22 @@ pub struct Scs {
 /// Decision of the protection unit on an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Protection {
-    /// `true` if the access is allowed.
+    /// `true` if the access is permitted.
     pub allowed: bool,
-    /// `true` if the core may cache the memory, and read it ahead of the program.
+    /// `true` if the core may cache or prefetch the memory.
     pub ahead: bool,
 }
 
-/// Moment of an access in both measures.
+/// Time of an access, in several units.
 #[derive(Clone, Copy)]
 pub struct Moment {
     /// Virtual time.
     pub now: Time,
-    /// Core clock cycles, sleep included.
+    /// Number of core clock cycles, including sleep.
     pub cycles: u64,
-    /// Instructions executed.
+    /// Number of instructions executed.
     pub instructions: u64,
-    /// Exception that runs.
+    /// Number of the running exception.
     pub running: usize,
 }
 
@@ -188,8 +188,8 @@ impl Scs {
         &self.mpu
     }
 
-    /// Returns the decision of the protection unit on a load or store by the program (ARMv7-M B3.5). `faults_masked`:
-    /// FAULTMASK is set, or HardFault or NMI runs.
+    /// Returns the decision of the protection unit on a load or store by the program (ARMv7-M B3.5). `faults_masked`
+    /// means that FAULTMASK is set, or that HardFault or NMI is running.
     pub fn protection(&self, address: u32, faults_masked: bool) -> Protection {
         const DEFAULT: Protection = Protection { allowed: true, ahead: true };
         let ctrl = self.plain.read(MPU_CTRL);
@@ -207,7 +207,7 @@ impl Scs {
             return Protection { allowed: default_elsewhere == 1, ..DEFAULT };
         };
         let (tex, c, b) = (rasr >> 19 & 7, rasr >> 17 & 1, rasr >> 16 & 1);
-        // Strongly ordered and device memory; memory that the program only reads is not distinguished here.
+        // Strongly ordered memory and device memory. Read-only memory is not distinguished here.
         let in_order = matches!((tex, c, b), (0, 0, _) | (2, 0, 0));
         Protection { allowed: rasr >> 24 & 7 != 0, ahead: !in_order }
     }
@@ -260,7 +260,7 @@ impl SysTick {
 
 const LINES_WORDS: usize = 5;
 
-/// Returns the lines of a word of the enable, pending and active registers.
+/// Returns the bits of a word in the enable, pending and active registers, each with its exception number.
 fn word_lines(address: u32) -> impl Iterator<Item = (u32, usize)> {
     let first = FIRST_LINE + ((address & 0x7F) as usize / 4) * 32;
     (0..32).map(move |bit| (bit, first + bit as usize)).filter(|&(_, e)| e < EXCEPTIONS)

@@ -1,4 +1,4 @@
-//! Basic and general timers TIM2..TIM7 (RM0399 chapters 40, 43): counter, prescaler, update and compare events.
+//! Timers TIM2..TIM7 (RM0399 chapters 40, 43): counter, prescaler, update events and compare events.
 use crate::clock::{NEVER, Time, period};
 
 const CEN: u32 = 1;
@@ -23,17 +23,17 @@ pub struct Timer {
     arr: u32,
     arr_active: u32,
     ccr: [u32; 4],
-    /// Counter at time `at`; it continues from there while the timer runs.
+    /// Counter value at time `at`. While the timer runs, it counts from this value.
     count: u32,
     at: Time,
     /// Length of a clock period.
     clock: Time,
-    /// Update events since reset.
+    /// Number of update events since reset.
     pub updates: u64,
 }
 
 impl Timer {
-    /// Creates TIM2..TIM7 by number.
+    /// Creates the timer with this number, TIM2..TIM7.
     pub fn new(number: u32) -> Self {
         let wide = number == 2 || number == 5;
         let max = if wide { u32::MAX } else { 0xFFFF };
@@ -59,7 +59,7 @@ impl Timer {
         }
     }
 
-    /// Sets the kernel clock; call it with the timer advanced to `now`.
+    /// Sets the kernel clock. The timer must have been advanced to `now` before.
     pub fn set_clock(&mut self, hz: u64, now: Time) {
         let clock = period(hz);
         if clock != self.clock {
@@ -76,7 +76,7 @@ impl Timer {
         self.cr1 & CEN != 0 && self.clock != NEVER
     }
 
-    /// Returns the counter at a moment before which no event is left.
+    /// Returns the counter value. All events before `now` must have been executed.
     fn value(&self, now: Time) -> u32 {
         if !self.runs() {
             return self.count;
@@ -98,14 +98,15 @@ impl Timer {
     /// Returns the number of timer ticks from `count` until the counter overflows to 0.
     fn to_overflow(&self) -> u64 {
         if self.count > self.arr_active {
-            // ARR was set below the counter: it runs through its whole range first.
+            // ARR was set to a value below the counter, so the counter first runs through its whole range.
             let top = if self.wide { 1u64 << 32 } else { 1 << 16 };
             return top - u64::from(self.count);
         }
         u64::from(self.arr_active - self.count) + 1
     }
 
-    /// Returns the timer ticks until the flag of a compare channel is next set before the overflow.
+    /// Returns the number of timer ticks until the flag of a compare channel is next set, if that happens before the
+    /// overflow.
     fn to_match(&self, channel: usize) -> Option<u64> {
         let compare = self.ccr[channel];
         (compare > self.count && compare <= self.arr_active).then(|| u64::from(compare - self.count))
@@ -119,26 +120,26 @@ impl Timer {
         (0..4).filter_map(|c| self.to_match(c)).fold(overflow, u64::min)
     }
 
-    /// Returns the time of the next flag that is not set already or whose interrupt is enabled.
+    /// Returns the time of the next flag that is not set yet or whose interrupt is enabled.
     pub fn next_event(&self) -> Time {
         if !self.runs() {
             return NEVER;
         }
-        // Flags without an interrupt need no stop: they are computed when a register is read.
+        // Flags without an interrupt cause no stop; they are computed when a register is read.
         let mut ticks = NEVER;
         if self.dier & 1 != 0 || self.cr1 & OPM != 0 {
             ticks = self.to_overflow();
         }
         if !self.basic {
             for c in (0..4).filter(|c| self.dier >> (c + 1) & 1 == 1) {
-                // A match after the overflow is found when the overflow is passed.
+                // A match after the overflow is found when the overflow is executed.
                 ticks = ticks.min(self.to_match(c).unwrap_or_else(|| self.to_overflow()));
             }
         }
         if ticks == NEVER { NEVER } else { self.at.saturating_add(ticks.saturating_mul(self.tick())) }
     }
 
-    /// Executes every event up to `now`.
+    /// Executes all events up to `now`.
     pub fn advance(&mut self, now: Time) {
         while self.runs() {
             let ticks = self.next_ticks();
@@ -218,7 +219,7 @@ impl Timer {
             0x04 => self.cr2 = value,
             0x08 => self.smcr = value,
             0x0C => self.dier = value,
-            // Writing 0 clears flags.
+            // Writing a 0 clears a flag.
             0x10 => self.sr &= value,
             0x14 => {
                 if value & 1 != 0 {
@@ -252,7 +253,7 @@ mod tests {
     use super::*;
     use crate::clock::{MICROSECOND, MILLISECOND};
 
-    /// Creates a timer that counts microseconds up to `reload`, compares with `compare`, and has these interrupts.
+    /// Creates a timer that counts microseconds up to `reload`, compares with `compare`, and enables these interrupts.
     fn microsecond_timer(number: u32, reload: u32, compare: u32, interrupts: u32) -> Timer {
         let mut timer = Timer::new(number);
         timer.set_clock(200_000_000, 0);

@@ -1,5 +1,5 @@
-//! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout; every
-//! byte takes its time on the wire.
+//! USART2 and USART3 (RM0399 chapter 51): asynchronous 8N1 with FIFOs, DMA requests, idle line and receiver timeout.
+//! Every byte takes its real time on the line.
 mod bits;
 mod next;
 mod registers;
@@ -14,9 +14,9 @@ const RTOEN: u32 = 1 << 23;
 const DMAR: u32 = 0x40;
 const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
-/// Number of bytes checked in advance for the next event.
+/// Number of bytes examined in advance to find the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference of rates at which bytes still arrive intact, in parts of 1000.
+/// Largest difference between the rates with which bytes still arrive intact, in thousandths.
 const TOLERANCE: u64 = 40;
 
 /// A byte and the time at which its stop bit ended.
@@ -44,10 +44,10 @@ pub struct Usart {
     bit: Time,
     rx_fifo: VecDeque<u8>,
     last_rdr: u8,
-    /// Bytes on the wire to the device.
+    /// Bytes on the line to the device.
     rx_wire: VecDeque<WireByte>,
     rx_wire_free: Time,
-    /// End of the last byte received, until the idle flag is derived from it.
+    /// End of the last byte received. The idle flag is derived from it.
     idle_from: Option<Time>,
     timeout_from: Option<Time>,
     tx_fifo: VecDeque<u8>,
@@ -55,20 +55,20 @@ pub struct Usart {
     output: VecDeque<WireByte>,
     /// Rate of the host, bit/s.
     pub host_baud: u32,
-    /// Bytes from the host that arrived while the receiver was off.
+    /// Number of bytes from the host that arrived while the receiver was off.
     pub missed: u64,
     /// Number of overruns.
     pub overruns: u64,
-    /// Bytes sent at a rate that the other end cannot read.
+    /// Number of bytes sent at a rate that the other end cannot read.
     pub garbled: u64,
-    /// Bytes received.
+    /// Number of bytes received.
     pub received: u64,
-    /// Bytes sent.
+    /// Number of bytes sent.
     pub sent: u64,
 }
 
 impl Usart {
-    /// Creates USART2 or USART3 with their DMAMUX request lines.
+    /// Creates USART2 or USART3 with its DMAMUX request lines.
     pub fn new(number: u32) -> Self {
         let rx_request = if number == 2 { 43 } else { 45 };
         Self {
@@ -102,7 +102,7 @@ impl Usart {
         }
     }
 
-    /// Sets the registers as after reset; bytes on the wire continue.
+    /// Sets the registers to their values after reset. Bytes on the line continue.
     pub fn reset(&mut self) {
         let old = core::mem::replace(self, Self::new(if self.rx_request == 43 { 2 } else { 3 }));
         self.rx_wire = old.rx_wire;
@@ -138,7 +138,7 @@ impl Usart {
         };
     }
 
-    /// Returns the rate that the registers give, bit/s; 0: none.
+    /// Returns the bit rate that the registers set, bit/s; 0 if none is set.
     pub fn baud(&self) -> u32 {
         if self.bit == NEVER { 0 } else { (SECOND as f64 / self.bit as f64).round() as u32 }
     }
@@ -158,7 +158,7 @@ impl Usart {
         own.abs_diff(host) * 1000 <= host * TOLERANCE
     }
 
-    /// Sends bytes of the host, the first no earlier than `now`.
+    /// Sends bytes from the host. The first byte starts at `now` or later.
     pub fn host_write(&mut self, now: Time, bytes: &[u8]) {
         let length = 10 * SECOND / u64::from(self.host_baud.max(1));
         for &byte in bytes {
@@ -168,24 +168,24 @@ impl Usart {
         }
     }
 
-    /// Returns the number of bytes of the host that have not passed the line yet.
+    /// Returns the number of host bytes that have not been transmitted on the line yet.
     pub fn host_pending(&self) -> usize {
         self.rx_wire.len()
     }
 
-    /// Returns the bytes that have reached the host since the last call.
+    /// Returns the bytes that the host has received since the last call.
     pub fn take_output(&mut self) -> impl Iterator<Item = WireByte> {
         core::mem::take(&mut self.output).into_iter()
     }
 
-    /// Executes everything up to `now`.
+    /// Executes all events up to `now`.
     pub fn advance(&mut self, now: Time, dma: &mut Dma, memory: &mut dyn Memory) {
         while let Some(&next) = self.rx_wire.front().filter(|b| b.end <= now) {
             self.rx_wire.pop_front();
             self.idle(next.end.saturating_sub(self.frame()));
             self.receive(next, dma, memory);
         }
-        // The start bit of a byte that is on its way ends the silence.
+        // The start bit of a byte now on the line ends the silence.
         let until = self.rx_wire.front().map_or(now, |b| now.min(b.end.saturating_sub(self.frame())));
         self.idle(until);
         self.drain_fifo(dma, memory);
@@ -252,7 +252,7 @@ impl Usart {
             return;
         }
         let depth = if self.cr1 & cr1::FIFOEN != 0 { FIFO } else { 1 };
-        // The next byte can start at the end of the one before, or now.
+        // The next byte can start at the end of the previous one, or now if that is later.
         loop {
             while self.cr3 & DMAT != 0
                 && self.tx_fifo.len() < depth

@@ -1,18 +1,18 @@
-//! Observers by the names of the firmware's symbols, and the firmware's log.
+//! Observers that find functions by the names of the firmware's symbols, and access to the firmware's log.
 use crate::elf::ElfError;
 use crate::machine::Machine;
 use crate::observe::Count;
 
-/// Counter of a function's instructions.
+/// Handle of a counter for a function's instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter(usize);
 
-/// Offset of defmt's channel in the control block of RTT: after the identifier and two counts.
+/// Offset of defmt's channel in the RTT control block, after the identifier and two counts.
 const RTT_CHANNEL: u32 = 24;
 
 impl Machine {
-    /// Counts the instructions of a function from now on. `name`: its full name, or a part that no other symbol
-    /// contains. Functions that the compiler has inlined have no symbol.
+    /// Counts the instructions of a function from now on. `name` is its full name, or a part that no other symbol
+    /// contains. A function that the compiler has inlined has no symbol.
     pub fn count(&mut self, name: &str) -> Result<Counter, ElfError> {
         let entry = self.elf().symbol(name)?.address;
         let chip = self.chip();
@@ -20,20 +20,20 @@ impl Machine {
         Ok(Counter(chip.observers.add_probe(entry)))
     }
 
-    /// Returns the count.
+    /// Returns the counts of a counter.
     pub fn counted(&self, counter: Counter) -> Count {
         self.uc.get_data().observers.probe(counter.0)
     }
 
-    /// Returns the bytes that the firmware has written into RTT's first channel since the last call, as a probe reads
-    /// them: encoded by defmt.
+    /// Returns the bytes, encoded by defmt, that the firmware has written into RTT's first channel since the last call.
+    /// Reads them in the same way as a debug probe.
     pub fn defmt(&mut self) -> Vec<u8> {
         let Ok(block) = self.elf().symbol("_SEGGER_RTT") else { return Vec::new() };
         let at = block.address + RTT_CHANNEL;
         let fields = [4, 8, 12, 16].map(|offset| self.word(at + offset).unwrap_or(0));
         let [buffer, size, write, read] = fields;
         if size == 0 || size > 0x10_0000 || write >= size || read >= size {
-            return Vec::new(); // not set up yet
+            return Vec::new(); // not initialised yet
         }
         let part = |from: u32, to: u32| self.memory(buffer + from, (to - from) as usize).unwrap_or_default();
         let bytes =

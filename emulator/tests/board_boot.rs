@@ -1,4 +1,4 @@
-//! Start of a board when its power comes on: supply, clocks, statuses, the version record, the second core.
+//! Start of a board after power-on: supply, clocks, statuses, the version record, the second core.
 mod rig;
 
 use jtc_core::ControllerState;
@@ -13,7 +13,7 @@ fn two_cores(board: &str) -> bool {
     board.contains("h745")
 }
 
-/// Returns `true` for the board that gets its core voltage from the SMPS.
+/// Returns `true` for the board whose core voltage comes from the SMPS.
 fn smps(board: &str) -> bool {
     board == "nucleo-h745zi-q"
 }
@@ -30,8 +30,8 @@ fn j10_clocks_are_those_of_the_documents() {
     }
 }
 
-/// RM0399 and RM0433: PWR_CR3 has LDOEN in bit 1 and SDEN in bit 2, D3CR.VOS 0b11 is scale 1, and SYSCFG_PWRCR.ODEN
-/// raises it to scale 0, which is allowed with the LDO only.
+/// RM0399 and RM0433: PWR_CR3 has LDOEN in bit 1 and SDEN in bit 2. D3CR.VOS 0b11 is scale 1; SYSCFG_PWRCR.ODEN raises
+/// it to scale 0, which is permitted only with the LDO.
 #[test]
 fn supply_and_voltage_are_those_of_the_board() {
     for board in BOARDS {
@@ -69,8 +69,8 @@ fn j12_tim7_ticks_a_thousand_times_a_second() {
     }
 }
 
-/// Memory that DMA and the core share is not cached, and a null pointer causes a fault. ARMv7-M B3.5.9: RASR has XN in
-/// bit 28, AP in bits 26..24, TEX S C B in bits 21..16, the size in bits 5..1.
+/// Memory that DMA and the core share is not cached, and a null pointer causes a fault. ARMv7-M B3.5.9: RASR contains
+/// XN in bit 28, AP in bits 26..24, TEX S C B in bits 21..16, and the size in bits 5..1.
 #[test]
 fn memory_is_protected_and_shared_memory_is_not_cached() {
     for board in BOARDS {
@@ -79,7 +79,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
         assert_eq!(rig.register(0xE000_ED94) & 1, 1, "{board}: MPU_CTRL");
         assert_eq!(rig.register(0xE000_ED14) >> 16 & 3, 3, "{board}: both caches");
         let regions = *rig.board.machine.chip().scs.mpu_regions();
-        // The region with the highest number that contains an address decides.
+        // If several regions contain an address, the region with the highest number applies.
         let at = |address: u32| {
             let holds = |(rbar, rasr): &(u32, u32)| {
                 let size = 1u64 << ((rasr >> 1 & 31) + 1);
@@ -97,7 +97,7 @@ fn memory_is_protected_and_shared_memory_is_not_cached() {
     }
 }
 
-/// J-12: no other interrupt has the tick's priority, so that only critical sections delay the tick.
+/// J-12: no other interrupt has the tick's priority, so only critical sections can delay the tick.
 #[test]
 fn j12_the_tick_is_above_all_other_interrupts() {
     const ENABLED: u32 = 0xE000_E100;
@@ -216,12 +216,12 @@ fn the_second_core_is_parked_where_there_is_one() {
         for vector in &words[1..16] {
             assert_eq!(*vector, BANK2 + 64 + 1, "{board}: every vector leads to the sleep");
         }
-        // WFI, and a branch back to it.
+        // WFI, then a branch back to it.
         assert_eq!(words[16], 0xE7FD_BF30, "{board}");
     }
 }
 
-/// All memory that is used was written before.
+/// The firmware writes all memory before it reads it.
 #[test]
 fn what_memory_holds_at_power_on_does_not_matter() {
     let run = |seed| {

@@ -1,4 +1,4 @@
-//! The joint bus as seen by the FDCAN controller of the chip: timing, filters, errors, bus-off.
+//! The joint bus as the chip's FDCAN controller sees it: timing, filters, errors, bus-off.
 mod rig;
 
 use std::collections::BTreeSet;
@@ -20,7 +20,7 @@ fn expected() -> BTreeSet<u16> {
     [0x200, 0x210, 0x2F0].into_iter().flat_map(|base| (0..7).map(move |node| base + node)).collect()
 }
 
-/// J-10, in the terms of RM0399: the registers hold each value minus one.
+/// J-10, with the register names of RM0399. The registers contain each value minus one.
 #[test]
 fn j10_registers_of_the_controller() {
     for board in BOARDS {
@@ -32,9 +32,10 @@ fn j10_registers_of_the_controller() {
         assert_eq!(state.nbtp, 1 << 25 | 4 << 16 | 11 << 8 | 3, "{board}");
         assert_eq!(state.dbtp, 1 << 23 | 11 << 8 | 3 << 4 | 1, "{board}");
         assert_eq!(state.tdcr, 13 << 8, "{board}: the sample point, 13 of 17, after the loop delay");
-        // TXP, BRSE, FDOE; neither INIT, CCE, DAR (so: retransmission) nor NISO (so: ISO).
+        // TXP, BRSE and FDOE are set. INIT, CCE, DAR (so retransmission is on) and NISO (so ISO format is used) are
+        // not.
         assert_eq!(state.cccr, 1 << 14 | 1 << 9 | 1 << 8, "{board}");
-        // Remote frames and frames that match no filter are rejected, 11 and 29 bits.
+        // Remote frames and frames that match no filter are rejected, with 11-bit and 29-bit identifiers.
         let gfc = rig.register(FDCAN1 + 0x80);
         assert_eq!(gfc & 3, 3, "{board}: RRFS, RRFE");
         assert!(gfc >> 2 & 3 >= 2 && gfc >> 4 & 3 >= 2, "{board}: ANFE, ANFS {gfc:#x}");
@@ -42,7 +43,7 @@ fn j10_registers_of_the_controller() {
     }
 }
 
-/// J-10: each filter accepts one identifier and puts it into a buffer of its own.
+/// J-10: each filter accepts one identifier and stores its frames in a dedicated buffer.
 #[test]
 fn j10_filters_are_the_expected_answers() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -58,7 +59,7 @@ fn j10_filters_are_the_expected_answers() {
     assert_eq!(rig.board.machine.chip().fdcan.ram.outside, 0, "nothing beyond the message RAM");
 }
 
-/// Members that acknowledge, and send nothing.
+/// Nodes that acknowledge frames but send none.
 struct Mute;
 
 impl CanPeers for Mute {
@@ -68,7 +69,7 @@ impl CanPeers for Mute {
     }
 }
 
-/// J-10, J-15: of all frames that a bus can carry only the expected answers reach the controller.
+/// J-10, J-15: of all frames that can occur on a bus, only the expected answers reach the controller.
 #[test]
 fn j10_only_expected_frames_arrive() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });
@@ -109,13 +110,14 @@ fn j10_only_expected_frames_arrive() {
     let ids: Vec<u16> = received.iter().map(|(_, f)| f.id).collect();
     assert_eq!(ids, expected().into_iter().collect::<Vec<_>>(), "each once");
     assert!(received.iter().all(|(n, f)| *n < fd + 10 && f.data() == [f.id as u8; 16]));
-    // The filters of this controller cannot distinguish classic frames from CAN FD: the driver drops and counts them (J-15).
+    // The filters cannot distinguish classic frames from CAN FD frames. The driver therefore drops and counts classic
+    // frames (J-15).
     assert!(classic > fd && rig.flight.wrong_format == 21, "{}", rig.flight.wrong_format);
     let fdcan = &rig.board.machine.chip().fdcan;
     assert_eq!((fdcan.stored, fdcan.state().lost), (42, 0));
 }
 
-/// Returns the controller's own frames on the bus in this millisecond, with their torques.
+/// Returns the frames that the controller sent in this millisecond: start time and torques.
 fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     let good = rig.bus.iter().filter(|e| e.from_controller && e.outcome == Outcome::Good);
     good.filter_map(|e| {
@@ -128,7 +130,8 @@ fn moves(rig: &Rig) -> Vec<(Time, [f64; 6])> {
     .collect()
 }
 
-/// J-14, J-12: an error at once, recovery by the rules, and a torque that waited while the bus was off is never sent.
+/// J-14, J-12: the error is raised at once, the bus recovers by the rules, and a torque that waited during bus-off is
+/// never sent.
 #[test]
 fn j14_after_bus_off_no_stale_frame() {
     // A pose in which gravity requires torque.
@@ -164,13 +167,13 @@ fn j14_after_bus_off_no_stale_frame() {
         to_us(first.saturating_sub(healed))
     );
     assert!(first > off + 129 * 11 * MILLISECOND / 1000, "129 times 11 recessive bits are waited for");
-    // The error stays until the host clears it (J-21), then operation continues.
+    // The error stays until the host clears it (J-21). Then operation continues.
     assert_eq!(rig.state(), ControllerState::Error);
     rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
     rig.wait_for_hold(15_000);
 }
 
-/// Returns the ticks with that state of the bus until Error, and the word of CAN errors then.
+/// Returns the number of ticks with this bus fault until Error, and the word of CAN errors at that time.
 fn ticks_to_error(rig: &mut Rig, kind: FaultKind) -> (u64, u32) {
     let before = rig.ticks;
     rig.inject(kind);
@@ -188,7 +191,7 @@ fn j14_five_moves_without_acknowledge_are_a_transmit_timeout() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.bring_up(Port::Usart2);
     let (ticks, flags) = ticks_to_error(&mut rig, FaultKind::NoAcknowledge);
-    // The tick after the fifth finds it.
+    // The error is raised in the tick after the fifth frame without acknowledgement.
     assert!((5..=7).contains(&ticks), "{ticks} ticks");
     assert!(flags & 1 != 0, "{flags:#x}");
     assert!(!rig.board.machine.chip().fdcan.state().bus_off, "a missing acknowledge alone makes no bus-off");
@@ -226,14 +229,14 @@ fn j14_j23_a_silent_gripper_is_shown_and_takes_nothing_away() {
     assert_eq!((status.can_error, status.can_current), (0, 1 << 14));
 }
 
-/// J-15: a frame that is too short for its identifier is ignored, from any member.
+/// J-15: a frame that is too short for its identifier is ignored, whichever node sends it.
 #[test]
 fn j15_short_answers_are_no_answers() {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { no_bus: true, ..Default::default() });
     rig.board.machine.chip().fdcan.wire.peers = Some(Box::new(Mute));
     let short = [0, 1, 7, 8, 12].map(|len| vec![0xFF; len]);
     let mut received = 0;
-    // Nodes may be silent for 2 s after a reset.
+    // After a reset, nodes may be silent for 2 s.
     for ms in 0..2_600 {
         if ms >= 20 {
             let id = Id::standard(0x200 + ms % 7).expect("11 bits");

@@ -1,5 +1,6 @@
-//! J-07: with any bytes on the lines and any frames on the joint bus, the program does not hang, no tick is missing, no
-//! reset occurs, and every tick gives the same outputs as the same controller with the same inputs (`rig`).
+//! J-07: whatever bytes arrive on the lines and whatever frames on the joint bus, the program does not hang, no tick is
+//! missed, and no reset occurs. In every tick the outputs are the same as those of a controller on the PC with the same
+//! inputs (`rig`).
 mod rig;
 
 use std::path::Path;
@@ -17,7 +18,7 @@ fn fast() -> Rig {
     Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() })
 }
 
-/// Returns every input that is kept for a fuzz target, by name.
+/// Returns all inputs that are stored for a fuzz target, with their names.
 fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     let fuzz = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../fuzz"));
     let mut inputs = Vec::new();
@@ -34,12 +35,12 @@ fn kept(target: &str) -> Vec<(String, Vec<u8>)> {
     inputs
 }
 
-/// Checks the end: a tick for each millisecond, the first start, no fault, and the board still answers.
+/// Checks the state at the end: one tick per millisecond, no restart, no fault, and the board still answers.
 fn unharmed(mut rig: Rig) {
     for port in PORTS {
         rig.wait("the line falls silent", 60_000, |rig| rig.board.pending(port) == 0);
     }
-    // The last bytes may have begun a frame; a gap ends it.
+    // The last bytes may be the beginning of a frame, which a gap ends.
     rig.run(20);
     rig.wait("every record", 60_000, |rig| {
         for host in &mut rig.hosts {
@@ -64,8 +65,9 @@ fn unharmed(mut rig: Rig) {
     assert!(late < 1_000, "{late} ns");
 }
 
-/// J-03, J-04, J-05: the records on the wire are those of a parser that has the whole stream, except those of noise
-/// that joined another record and those that were lost because more than 64 waited, which are counted.
+/// J-03, J-04, J-05: the records on the line are the same as those of a parser that gets the whole stream. Two kinds of
+/// exceptions are counted: noise that was merged with another record, and records that were lost because more than 64
+/// were waiting.
 #[test]
 fn j03_records_of_kept_streams_are_those_of_the_reference() {
     let mut rig = fast();
@@ -86,14 +88,14 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
                     Event::Bad(bad) => (bad.frame_type, bad.status, bad.length),
                 });
             }
-            // At this rate each takes a millisecond.
+            // At this rate the transmission of each record takes a millisecond.
             rig.run(80);
         }
         rig.run(10);
         let records = rig.hosts[index(port)].records.iter();
         let records: Vec<_> = records.map(|r| (r.frame_type, r.status, r.length)).collect();
         let lost = rig.telemetry().records_lost as usize - lost_before;
-        // Noise joins the record of noise that waits; no other record joins.
+        // Noise is merged with the record of waiting noise. No other record is merged.
         let noise = |record: &&(u8, FrameStatus, u16)| record.0 == 0;
         let count = |all: &[(u8, FrameStatus, u16)]| all.iter().filter(|record| !noise(record)).count();
         assert!(count(&records) + lost >= count(&expected), "{name}: {records:?} instead of {expected:?}");
@@ -109,7 +111,7 @@ fn j03_records_of_kept_streams_are_those_of_the_reference() {
     unharmed(rig);
 }
 
-/// Good frames with any body, to a controller that could obey them.
+/// Valid frames with any body, sent to a controller that could execute them.
 #[test]
 fn j07_kept_frames_with_any_body() {
     let mut rig = fast();
@@ -123,7 +125,7 @@ fn j07_kept_frames_with_any_body() {
     unharmed(rig);
 }
 
-/// Both lines at once, at full load: the program for 15 MBd, and another board's program at the default rate.
+/// Full load on both lines at once: with the 15 MBd firmware, and with another board's firmware at the default rate.
 #[test]
 fn j07_random_bytes() {
     for (seed, mut rig, bytes) in [(1, fast(), 150_000), (2, Rig::new(BOARDS[2]), 6_000)] {
@@ -131,7 +133,7 @@ fn j07_random_bytes() {
         let mut rng = fastrand::Rng::with_seed(seed);
         rig.bring_up(Port::Usart3);
         for port in PORTS {
-            // The parser reacts to headers.
+            // The bytes contain many header bytes, because the parser reacts to headers.
             let noise: Vec<u8> =
                 (0..bytes).map(|_| if rng.u8(..) < 40 { 0x9B } else { rng.u8(..) }).collect();
             rig.write(port, &noise);
@@ -140,7 +142,7 @@ fn j07_random_bytes() {
     }
 }
 
-/// Frames with a good CRC and any type, length and body.
+/// Frames with a valid CRC and any type, length and body.
 #[test]
 fn j07_random_frames_of_hosts() {
     let mut rng = fastrand::Rng::with_seed(3);
@@ -155,7 +157,7 @@ fn j07_random_frames_of_hosts() {
     unharmed(rig);
 }
 
-/// J-15: any frame that a bus can carry, between those of the real nodes.
+/// J-15: any frames that can occur on a bus, between the frames of the real nodes.
 #[test]
 fn j15_random_frames_on_the_joint_bus() {
     for seed in 4..7 {
@@ -172,7 +174,7 @@ fn j15_random_frames_on_the_joint_bus() {
             }
             rig.step();
         }
-        // Without these frames the bus recovers, and any host can clear the errors.
+        // Without these frames the bus recovers, and a host can clear the errors.
         rig.wait("the bus is free", 1_000, |rig| rig.board.machine.chip().fdcan.wire.waiting() < 8);
         rig.run(50);
         rig.ask(Port::Usart2, &jtc_sim::host::clear_all());
@@ -185,7 +187,7 @@ fn random_frame(rng: &mut fastrand::Rng) -> CanFrame {
     const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 16, 20, 24, 48, 64];
     let id = match rng.u8(0..4) {
         0 => rng.u32(0..0x800),
-        // Answers of existing and non-existing nodes.
+        // Answers with identifiers of existing and non-existing nodes.
         _ => [0x200, 0x200, 0x210, 0x2F0][rng.usize(0..4)] + rng.u32(0..9),
     };
     let standard = Id::standard(id).expect("11 bits");

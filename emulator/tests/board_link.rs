@@ -1,4 +1,4 @@
-//! Both serial lines: gaps, long frames, the line of each record, floods.
+//! Both serial lines: gaps, long frames, the line on which each record is sent, overload.
 mod rig;
 
 use jtc_sim::host;
@@ -12,7 +12,7 @@ use rig::{BOARDS, PORTS, Rig, elf, fast_elf, index};
 const A: Port = Port::Usart2;
 const B: Port = Port::Usart3;
 
-/// Returns segment 0 of 1 with that many points, which stand still at 0.
+/// Returns a segment 0 of 1 with this number of points, all at position 0.
 fn segment(points: usize) -> Vec<u8> {
     let mut frame = vec![0; 60_000];
     let still = std::iter::repeat_n(RawPoint::default(), points);
@@ -21,7 +21,7 @@ fn segment(points: usize) -> Vec<u8> {
     frame
 }
 
-/// Runs until the line of a port has been silent for that long.
+/// Runs until the line of a port has been silent for this time.
 fn silence(rig: &mut Rig, port: Port, ms: u64) {
     rig.wait("the line falls silent", 10_000, |rig| rig.board.pending(port) == 0);
     rig.run(ms);
@@ -33,17 +33,18 @@ fn no_losses(rig: &mut Rig) {
     }
 }
 
-/// J-03, J-05. Sends the first half of a frame, a silence of whole ms, the other half.
+/// J-03, J-05: sends the first three bytes of a frame, waits a whole number of ms, then sends the rest.
 #[test]
 fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // Long enough that no silence after it wakes the program.
+        // The rest of the frame takes so long that no idle line wakes the program right after the gap.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
-        // With the time of the bytes the silence is 0.2 ms shorter than the time between the halves.
-        // At any moment between two ticks.
+        // The transmission time of the first bytes makes the silence 0.2 ms shorter than the time between the two
+        // parts.
+        // The parts are sent at different times between two ticks.
         let moments = [0, 300, 600].into_iter().flat_map(|us| [1, 3, 4, 5, 6, 8, 12].map(|ms| (us, ms)));
         for (us, ms) in moments {
             let later = |rig: &mut Rig| {
@@ -74,7 +75,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     }
 }
 
-/// J-01, J-07: the longest possible frames, on both lines at once, without the loss of a byte or a tick.
+/// J-01, J-07: the longest possible frames, on both lines at once, without losing a byte or a tick.
 fn longest_frames(mut rig: Rig) {
     rig.bring_up(A);
     let (accepted, refused) = (segment(1500), segment(1666));
@@ -111,7 +112,8 @@ fn j01_frames_of_60_000_bytes_at_15_mbd() {
     longest_frames(rig);
 }
 
-/// J-04: an answer goes to the line of the request, in order, regardless of simultaneous frames on the other line.
+/// J-04: each answer is sent on the line of its request, in order, while frames arrive on the other line at the same
+/// time.
 #[test]
 fn j04_every_port_gets_its_own_records() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -134,7 +136,7 @@ fn j04_every_port_gets_its_own_records() {
             host.records.clear();
         }
         for (port, frames) in PORTS.into_iter().zip(asked) {
-            // The halves of a round begin at other moments of the tick.
+            // In each round the frames begin at another time within the tick.
             for (_, frame) in frames.iter().cycle().skip(round).take(frames.len()) {
                 rig.write(port, frame);
             }
@@ -150,28 +152,28 @@ fn j04_every_port_gets_its_own_records() {
     }
 }
 
-/// J-04: "at once" is the tick after the frame's last byte.
+/// J-04: "at once" means in the tick after the frame's last byte.
 #[test]
 fn j04_a_record_waits_for_nothing_but_the_tick() {
     let mut rig = Rig::new(BOARDS[0]);
     rig.run(65);
     for shift in 0..40 {
-        // Right after a status, when the line is free again.
+        // The request is sent right after a status, when the line is free again.
         let port = PORTS[shift % 2];
         rig.run(1 + shift as u64);
         rig.wait("the line is free", 50, |rig| rig.flight.status_free && rig.ticks % 40 > 25);
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // Six bytes in, one tick at most, 175 bytes out, at 86.8 µs each; unless a periodic status was sent just
-        // before.
+        // Six bytes are received, at most one tick passes, and 175 bytes are sent, at 86.8 µs per byte. It takes longer
+        // if a periodic status was sent just before.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
     }
 }
 
-/// J-03, J-07: noise of any kind costs one record, and no frame that follows it is lost, with or without a gap.
+/// J-03, J-07: noise of any kind costs one record. No frame after it is lost, with or without a gap.
 #[test]
 fn j03_noise_costs_no_frame_that_follows() {
     let mut rig = Rig::new(BOARDS[0]);
@@ -183,7 +185,7 @@ fn j03_noise_costs_no_frame_that_follows() {
     for (n, noise) in [&every[..], &header, &headers, &zeros, &[0x9B]].into_iter().enumerate() {
         for (gap, port) in [(8, A), (8, B), (0, A), (0, B)] {
             if gap == 0 && noise == header {
-                // After a header that announces 59 974 bytes the parser waits for a gap; only then it parses the bytes
+                // After a header that announces 59 974 bytes, the parser waits for a gap before it parses the bytes
                 // that follow.
                 rig.write(port, noise);
             }
@@ -204,8 +206,8 @@ fn j03_noise_costs_no_frame_that_follows() {
     no_losses(&mut rig);
 }
 
-/// J-07: a port that floods neither delays the tick (checked in every millisecond) nor lets the other port wait for
-/// more than the records that are ahead of it.
+/// J-07: a port with continuous traffic does not delay the tick (checked in every millisecond). The other port waits at
+/// most for the records that are ahead of its own.
 #[test]
 fn j07_a_flooding_port_does_not_starve_the_other() {
     for (flood, other) in [(A, B), (B, A)] {
@@ -227,7 +229,7 @@ fn j07_a_flooding_port_does_not_starve_the_other() {
     }
 }
 
-/// J-04 at 15 MBd, to the end: while at most 64 records wait on a line, every frame gets its record.
+/// J-04 at 15 MBd: while at most 64 records wait on a line, every frame gets its record.
 #[test]
 fn j04_a_host_that_pipelines_loses_no_record() {
     let mut rig = Rig::of(fast_elf(), &BoardConfig { baud: 15_000_000, ..Default::default() });
@@ -247,7 +249,7 @@ fn j04_a_host_that_pipelines_loses_no_record() {
     no_losses(&mut rig);
 }
 
-/// Returns a board while it moves along a path, with the host at A.
+/// Returns a board that moves the arm along a path, with the host at port A.
 fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     let mut rig = Rig::of(elf, &BoardConfig { baud, ..Default::default() });
     rig.bring_up(A);
@@ -261,7 +263,7 @@ fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     rig
 }
 
-/// J-04: a Stop acts in the tick after its last byte, regardless of the bytes that either line has brought before.
+/// J-04: a Stop takes effect in the tick after its last byte, whatever bytes have arrived on either line before it.
 #[test]
 fn j04_a_stop_waits_for_nothing() {
     let clear = fixed::CLEAR_OCCURRED_ERRORS;
@@ -287,7 +289,7 @@ fn j04_a_stop_waits_for_nothing() {
                     break;
                 }
             }
-            // The last byte is on the wire in this millisecond: it is there for the next tick or the one after.
+            // The last byte is transmitted in this millisecond, so the next tick or the one after it finds it.
             let mut ticks = 0;
             while rig.flight.urgent[index(port)].is_empty() {
                 ticks += 1;

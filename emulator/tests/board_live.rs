@@ -1,4 +1,4 @@
-//! The command `jtc`, as a user types it, with the board's program at the other end of a pseudo-terminal, in real time.
+//! The command `jtc` as a user runs it, connected through a pseudo-terminal to the board's firmware, in real time.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
@@ -26,7 +26,7 @@ impl Finished {
     }
 }
 
-/// A board at a pseudo-terminal, and the program that talks to it.
+/// A board on a pseudo-terminal, and the program that communicates with it.
 struct Live {
     jtc: PathBuf,
     directory: PathBuf,
@@ -66,7 +66,7 @@ impl Live {
         finished(self.command(words).spawn().expect("jtc starts"))
     }
 
-    /// Waits until a status shows the value.
+    /// Waits until a status contains the value.
     #[track_caller]
     fn wait_for(&self, name: &str, value: &str) {
         let begin = Instant::now();
@@ -103,7 +103,7 @@ fn interrupt(child: &Child) {
     assert!(status.is_ok_and(|status| status.success()), "kill");
 }
 
-/// Returns a motion that starts slightly off the zero pose, out and back there, 5 s in all.
+/// Returns a motion of 5 s that starts slightly off the zero pose, moves out and returns there.
 fn motion() -> String {
     let mut text = String::from("t,q1,q2,q3,q4,q5,q6\n");
     for i in 0..=250 {
@@ -123,7 +123,7 @@ fn a_session_at_the_command_line() {
     let mut live = Live::start(jtc.into(), &Path::new(&firmware).join("nucleo-h745zi-q.elf"));
     let status = live.jtc(&["status"]).ends(0);
     assert!(status.out.contains(r#""missing_parameters":["friction"#), "{}", status.out);
-    // The board runs exactly this file.
+    // The emulated board runs exactly this file.
     let image =
         |board: &str| Path::new(&firmware).join(format!("{board}.elf")).to_string_lossy().into_owned();
     let verified = live.jtc(&["firmware", "verify", "--image", &image("nucleo-h745zi-q")]).ends(0);
@@ -142,7 +142,7 @@ fn a_session_at_the_command_line() {
     assert!(run.shows("outcome", "finished"), "{}", run.out);
     live.wait_for("trajectory", "Finish");
 
-    // A finished run is not resumed.
+    // A finished run cannot be resumed.
     live.jtc(&["traj", "resume"]).ends(4);
     live.jtc(&["traj", "stop"]).ends(0);
     live.wait_for("trajectory", "Stop");
@@ -163,7 +163,7 @@ fn a_session_at_the_command_line() {
     let doctor = live.jtc(&["doctor"]).ends(0);
     assert!(doctor.out.contains(r#""healthy":true"#), "{}", doctor.out);
 
-    // The board was never reset, and ends on a signal.
+    // The board was never reset, and its process ends when it gets a signal.
     interrupt(&live.board);
     assert_eq!(live.board.wait().expect("it ends").code(), Some(0));
     let mut errors = String::new();

@@ -1,4 +1,4 @@
-//! J-56: the flight recorder of the board, in memory that a reset does not change.
+//! J-56: the flight recorder of the board, in memory that survives a reset.
 mod rig;
 
 use jtc_core::recorder::{BLOCK_BYTES, Block, Log, Outcome, Replay};
@@ -11,7 +11,7 @@ use rig::{BOARDS, Rig};
 
 const HOST: Port = Port::Usart3;
 
-/// Returns a board while it moves along a trajectory of many seconds.
+/// Returns a board that moves the arm along a trajectory of many seconds.
 fn moving() -> Rig {
     let sim = SimConfig { start: [0.0, 0.5, -0.4, 0.3, 0.0, 0.0], ..SimConfig::default() };
     let mut rig = Rig::with(BOARDS[0], BoardConfig { sim, ..Default::default() });
@@ -33,7 +33,8 @@ fn memory(rig: &Rig) -> Vec<Block> {
     names.into_iter().zip(jtc_sim::RECORDER_BLOCKS).flat_map(piece).collect()
 }
 
-/// Replays the log of the shadow controller: the telemetry of each tick, which must not differ in any tick.
+/// Replays the log of the shadow controller and returns the telemetry of each tick. The replay must agree in every
+/// tick.
 fn replayed(rig: &Rig) -> Vec<Telemetry> {
     let shadow = rig.shadow.as_ref().expect("a controller");
     let blocks: Vec<Block> = shadow.recorder().blocks().copied().collect();
@@ -46,8 +47,8 @@ fn replayed(rig: &Rig) -> Vec<Telemetry> {
         .collect()
 }
 
-/// The board writes the same log as the recorder on this machine, to the last word; and a replay on this machine gives
-/// the values that the board computed: two seconds at least before the error, and 0.3 s after it.
+/// The board writes the same log as the recorder on the PC, down to the last word. A replay on the PC gives the values
+/// that the board computed, for at least two seconds before the error and 0.3 s after it.
 #[test]
 fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     let mut rig = moving();
@@ -71,13 +72,13 @@ fn j56_a_replay_on_a_pc_is_what_the_board_did() {
     }
 }
 
-/// A watchdog reset does not interrupt a log, and the next start keeps it. Its pages are fetched, equal those of the
-/// shadow controller byte by byte, and replay up to the last tick before the reset.
+/// A watchdog reset does not interrupt a log, and the next start keeps the log. Its pages are read out, equal the pages
+/// of the shadow controller byte by byte, and can be replayed up to the last tick before the reset.
 #[test]
 fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
     let mut rig = moving();
     let last = rig.telemetry().tick;
-    // TIM7 is masked: no more ticks come.
+    // TIM7 is masked, so no tick follows.
     rig.may_hang = true;
     rig.board.machine.write_register(0xE000_E184, 1 << (55 - 32));
     rig.run(30);
@@ -99,7 +100,7 @@ fn j56_a_log_outlasts_the_reset_of_a_board_that_hangs() {
         .collect();
     assert!(ticks.last().is_some_and(|tick| last - tick <= 500), "{ticks:?} {last}");
 
-    // A whole block by frames; each byte is compared with the answers of the shadow controller.
+    // Reads a whole block with frames. Each byte is compared with the answers of the shadow controller.
     for offset in (0..BLOCK_BYTES).step_by(232) {
         rig.ask(HOST, &fixed::get_log(0, offset as u16));
         rig.run(60);

@@ -1,4 +1,4 @@
-//! Safety functions: safety input, a tick that hangs, faults and panics of the program.
+//! Safety functions: safety input, a hanging tick, faults and panics of the program.
 mod rig;
 
 use jtc_bus::Request;
@@ -22,7 +22,7 @@ fn holding() -> Rig {
     rig
 }
 
-/// Returns the same board while it moves along a trajectory.
+/// Returns the same board while it moves the arm along a trajectory.
 fn moving() -> Rig {
     let mut rig = holding();
     rig.set_off(HOST, 1.0, 500);
@@ -37,8 +37,8 @@ fn torque_of(frame: &can_link::CanFrame) -> Option<[f64; 6]> {
     }
 }
 
-/// J-22, J-12, J-21: Error in the first tick that reads 0, with zero torque in the frame of that tick. A broken wire
-/// has the same effect. The error stays until the wire is repaired and the host has cleared it.
+/// J-22, J-12, J-21: Error begins in the first tick that reads 0, and the frame of this tick has zero torque. A broken
+/// wire has the same effect. The error stays until the wire is repaired and the host has cleared it.
 #[test]
 fn j22_the_safety_input_acts_in_one_tick() {
     for level in [Some(false), None] {
@@ -49,7 +49,7 @@ fn j22_the_safety_input_acts_in_one_tick() {
             assert!(!rig.flight.safety_input && rig.telemetry().errors & error::EMERGENCY_INPUT != 0);
             let sent: Vec<_> = rig.bus.iter().filter(|e| e.from_controller).map(|e| &e.frame).collect();
             assert_eq!(sent.into_iter().map(torque_of).collect::<Vec<_>>(), [Some([0.0; 6])], "on the bus");
-            // Clearing has no effect while the cause persists.
+            // Clearing has no effect while the cause is present.
             rig.ask(HOST, &frames::clear_all());
             rig.run(50);
             assert_eq!(rig.state(), ControllerState::Error);
@@ -68,8 +68,8 @@ fn j22_the_safety_input_acts_in_one_tick() {
     }
 }
 
-/// Sets the safety input low for `us`, beginning this long after the start of a millisecond; returns `true` if one of
-/// the next two ticks has seen it.
+/// Sets the safety input low for `us` µs, beginning `phase` µs after the start of a millisecond. Returns `true` if one
+/// of the next two ticks has detected it.
 fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
     let start = rig.board.now_ms() * 1000 + phase;
     rig.board.machine.run_until(start * MICROSECOND);
@@ -82,7 +82,7 @@ fn pulse(rig: &mut Rig, phase: u64, us: u64) -> bool {
     })
 }
 
-/// J-22: a pulse of the safety input between two ticks is latched at any phase, and acts in the next tick.
+/// J-22: a pulse of the safety input between two ticks is latched at any phase, and takes effect in the next tick.
 #[test]
 fn j22_pulses_shorter_than_a_tick_are_seen() {
     let mut rig = holding();
@@ -92,7 +92,7 @@ fn j22_pulses_shorter_than_a_tick_are_seen() {
     for us in [50, 100, 200, 300] {
         for phase in (5..995 - us).step_by(23) {
             assert!(pulse(&mut rig, phase, us), "{us} µs, {phase} µs after the start of a millisecond");
-            // The pulse is seen once.
+            // The pulse is detected only once.
             rig.step();
             assert!(rig.flight.safety_input, "{us} µs, {phase} µs after the start of a millisecond");
         }
@@ -105,22 +105,22 @@ fn j22_pulses_shorter_than_a_tick_are_seen() {
     }
 }
 
-/// How a program ended.
+/// Data about how a program ended.
 struct End {
     /// Time of the fault or of the last tick.
     begin: Time,
     /// Time of the reset.
     reset: Time,
     cause: ResetCause,
-    /// Its last words.
+    /// Record that the program left about its end.
     last_words: Vec<u8>,
-    /// Torques of the frames that passed between the two.
+    /// Torques in the frames that were sent between these two times.
     torques: Vec<[f64; 6]>,
     /// Level of the safety output before the reset.
     safety: Option<bool>,
 }
 
-/// Runs until the board has ended and started again. `undo` runs before the new program's first tick.
+/// Runs until the board has been reset and started again. `undo` is called before the first tick of the new program.
 fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     rig.may_hang = true;
     let begin = rig.board.machine.now();
@@ -130,7 +130,7 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     let mut torques = Vec::new();
     let mut seen = 0;
     for _ in 0..20 {
-        // In small steps up to the next millisecond, so that the machine is stopped between reset and start.
+        // Runs in small steps up to the next millisecond, so that the machine is stopped between reset and start.
         for _ in 0..99 {
             let safety = rig.board.safety_output();
             let next = rig.board.machine.now() + 10 * MICROSECOND;
@@ -157,8 +157,8 @@ fn until_reset(rig: &mut Rig, undo: impl FnOnce(&mut Rig)) -> End {
     panic!("no reset");
 }
 
-/// Checks the state after any such end: the error is present from the first status on, with zero torque and the safety
-/// output at 0, until the host clears it; no motion continues by itself.
+/// Checks the state after such an end. From the first status on, the error is present, the torque is zero and the
+/// safety output is at 0, until the host clears the error. No motion continues by itself.
 fn latched_until_cleared(mut rig: Rig, cause: u32) {
     rig.wait("the first tick", 10, |rig| rig.ticks > 0);
     assert_eq!(rig.flight.cause, cause);
@@ -195,14 +195,14 @@ fn latched_until_cleared(mut rig: Rig, cause: u32) {
     assert_eq!(rig.board.safety_output(), Some(true));
 }
 
-/// Returns the largest motion of a joint since then, rad.
+/// Returns the largest motion of a joint since the positions `since`, rad.
 fn moved(rig: &Rig, since: &[f64; 6]) -> f64 {
     rig.board.plant().truth().q.iter().zip(since).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
 }
 
 const CONTROL_STEP: &str = "control_step";
 
-/// Overwrites the first instructions of a function; returns the old ones.
+/// Overwrites the first instructions of the control step; returns the old ones and their address.
 fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
     let at = rig.board.machine.elf().symbol(CONTROL_STEP).expect("the control step").address;
     let old = rig.board.machine.memory(at, code.len()).expect("flash");
@@ -210,10 +210,10 @@ fn patch(rig: &mut Rig, code: &[u8]) -> (u32, Vec<u8>) {
     (at, old)
 }
 
-/// J-12: a tick that does not end, and one that does not begin, end in a reset by the watchdog within 6 ms.
+/// J-12: if a tick does not end, or does not begin, the watchdog resets the board within 6 ms.
 #[test]
 fn j12_a_tick_that_hangs_resets_the_board() {
-    // `b .`, and the interrupt of TIM7 masked in the NVIC.
+    // `true`: the step is replaced by `b .`; `false`: the interrupt of TIM7 is masked in the NVIC.
     for hang in [true, false] {
         let mut rig = holding();
         let pose = rig.board.plant().truth().q;
@@ -236,7 +236,7 @@ fn j12_a_tick_that_hangs_resets_the_board() {
     }
 }
 
-/// J-24 in motion, too: the trajectory does not continue.
+/// J-24: after a reset during a motion, the trajectory does not continue.
 #[test]
 fn j24_after_a_hang_no_trajectory_goes_on() {
     let mut rig = moving();
@@ -245,8 +245,8 @@ fn j24_after_a_hang_no_trajectory_goes_on() {
     latched_until_cleared(rig, 4);
 }
 
-/// Checks the end by a fault or a panic: safety output to 0, one frame with zero torque, then the reset; the cause is
-/// kept.
+/// Checks the end by a fault or a panic: the safety output goes to 0, one frame with zero torque is sent, then the
+/// board is reset. The cause is kept.
 fn said_goodbye(end: &End) {
     assert_eq!(end.cause, ResetCause::Software);
     assert_eq!(
@@ -268,7 +268,7 @@ fn words(end: &End, n: usize) -> u32 {
 #[test]
 fn j12_a_hard_fault_takes_the_torque_away() {
     for mut rig in [holding(), moving()] {
-        // An instruction that does not exist.
+        // An undefined instruction.
         let (at, old) = patch(&mut rig, &[0x00, 0xDE]);
         let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
         said_goodbye(&end);
@@ -279,11 +279,11 @@ fn j12_a_hard_fault_takes_the_torque_away() {
     }
 }
 
-/// A wild pointer: a load from an unmapped address, in the tick.
+/// An invalid pointer: the tick loads from an unmapped address.
 #[test]
 fn j12_a_null_pointer_is_a_hard_fault() {
     let mut rig = holding();
-    // `movw r0, 0; movt r0, 0x6000; ldr r0, [r0]`: external memory, which is not there.
+    // `movw r0, 0; movt r0, 0x6000; ldr r0, [r0]` loads from external memory, which does not exist.
     let (at, old) = patch(&mut rig, &[0x40, 0xF2, 0x00, 0x00, 0xC6, 0xF2, 0x00, 0x00, 0x00, 0x68]);
     let end = until_reset(&mut rig, |rig| assert!(rig.board.machine.poke(at, &old)));
     said_goodbye(&end);
@@ -291,7 +291,7 @@ fn j12_a_null_pointer_is_a_hard_fault() {
     latched_until_cleared(rig, 5);
 }
 
-/// `b.w` from one address to another.
+/// Encodes `b.w` from one address to another.
 fn branch(from: u32, to: u32) -> [u8; 4] {
     let offset = to.wrapping_sub(from + 4);
     let bit = |n: u32| offset >> n & 1;
@@ -306,7 +306,7 @@ fn branch(from: u32, to: u32) -> [u8; 4] {
 #[test]
 fn j12_a_panic_takes_the_torque_away() {
     let mut rig = holding();
-    // Functions that panic; all take a place in the source as one of their first arguments, if any.
+    // Functions that panic. Each takes a source location as one of its first arguments, if it takes one at all.
     const PANICS: [&str; 4] = [
         "core::option::unwrap_failed",
         "core::panicking::panic_bounds_check",
@@ -315,7 +315,7 @@ fn j12_a_panic_takes_the_torque_away() {
     ];
     let elf = rig.board.machine.elf();
     let panic = PANICS.iter().find_map(|name| elf.symbol(name).ok()).expect("a function that panics").address;
-    // In free flash: the four arguments, the branch, a `Location`, a name.
+    // Written to free flash: the four arguments, the branch, a `Location`, a name.
     const STUB: u32 = 0x080F_0000;
     let mut stub = vec![0x03, 0x48, 0x01, 0x46, 0x02, 0x46, 0x03, 0x46];
     stub.extend(branch(STUB + 8, panic));
@@ -337,7 +337,7 @@ fn j12_a_panic_takes_the_torque_away() {
     latched_until_cleared(rig, 6);
 }
 
-/// A reset by the button or the supply is not a failure: the board starts without an error, in Init, and moves nothing.
+/// A reset by the button or the supply is not a failure. The board starts in Init without an error, and moves nothing.
 #[test]
 fn j24_reset_and_power_on_begin_in_init() {
     for (cause, number) in [(ResetCause::Pin, 2), (ResetCause::PowerOn, 1)] {

@@ -1,5 +1,5 @@
-//! J-54: the stored arm. The flash contents of an emulated board go from one board to the next, as over a loss of
-//! power. The test requests a store through the program's mailbox, which only a test or a debugger can reach.
+//! J-54: the stored arm. The test moves the flash contents of an emulated board to the next board, which simulates a
+//! loss of power. It requests a store through the firmware's mailbox, which is accessible only to a test or a debugger.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -15,7 +15,7 @@ const IMAGE_MAX: usize = jtc_core::slots::IMAGE_MAX;
 /// Addresses of the slots.
 const SLOTS: [u32; 2] = [BANK2 + 6 * 0x2_0000, BANK2 + 7 * 0x2_0000];
 
-/// The program's mailbox: words in the order of `firmware/src/arm_store.rs`.
+/// The firmware's mailbox: these words in the order of `firmware/src/arm_store.rs`.
 #[derive(Debug, PartialEq)]
 struct Mailbox {
     state: u32,
@@ -37,13 +37,13 @@ fn mailbox(machine: &Machine) -> Mailbox {
     Mailbox { state, length, sequence, failure, staging, loaded: [word(5), word(6), word(7)] }
 }
 
-/// Returns the image that the program found when it started, with its sequence number.
+/// Returns the image that the firmware found when it started, with its sequence number.
 fn loaded(machine: &Machine) -> Option<(Vec<u8>, u32)> {
     let [address, length, sequence] = mailbox(machine).loaded;
     (address != 0).then(|| (machine.memory(address, length as usize).expect("memory"), sequence))
 }
 
-/// Requests a store, as a frame of the host does.
+/// Requests a store in the same way as a host's frame does.
 fn ask(machine: &mut Machine, image: &[u8]) {
     let at = machine.elf().symbol("ARM_STORE").expect("the mailbox").address;
     let staging = mailbox(machine).staging;
@@ -52,8 +52,8 @@ fn ask(machine: &mut Machine, image: &[u8]) {
     assert!(machine.poke(at, &ASKED.to_le_bytes()));
 }
 
-/// Returns a board with this in its flash, some ticks after its start. If the time does not matter, a sector is erased
-/// fast.
+/// Returns a board with these flash contents, some ticks after its start. Erasing a sector is fast, except in tests of
+/// the erase time.
 fn board(bank2: Bank2) -> Rig {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { bank2, ..Default::default() });
     rig.board.machine.chip().flash.erase_time = 100 * MILLISECOND;
@@ -112,7 +112,7 @@ fn clean(rig: &mut Rig) {
     assert_eq!(wrong, None, "the first sectors are not the store's");
 }
 
-/// J-54: a stored image survives a loss of power, and the image before it stays until the next store but one.
+/// J-54: a stored image survives a loss of power, and the image before it stays in flash until the next store but one.
 #[test]
 fn j54_a_stored_image_outlasts_the_power() {
     let mut rig = board(Bank2::default());
@@ -129,14 +129,15 @@ fn j54_a_stored_image_outlasts_the_power() {
         assert_eq!(loaded(&rig.board.machine), Some((image.clone(), sequence)));
         clean(&mut rig);
     }
-    // Two in a row without a start between them.
+    // Stores two images in a row, without a restart between them.
     store(&mut rig, &images[2]);
     store(&mut rig, &images[1]);
     let rig = board(rig.board.machine.cut_power(9));
     assert_eq!(loaded(&rig.board.machine), Some((images[1].clone(), 6)));
 }
 
-/// J-50 to J-54: a host uploads an arm by frames and has it stored; after a loss of power the defaults are this arm.
+/// J-50 to J-54: a host uploads an arm with frames and requests to store it. After a loss of power the board starts
+/// with this arm.
 #[test]
 fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     const HOST: Port = Port::Usart3;
@@ -163,7 +164,7 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     rig.ask(HOST, &fixed::STORE_ARM);
     rig.wait("the arm is stored", 4_000, |rig| !working(rig));
     assert_eq!(mailbox(&rig.board.machine).state, DONE);
-    // The tick sees in its next turn what the links have done.
+    // The tick detects the result of the links when it runs next.
     rig.run(2);
     rig.ask(HOST, &fixed::GET_INFO);
     rig.run(60);
@@ -187,8 +188,8 @@ fn j54_an_arm_that_a_host_gives_is_the_boards_after_a_loss_of_power() {
     clean(&mut rig);
 }
 
-/// J-12: erasing a sector takes two seconds and more; every tick comes in time, with the same number of instructions as
-/// without an operation.
+/// J-12: erasing a sector takes at least two seconds. Meanwhile every tick is on time and has the same number of
+/// instructions as without an operation.
 #[test]
 fn j12_no_tick_is_late_while_the_flash_works() {
     let run = |ask_for: Option<&[u8]>| {
@@ -206,15 +207,15 @@ fn j12_no_tick_is_late_while_the_flash_works() {
     let (idle, none) = run(None);
     let (storing, operations) = run(Some(&image(IMAGE_MAX, 5)));
     assert_eq!((none, operations), (0, 1 + IMAGE_MAX / WORD + 1), "all is stored in that time");
-    // The tick reads the progress of the image, which changes its number of instructions by a few.
+    // The tick reads the progress of storing, which changes its number of instructions slightly.
     assert_eq!(idle.calls, storing.calls);
     for (idle, storing) in [(idle.min, storing.min), (idle.max, storing.max)] {
         assert!(idle.abs_diff(storing) <= 32, "instructions of the tick: {idle} and {storing}");
     }
 }
 
-/// J-54: the power fails at every operation of a store: before it, in the middle of it, after it. The board starts with
-/// the old image or the new one, complete, and stores the next.
+/// J-54: the power fails at every operation of a store: before it, in the middle of it, and after it. The board starts
+/// with either the old or the new image, complete, and can store the next image.
 #[test]
 fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     let images = [image(200, 1), image(IMAGE_MAX, 2), image(260, 3)];
@@ -238,7 +239,7 @@ fn j54_a_power_cut_at_any_operation_leaves_one_whole_image() {
     }
 }
 
-/// Stores an image on a board with this flash. Returns the flash afterwards, and the contents after a loss of power
+/// Stores an image on a board with this flash. Returns the flash afterwards, and its contents after a loss of power
 /// before, during and after operations, each with a description.
 fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     let mut rig = board(bank);
@@ -252,7 +253,8 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // The header decides, and a half-erased sector has many forms; of the many words a few are enough.
+        // The header decides if an image is valid, and a half-erased sector can have many contents, so both are tested
+        // thoroughly. Of the many data words a few are enough.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,
@@ -273,7 +275,7 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
     (rig.board.machine.cut_power(0), cuts)
 }
 
-/// The reset button, or the watchdog, in the middle of it is the same to the flash.
+/// For the flash, a reset by the button or the watchdog in the middle of an operation is the same as a loss of power.
 #[test]
 fn j54_a_reset_in_the_middle_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -298,7 +300,8 @@ fn start(bank: Bank2) -> Option<Vec<u8>> {
     loaded(&rig.board.machine).map(|(image, _)| image)
 }
 
-/// J-54: unreadable words are neither a fault nor an image, in any place of the slot; and they can be replaced.
+/// J-54: an unreadable word anywhere in a slot causes no fault, and its slot is not used as an image. The slot can be
+/// overwritten.
 #[test]
 fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     let mut rig = board(Bank2::default());
@@ -322,7 +325,7 @@ fn j54_a_slot_with_an_unreadable_word_is_not_used() {
     }
 }
 
-/// The flash reports an error: the program reports it, the previous image stays, and the next attempt may succeed.
+/// If the flash reports an error, the firmware reports it, the previous image stays, and the next attempt may succeed.
 #[test]
 fn j54_a_failed_store_leaves_the_image_of_before() {
     let (old, new) = (image(500, 1), image(700, 2));
@@ -333,7 +336,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
         rig.wait("the operation", 4_000, |rig| {
             let operations = &rig.board.machine.chip().flash.operations;
             let last = operations.last().map(|operation| operation.kind);
-            // An erasure takes long; words are written within milliseconds, and the present or the next one fails.
+            // An erase operation takes long. Words are written within milliseconds, and the current or the next one
+            // fails.
             last.is_some_and(|kind| matches!(kind, OperationKind::Program { .. }) == program)
                 && (program || rig.board.machine.chip().flash.busy_until(0).is_some())
         });
@@ -348,8 +352,8 @@ fn j54_a_failed_store_leaves_the_image_of_before() {
     assert_eq!(start(rig.board.machine.cut_power(0)), Some(new));
 }
 
-/// Failures that the flash does not report: keys that it no longer takes, a word that reads back differently, an
-/// erasure that never ends.
+/// Failures that the flash does not report: it no longer accepts keys, a word reads back differently, or an erase
+/// operation never ends.
 #[test]
 fn j54_a_store_that_cannot_work_ends() {
     let fails = |mut rig: Rig, failure: u32| {
@@ -387,7 +391,7 @@ fn j54_a_store_that_cannot_work_ends() {
     fails(rig, 5);
 }
 
-/// Every board's program finds an image that another board's program stored.
+/// The firmware of every board finds an image that the firmware of another board has stored.
 #[test]
 fn j54_every_board_loads_it() {
     let mut rig = board(Bank2::default());

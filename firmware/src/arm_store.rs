@@ -1,11 +1,11 @@
-//! The stored arm (J-54): an image of bytes that persists without power, and the operations of a host on it.
-//!
+//! The stored arm (J-54): an image of bytes that is kept without power, and the operations that a host can request on
+//! it.
 //! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. Later the
-//! tick hands an image over with [`begin`], and reads the result with [`progress`]. The rounds of the links store it, a
-//! small step in each ([`Store::step`]): no code waits for the flash, and no interrupt is delayed by more than a few
-//! instructions.
+//! tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that serves the links stores the
+//! image, one small step per pass ([`Store::step`]). No code waits for the flash, and no interrupt is delayed by more
+//! than a few instructions.
 //!
-//! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] drives the flash itself.
+//! `jtc_core::slots` defines the contents of the slots and the order of the steps; [`bank2`] operates the flash itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,27 +15,27 @@ use jtc_core::slots::{Action, Header, IMAGE_MAX, Slots, Storing, WORD, Word};
 
 use crate::bank2;
 
-/// Memory of one image.
+/// Memory for one image.
 pub type Buffer = [u8; IMAGE_MAX];
 
-/// The slowest sector takes 4 s to erase (data sheet), the slowest word 0.5 ms to program.
+/// The slowest sector takes 4 s to erase, the slowest word 0.5 ms to program (data sheet).
 const ERASE_MAX: Duration = Duration::from_secs(8);
 const PROGRAM_MAX: Duration = Duration::from_millis(50);
 
-/// Mailbox between tick and links. Its layout is fixed, so that a debugger can read it: words in this order.
+/// Mailbox between tick and links. Its layout is fixed so that a debugger can read it: these words in this order.
 #[repr(C)]
 pub struct Mailbox {
-    /// [`Mailbox::IDLE`] and so on.
+    /// State: [`Mailbox::IDLE`] or one of the other constants.
     state: AtomicU32,
-    /// Bytes of the image to be stored.
+    /// Number of bytes of the image to be stored.
     length: AtomicU32,
-    /// Sequence number of the image that was stored last.
+    /// Sequence number of the last stored image.
     sequence: AtomicU32,
     /// Last [`Failure`].
     failure: AtomicU32,
-    /// Address of the memory with the image to be stored.
+    /// Address of the buffer with the image to be stored.
     staging: AtomicU32,
-    /// Image that was found at the start: address or 0, bytes, sequence number.
+    /// Image found at the start: address (0: none), number of bytes, sequence number.
     loaded: [AtomicU32; 3],
 }
 
@@ -59,21 +59,21 @@ pub static ARM_STORE: Mailbox = Mailbox {
     loaded: [const { AtomicU32::new(0) }; 3],
 };
 
-/// Memory for an image to be stored; the side that has taken it out may use it.
+/// Buffer for an image to be stored. The side that has taken it out owns it.
 static STAGING: Mutex<Cell<Option<&'static mut Buffer>>> = Mutex::new(Cell::new(None));
-/// Image that was found at the start.
+/// Image found at the start.
 static LOADED: Mutex<Cell<Option<Loaded>>> = Mutex::new(Cell::new(None));
 
-/// The image that was found at the start.
+/// The image found at the start.
 #[derive(Clone, Copy)]
 pub struct Loaded {
-    /// Its bytes.
+    /// Bytes of the image.
     pub image: &'static [u8],
-    /// Its sequence number.
+    /// Sequence number of the image.
     pub sequence: u32,
 }
 
-/// Reason why an image is not taken.
+/// Reason why an image is not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
     /// The last image is not stored yet.
@@ -85,20 +85,20 @@ pub enum Refused {
 /// Progress of the last image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// No image was handed over since the start.
+    /// No image was passed to [`begin`] since the start.
     Idle,
     /// The image is being stored.
     Busy,
-    /// The image is stored, and is found at every later start.
+    /// The image is stored, and every later start finds it.
     Done {
-        /// Its sequence number.
+        /// Sequence number of the image.
         sequence: u32,
     },
-    /// The image is not stored; the image before it is still there.
+    /// The image could not be stored. The previous image is still stored.
     Failed(Failure),
 }
 
-/// Reason why an image could not be stored. The flags of the flash are in the log.
+/// Reason why an image could not be stored. The log contains the flash's error flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, defmt::Format)]
 #[repr(u8)]
 pub enum Failure {
@@ -114,7 +114,7 @@ pub enum Failure {
     Timeout = 5,
 }
 
-/// Hands over an image to be stored. Called by the tick; copies the bytes and returns at once.
+/// Accepts an image to be stored. Called by the tick; copies the bytes and returns at once.
 pub fn begin(image: &[u8]) -> Result<(), Refused> {
     if matches!(ARM_STORE.state.load(Ordering::Acquire), Mailbox::ASKED | Mailbox::BUSY) {
         return Err(Refused::Busy);
@@ -145,7 +145,7 @@ pub fn progress() -> Progress {
     }
 }
 
-/// Returns the image that was found at the start; it stays the same until the next start.
+/// Returns the image found at the start. It does not change until the next start.
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }
@@ -168,7 +168,7 @@ fn read(slot: usize, buffer: &mut Buffer) -> Option<Header> {
     header
 }
 
-/// Looks for the stored image. Call it once, before the first tick; the watchdog does not run yet.
+/// Finds the stored image. Must be called once, before the first tick, while the watchdog does not run yet.
 pub fn load(buffers: [&'static mut Buffer; 2]) -> Store {
     let [first, second] = buffers;
     let headers = [read(0, first), read(1, second)];
@@ -206,7 +206,7 @@ struct Job {
 }
 
 impl Store {
-    /// Carries out one step of the work, if there is any; takes a few microseconds.
+    /// Carries out one step of storing, if an image is being stored. Takes a few microseconds.
     pub fn step(&mut self) {
         let Some(job) = &mut self.job else {
             if ARM_STORE.state.load(Ordering::Acquire) == Mailbox::ASKED {
@@ -221,12 +221,12 @@ impl Store {
         }
     }
 
-    /// Takes an image over from the mailbox.
+    /// Takes an image out of the mailbox.
     fn start(&mut self) {
         let Some(image) = critical_section::with(|cs| STAGING.borrow(cs).take()) else { return };
         ARM_STORE.state.store(Mailbox::BUSY, Ordering::Relaxed);
         let length = (ARM_STORE.length.load(Ordering::Relaxed) as usize).min(IMAGE_MAX);
-        // The image is not too long, so a slot is always found.
+        // `begin` has checked the length, so a slot is always found.
         let Some(storing) = Storing::begin(&mut self.slots, &image[..length]) else { return };
         self.job = Some(Job { image, length, storing, begun: None });
         if bank2::busy() {
@@ -239,7 +239,7 @@ impl Store {
     fn end(&mut self, result: Result<(), Failure>) {
         let Some(Job { image, length, storing, .. }) = self.job.take() else { return };
         let flags = bank2::errors();
-        // If the bank is still busy, it is left alone and closed to reads; the next attempt checks it again.
+        // A bank that is still busy is left alone, and reads of it stay blocked. The next attempt checks it again.
         if !bank2::busy() {
             bank2::lock();
         }
@@ -268,7 +268,7 @@ impl Job {
         self.storing.action(self.image.get(..self.length).unwrap_or(&[]))
     }
 
-    /// Checks if the flash has finished, and begins the next action; returns `true` at the end.
+    /// Checks if the flash has finished, and begins the next action. Returns `true` when the image is stored.
     fn step(&mut self) -> Result<bool, Failure> {
         if let Some(begun) = self.begun {
             let limit = if matches!(self.action(), Action::Erase { .. }) { ERASE_MAX } else { PROGRAM_MAX };
@@ -289,7 +289,7 @@ impl Job {
         Ok(false)
     }
 
-    /// Checks that the flash has done the action.
+    /// Checks that the flash has carried out the action.
     fn check(&self) -> Result<(), Failure> {
         let failed = bank2::errors() != 0;
         match self.action() {

@@ -1,9 +1,10 @@
-//! Flash bank 2: its last two sectors keep the stored arm (J-54). Erasing and programming never block, and a damaged
-//! word cannot cause a fault when it is read.
+//! Flash bank 2, whose last two sectors contain the stored arm (J-54). Erasing and programming never block, and reading
+//! a damaged word causes no fault.
 //!
-//! While the bank is erased or programmed, a read of it would halt the processor until the operation ends: up to two seconds, but the
-//! watchdog allows only 4.5 ms. Therefore the protection unit blocks every access, including speculative reads and cache line fills
-//! ([`memory::bank2`]). The unit opens the bank only for the few instructions here, as memory that is neither cached nor read ahead of the
+//! A read of the bank during erasing or programming would halt the processor until the operation ends. That takes up to
+//! two seconds, but the watchdog allows only 4.5 ms. The memory protection unit therefore blocks every access,
+//! including speculative reads and cache line fills ([`memory::bank2`]). Only the few instructions in this module open
+//! the bank, as memory that is neither cached nor prefetched. Code and constants are in bank 1, which stays readable.
 //! program. Code and constants are in bank 1, which stays readable.
 use core::arch::asm;
 
@@ -14,11 +15,11 @@ use jtc_core::slots::{SLOTS, WORD, Word};
 
 use crate::memory;
 
-/// Sectors of the slots. The Cortex-M4 starts in the first sector of the bank, which is never changed.
+/// Sectors of the slots. The Cortex-M4 starts in the first sector of the bank, which is never modified.
 const SECTORS: [u8; SLOTS] = [6, 7];
 const SECTOR_BYTES: u32 = 128 * 1024;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// 32 bits at once: allowed at any supply of the boards.
+/// Programs 32 bits at once, which is permitted at every supply voltage of the boards.
 const PSIZE: u8 = 0b10;
 /// BFHFNMIGN in the register CCR of the core.
 const IGNORE_BUS_FAULTS: u32 = 1 << 8;
@@ -27,7 +28,7 @@ const IGNORE_BUS_FAULTS: u32 = 1 << 8;
 /// protection, read security, two wrong bits in a word.
 const ERRORS: u32 = 1 << 17 | 1 << 18 | 1 << 19 | 1 << 21 | 1 << 22 | READ_ERRORS;
 const READ_ERRORS: u32 = 1 << 23 | 1 << 24 | 1 << 26;
-/// Flags that are cleared together with the errors: end of operation, one wrong bit that was corrected.
+/// Flags that are cleared together with the errors: end of operation, corrected error of one bit.
 const REMARKS: u32 = 1 << 16 | 1 << 25;
 
 /// Returns the registers of the bank.
@@ -35,7 +36,7 @@ fn bank() -> Bank {
     pac::FLASH.bank(1)
 }
 
-/// Unlocks the registers; returns `false` if they refuse until the next reset.
+/// Unlocks the registers. Returns `false` if they stay locked until the next reset.
 pub fn unlock() -> bool {
     if bank().cr().read().lock() {
         KEYS.into_iter().for_each(|key| bank().keyr().write_value(key));
@@ -43,24 +44,24 @@ pub fn unlock() -> bool {
     !bank().cr().read().lock()
 }
 
-/// Ends an operation; afterwards no operation can begin before [`unlock`].
+/// Ends an operation and locks the registers. No operation can begin before [`unlock`].
 pub fn lock() {
     end();
     bank().cr().modify(|w| w.set_lock(true));
 }
 
-/// Returns `true` while an operation is not finished.
+/// Returns `true` while an operation is in progress.
 pub fn busy() -> bool {
     let sr = bank().sr().read();
     sr.bsy() || sr.qw()
 }
 
-/// Ends programming or erasing: later writes do not belong to that operation.
+/// Ends programming or erasing, so that later writes do not belong to that operation.
 pub fn end() {
     bank().cr().write(|w| w.set_psize(PSIZE));
 }
 
-/// Returns the errors since an operation began, bits of FLASH_SR2.
+/// Returns the errors since the operation began, as bits of FLASH_SR2.
 pub fn errors() -> u32 {
     bank().sr().read().0 & ERRORS
 }
@@ -95,13 +96,14 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
     let (words, _) = bytes.as_chunks::<4>();
     let at = address(slot, word) as *mut u32;
     let write = |n: usize| {
-        // SAFETY: within a sector that only this module uses; stores there go to the flash's buffer.
+        // SAFETY: the address is within a sector that only this module uses; stores to it go to the flash's write
+        // buffer.
         unsafe { at.add(n).write_volatile(u32::from_le_bytes(words[n])) }
     };
     let last = words.len() - 1;
     memory::bank2(true);
     (0..last).for_each(write);
-    // The last word starts programming: no interrupt comes before the bank is closed.
+    // The last word starts programming. Interrupts are masked until the bank is closed again.
     critical_section::with(|_| {
         write(last);
         memory::bank2(false);
@@ -110,11 +112,12 @@ pub fn program(slot: usize, word: usize, bytes: &Word) {
 
 /// Reads a word; returns `None` if it cannot be read. Must not be called while the bank is busy.
 ///
-/// A word whose programming or erasing was interrupted may have more wrong bits than the flash can correct. Reading it
-/// causes a bus fault, which the core ignores here; the flag that the flash sets shows the error instead.
+/// If programming or erasing a word was interrupted, the word may have more wrong bits than the flash can correct.
+/// Reading it causes a bus fault, which the core ignores here. The flag that the flash sets shows the error instead.
 pub fn read(slot: usize, word: usize) -> Option<Word> {
     clear();
-    // SAFETY: a register of the core. No other code changes it, and the bit acts only while faults are masked.
+    // SAFETY: a register of the core. No other code changes this bit, and the bit has an effect only while faults are
+    // masked.
     let ignore = |on: bool| unsafe {
         (*SCB::PTR).ccr.modify(|ccr| if on { ccr | IGNORE_BUS_FAULTS } else { ccr & !IGNORE_BUS_FAULTS });
     };
@@ -130,11 +133,12 @@ pub fn read(slot: usize, word: usize) -> Option<Word> {
     (bank().sr().read().0 & READ_ERRORS == 0).then_some(bytes)
 }
 
-/// Loads one word with faults masked. Each load is masked separately, so that the tick waits for one at most.
+/// Loads one word with faults masked. Each load is masked separately, so that the tick waits for one load at most.
 fn load(address: u32) -> u32 {
     let value: u32;
-    // SAFETY: an aligned load from flash. With FAULTMASK set and BFHFNMIGN a bus fault of it is ignored; the barrier waits for
-    // it. The protection unit continues to work with faults masked (HFNMIENA, `memory`), so it is neither cached nor read ahead.
+    // SAFETY: an aligned load from flash. With FAULTMASK and BFHFNMIGN set, the core ignores a bus fault of this load;
+    // the barrier waits for it. The protection unit stays active while faults are masked (HFNMIENA, `memory`), so the
+    // load is neither cached nor prefetched.
     unsafe {
         asm!(
             "cpsid f",

@@ -7,8 +7,8 @@ use jtc_bus::timing;
 /// Frequency at OSC_IN, Hz.
 pub const HSE_HZ: u32 = 8_000_000;
 
-/// `true` if Vcore comes from the SMPS, as the board is wired on delivery. Then the highest voltage scale is not
-/// allowed, and neither is the highest frequency.
+/// `true` if Vcore comes from the SMPS, as wired when the board is delivered. The highest voltage scale and the highest
+/// frequency are then not permitted.
 pub const SMPS: bool = cfg!(feature = "nucleo-h745zi-q");
 
 /// Output of a phase-locked loop.
@@ -33,7 +33,8 @@ impl Pll {
         self.vco() / self.divide
     }
 
-    /// Checks the reference manual's rules for the wide oscillator, and that no division rounds.
+    /// Returns `true` if the loop keeps the reference manual's rules for the wide-range oscillator and every division
+    /// is exact.
     const fn valid(&self) -> bool {
         let reference = HSE_HZ / self.m;
         HSE_HZ.is_multiple_of(self.m)
@@ -56,23 +57,23 @@ pub const SERIAL: Pll = Pll { m: 4, n: 180, divide: 3 };
 
 /// Core, Hz.
 pub const CORE_HZ: u32 = CORE.hz();
-/// Buses and memories: half of the core.
+/// Buses and memories: half of the core frequency.
 pub const AHB_HZ: u32 = CORE_HZ / 2;
-/// Peripherals: half of that.
+/// Peripherals: half of the bus frequency.
 pub const APB_HZ: u32 = AHB_HZ / 2;
 /// Timers run at twice the frequency of their bus.
 pub const TIMER_HZ: u32 = 2 * APB_HZ;
 
-/// Ticks of the controller in a second.
+/// Ticks of the controller per second.
 pub const TICK_HZ: u32 = 1_000;
 /// TIM7 counts microseconds.
 pub const TICK_PRESCALER: u32 = TIMER_HZ / 1_000_000;
-/// Microseconds in a tick.
+/// Microseconds per tick.
 pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
 
 const _: () = {
     assert!(CORE.valid() && CAN.valid() && SERIAL.valid());
-    // Highest frequencies at the voltage scale: VOS1 from the SMPS, VOS0 from the LDO.
+    // Highest frequencies for the voltage scale: VOS1 with the SMPS, VOS0 with the LDO.
     assert!(CORE_HZ <= if SMPS { 400_000_000 } else { 480_000_000 });
     assert!(APB_HZ <= if SMPS { 100_000_000 } else { 120_000_000 });
     assert!(CAN.hz() == timing::KERNEL_CLOCK_HZ && CAN.hz() <= APB_HZ);
@@ -83,7 +84,7 @@ const _: () = {
     assert!(SERIAL.hz() == 8 * 15_000_000);
 };
 
-/// Settings of a USART for a rate: the divider register, and whether a bit is sampled 8 instead of 16 times.
+/// Settings of a USART for a rate: the divider register, and if a bit is sampled 8 times instead of 16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Baud {
     /// Register BRR.
@@ -93,7 +94,7 @@ pub struct Baud {
 }
 
 impl Baud {
-    /// Settings for `rate` Bd; `None` when the clock cannot make it within 1 %.
+    /// Returns the settings for `rate` Bd; `None` if the clock cannot produce the rate within 1 %.
     pub const fn new(rate: u32) -> Option<Self> {
         let clock = SERIAL.hz();
         if rate == 0 || rate > clock / 8 {
@@ -137,7 +138,7 @@ mod tests {
         {
             let baud = Baud::new(wanted).unwrap_or_else(|| panic!("{wanted} Bd"));
             let error = rate(baud) / f64::from(wanted) - 1.0;
-            // The errors of both ends together may be about 3 %.
+            // The errors of both ends together may be about 3 %, so each end gets 1 %.
             assert!(error.abs() < 0.01, "{wanted} Bd: {error}");
         }
         assert_eq!(Baud::new(15_000_000), Some(Baud { brr: 0x10, over8: true }));

@@ -1,5 +1,5 @@
-//! Handling of a failed program: the safety output goes to 0, the drives get one last frame with zero torque, the cause
-//! is kept, and the processor is reset. After a reset: the data that the last program kept.
+//! Handling of a failed program: the safety output goes to 0, the drives get a last frame with zero torque, the cause
+//! is recorded, and the processor is reset. After a reset: reading the data that the last program kept.
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -12,11 +12,11 @@ use openjtc_firmware::reset::{self, Cause, Failure};
 
 use crate::{board, fdcan};
 
-/// Memory whose contents survive a reset: tightly coupled, so that no cache stands between a write and the cells.
+/// Memory whose contents survive a reset. It is tightly coupled, so that a write reaches the memory without a cache.
 #[repr(transparent)]
 pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: `boot` hands out the only reference; a fault, after which nothing else runs, writes through a pointer.
+// SAFETY: `boot` creates the only reference. A fault writes through a pointer, and no other code runs after it.
 unsafe impl<T: Send> Sync for Kept<T> {}
 
 /// Record of the last tick; layout in [`openjtc_firmware::flight`].
@@ -31,24 +31,24 @@ pub static FLIGHT: Kept<Flight> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 #[used]
 pub static LAST_WORDS: Kept<LastWords> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Number of starts since power came on.
+/// Number of starts since power-on.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.BOOTS")]
 #[used]
 pub static BOOTS: Kept<u32> = Kept(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Place in the source code or in the program at which the last program ended.
+/// Place at which the last program ended, in the source code or in the program memory.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct LastWords {
-    /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; any other value: no failure.
+    /// [`LastWords::HARD_FAULT`] or [`LastWords::PANIC`]; any other value means no failure.
     magic: u32,
     /// Panic: line of the source.
     line: u32,
     /// Hard fault: program counter and return address, 0 if unknown.
     pc: u32,
     lr: u32,
-    /// Hard fault: registers CFSR, HFSR, and the address if the fault has one.
+    /// Hard fault: registers CFSR and HFSR, and the address of the fault if it has one.
     cfsr: u32,
     hfsr: u32,
     address: u32,
@@ -79,25 +79,25 @@ impl LastWords {
 pub struct Boot {
     /// Cause of the start.
     pub cause: Cause,
-    /// Number of this start since power came on.
+    /// Number of this start since power-on.
     pub boots: u32,
-    /// `true` if power was off before it.
+    /// `true` if power was off before this start.
     pub lost_power: bool,
-    /// Record of how the last program ended, and its last tick if that was kept.
+    /// Record of how the last program ended, and its last tick if the flight record was kept.
     last_words: LastWords,
     last_flight: Option<(u64, u32, u8)>,
     /// The flight record of this program.
     pub flight: &'static mut Flight,
 }
 
-/// Reads the data from before the start. Must be the first call in the program, once.
+/// Reads the data of the last program. Must be called once, as the first call in the program.
 pub fn boot() -> Boot {
     let rsr = pac::RCC.rsr().read().0;
     pac::RCC.rsr().modify(|w| w.set_rmvf(true));
     let lost_power = reset::lost_power(rsr);
-    // SAFETY: nothing else refers to the three yet, and this is called once. After power-on they are random, with wrong
-    // check bits, so they are written before they are read. Otherwise they hold integers and floats, for which any bits
-    // are a value.
+    // SAFETY: no other reference to the three exists yet, and this function is called once. After power-on their
+    // contents are random, with wrong check bits, so they are written before they are read. Otherwise they contain
+    // integers and floats, for which all bit patterns are valid.
     let (words, flight, boots) = unsafe {
         let (words, flight) = (&mut *LAST_WORDS.0.get(), &mut *FLIGHT.0.get());
         let boots = &mut *BOOTS.0.get();
@@ -116,7 +116,7 @@ pub fn boot() -> Boot {
     Boot { cause, boots: *boots, lost_power, last_words, last_flight, flight }
 }
 
-/// Logs the origin of the start.
+/// Logs the cause of the start.
 pub fn log(boot: &Boot) {
     let words = &boot.last_words;
     match boot.cause {
@@ -141,11 +141,11 @@ pub fn log(boot: &Boot) {
     }
 }
 
-/// Leaves the machine safe, keeps the record, and restarts. Interrupts stay off.
+/// Puts the machine into a safe state, writes the record, and resets the processor. Interrupts stay disabled.
 fn end(words: LastWords) -> ! {
     cortex_m::interrupt::disable();
     board::safety_output_low();
-    // SAFETY: nothing else runs any more.
+    // SAFETY: no other code runs any more.
     unsafe { LAST_WORDS.0.get().write(MaybeUninit::new(words)) };
     fdcan::last_frame();
     SCB::sys_reset()
@@ -156,7 +156,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     let mut words = LastWords { magic: LastWords::PANIC, ..LastWords::NONE };
     if let Some(place) = info.location() {
         words.line = place.line();
-        // The end of the name is the most useful part.
+        // The end of the file name is the most useful part.
         let name = place.file().as_bytes();
         let name = &name[name.len().saturating_sub(words.file.len())..];
         for (to, from) in words.file.iter_mut().zip(name) {
@@ -166,7 +166,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(words)
 }
 
-/// Handles every unexpected interrupt, including the one that cannot be masked.
+/// Handles every unexpected interrupt, including the non-maskable interrupt.
 ///
 /// # Safety
 /// Only the processor may call it.
@@ -180,8 +180,8 @@ unsafe fn DefaultHandler(number: i16) {
     end(words)
 }
 
-/// Entry of the hard fault, to which all faults lead. The stack may be the cause of the failure: therefore a new one is
-/// begun, and the address of the old one is passed in the first argument.
+/// Entry of the hard fault, to which all other faults are escalated. The stack may be the cause of the failure, so a
+/// new stack is started, and the address of the old one is passed in the first argument.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 unsafe extern "C" fn hard_fault() -> ! {
@@ -200,7 +200,7 @@ unsafe extern "C" {
 }
 
 extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
-    // Words of the frame that the processor pushed: r0..r3, r12, lr, pc, xpsr.
+    // Indices of words in the frame that the processor pushed: r0..r3, r12, lr, pc, xpsr.
     const LR: usize = 5;
     const PC: usize = 6;
     let (bottom, top) = (&raw const _stack_end as usize, &raw const _stack_start as usize);
@@ -209,12 +209,12 @@ extern "C" fn hard_fault_with_stack(frame: usize) -> ! {
         if at < bottom || at + 4 > top || !at.is_multiple_of(4) {
             return 0;
         }
-        // SAFETY: within the stack and aligned. If the old stack was nearly empty, the new one may have overwritten it;
-        // then the value is wrong, but harmless.
+        // SAFETY: the address is within the stack and aligned. If the old stack was nearly empty, the new one may have
+        // overwritten it; the value is then wrong, but harmless.
         unsafe { (at as *const u32).read_volatile() }
     };
     let (pc, lr) = (word(PC), word(LR));
-    // SAFETY: registers that are only read.
+    // SAFETY: the registers are only read.
     let scb = unsafe { &*SCB::PTR };
     let cfsr = scb.cfsr.read();
     const MEMORY_ADDRESS: u32 = 1 << 7;

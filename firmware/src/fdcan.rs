@@ -1,8 +1,8 @@
-//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses it, and it never interrupts the tick.
+//! The joint bus: FDCAN1 with dedicated buffers (J-10). Only the tick uses it, and it causes no interrupts.
 //!
-//! At most one frame is sent per tick. The frame goes into the one of the two transmit buffers that the last frame did not use. If the next
-//! tick finds the last frame still unsent, it cancels that frame: a transmission that is on the wire at that moment ends there, and the
-//! frame is never sent late. Such a frame counts as unacknowledged.
+//! At most one frame is sent per tick. There are two transmit buffers; the frame goes into the one that the last frame
+//! did not use. If the next tick finds the last frame still unsent, it cancels that frame. A transmission on the wire
+//! at that moment still completes, but the frame is never sent later. A cancelled frame is reported as unacknowledged.
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use embassy_stm32::pac::can::Fdcan as Registers;
@@ -17,19 +17,19 @@ use openjtc_firmware::message_ram as ram;
 
 const CAN: Registers = FDCAN1;
 
-/// Reads of a register before the wait for a change that should take a few clock periods is given up.
+/// Number of times that a register is read while waiting for a change that should take a few clock periods.
 const PATIENCE: u32 = 10_000;
-/// Like `PATIENCE`, for waits within a tick, which must be short: the next tick looks again a millisecond later.
+/// Like `PATIENCE`, for waits within a tick, which must be short. The next tick checks again a millisecond later.
 const PATIENCE_IN_TICK: u32 = 100;
 
-/// Frames received in a tick.
+/// Frames received since the last tick.
 pub struct ReceivedFrames {
     frames: [Frame; ram::RX],
     count: usize,
 }
 
 impl ReceivedFrames {
-    /// No frame.
+    /// Creates an empty list.
     pub const fn new() -> Self {
         const NONE: Frame = Frame::new(0, &[]).expect("an empty frame is allowed");
         Self { frames: [NONE; ram::RX], count: 0 }
@@ -55,11 +55,11 @@ pub struct Counters {
     pub transmit: u8,
     /// Receive error counter.
     pub receive: u8,
-    /// Frames that were cancelled because the next tick had begun.
+    /// Number of frames that were cancelled because the next tick had begun.
     pub cancelled: u32,
-    /// Times the controller went off the bus.
+    /// Number of times that the controller went bus-off.
     pub bus_off: u32,
-    /// Frames that were not CAN FD with an 11-bit identifier (J-15).
+    /// Number of received frames that were not CAN FD frames with an 11-bit identifier (J-15).
     pub wrong_format: u32,
 }
 
@@ -70,18 +70,18 @@ impl Counters {
     }
 }
 
-/// The bus.
+/// The joint bus.
 pub struct Fdcan {
     /// Transmit buffer of the last frame.
     last: usize,
-    /// `true` if the last tick put a frame there.
+    /// `true` if the last tick put a frame into that buffer.
     sent: bool,
     recovering: bool,
     counters: Counters,
 }
 
 impl Fdcan {
-    /// Configures the controller and joins the bus.
+    /// Configures the controller and connects it to the bus.
     pub fn start() -> Self {
         rcc::enable_and_reset::<peripherals::FDCAN1>();
         CAN.cccr().modify(|w| w.set_init(true));
@@ -97,7 +97,7 @@ impl Fdcan {
         });
         set_timing();
 
-        // The memory is random after power-on and has check bits.
+        // The memory and its check bits are random after power-on.
         for word in 0..ram::BYTES / 4 {
             FDCANRAM.ram(word).write_value(0);
         }
@@ -105,7 +105,7 @@ impl Fdcan {
             FDCANRAM.ram(ram::FILTERS + n).write_value(ram::filter(n));
         }
         CAN.gfc().write(|w| {
-            // Reject frames that match no filter, and remote frames.
+            // Rejects frames that match no filter, and remote frames.
             w.set_anfs(3);
             w.set_anfe(3);
             w.set_rrfs(true);
@@ -127,8 +127,8 @@ impl Fdcan {
         Self { last: 0, sent: false, recovering: false, counters: Counters::new() }
     }
 
-    /// Takes the frames received since the last tick; returns the state of the bus. Call it before `send`, once per
-    /// tick.
+    /// Takes the frames received since the last tick, and returns the state of the bus. Must be called once per tick,
+    /// before `send`.
     pub fn poll(&mut self, frames: &mut ReceivedFrames) -> BusState {
         let acknowledged = self.finish_last();
         let off = self.recover();
@@ -142,12 +142,12 @@ impl Fdcan {
                 }
             }
         }
-        // The buffers are open again.
+        // Releases the buffers for new frames.
         CAN.ndat1().write_value(Ndat1(new));
         BusState { acknowledged, bus_off: off }
     }
 
-    /// Requests transmission of the frame of this tick. Drops it while the bus is off.
+    /// Requests transmission of this tick's frame. Drops the frame while the controller is bus-off.
     pub fn send(&mut self, frame: &Frame) {
         if self.recovering {
             return;
@@ -178,16 +178,17 @@ impl Fdcan {
         sent && CAN.txbto().read().0 & bit != 0
     }
 
-    /// Restarts a controller that is bus-off: ISO 11898-1 lets it rejoin after 129 times 11 recessive bits, counted
-    /// from when the program allows it. Returns `true` while it cannot send: no frame would leave, and drives keep
-    /// their last torque.
+    /// Restarts a controller that is bus-off. ISO 11898-1 lets it rejoin after 129 times 11 recessive bits, counted
+    /// from the time at which the program permits it. Returns `true` while it cannot send. Until then no frame is sent,
+    /// and the drives keep their last torque.
     fn recover(&mut self) -> bool {
         let control = CAN.cccr().read();
-        // INIT: the controller has stopped itself. ASM: it could not use its message memory, and now only listens.
+        // INIT: the controller has stopped itself. ASM: the controller could not access its message memory, and now
+        // only listens.
         if control.init() || control.asm() {
             CAN.cccr().modify(|w| w.set_init(true));
             wait(PATIENCE_IN_TICK, || CAN.cccr().read().init());
-            // Access to its configuration clears all transmit requests.
+            // Enabling access to the configuration clears all transmit requests.
             CAN.cccr().modify(|w| {
                 w.set_cce(true);
                 w.set_asm(false);
@@ -204,7 +205,7 @@ impl Fdcan {
 }
 
 fn set_timing() {
-    // The registers hold each value minus one.
+    // The registers contain each value minus one.
     let BitTiming { prescaler, segment1, segment2, jump_width } = timing::NOMINAL;
     CAN.nbtp().write(|w| {
         w.set_nbrp(prescaler - 1);
@@ -226,7 +227,7 @@ fn set_timing() {
     });
 }
 
-/// Leaves the initialisation mode. The bit is cleared in another clock domain: it must read 0 before it may be set
+/// Leaves the initialisation mode. The bit is cleared in another clock domain and must read 0 before it may be set
 /// again.
 fn leave_init(patience: u32) {
     CAN.cccr().modify(|w| {
@@ -236,12 +237,12 @@ fn leave_init(patience: u32) {
     wait(patience, || !CAN.cccr().read().init());
 }
 
-/// Checks up to `patience` times if it is `done`.
+/// Calls `done` up to `patience` times until it returns `true`; returns `false` if it never did.
 fn wait(patience: u32, done: impl Fn() -> bool) -> bool {
     (0..patience).any(|_| done())
 }
 
-/// Returns the frame in receive buffer `n`; `None` if its format is not used on this bus.
+/// Returns the frame in receive buffer `n`; `None` if this bus does not use its format.
 fn received(n: usize) -> Option<Frame> {
     let word = |i: usize| FDCANRAM.ram(ram::rx(n) + i).read();
     let (head, about) = (word(0), word(1));
@@ -257,7 +258,7 @@ fn received(n: usize) -> Option<Frame> {
     Frame::from_dlc((head >> 18 & 0x7FF) as u16, (about >> 16 & 0xF) as u8, &data)
 }
 
-/// Writes a frame into transmit buffer `n` and requests its transmission; returns `false` if the buffer is still in
+/// Writes a frame into transmit buffer `n` and requests its transmission. Returns `false` if the buffer is still in
 /// use.
 fn request(n: usize, frame: &Frame) -> bool {
     const FD: u32 = 1 << 21;
@@ -280,10 +281,10 @@ fn request(n: usize, frame: &Frame) -> bool {
     true
 }
 
-/// Takes the torque away after a failure of the program, if the bus can still be used. Otherwise gives up after about a
-/// millisecond. Called from a fault, when the state of all other parts is unknown.
+/// Sends zero torque to the drives after a failure of the program, if the bus can still be used. Gives up after about a
+/// millisecond. Called from a fault handler, when the state of all other parts is unknown.
 pub fn last_frame() {
-    /// A frame takes 0.1 ms, and up to seven answers may be on the bus before it.
+    /// A frame takes 0.1 ms, and up to seven answers may be sent before it.
     const LOOKS: u32 = 20_000;
     if !embassy_stm32::pac::RCC.apb1henr().read().fdcanen() || CAN.cccr().read().init() {
         return;

@@ -1,12 +1,12 @@
 //! The flight record: all inputs and outputs of the last tick.
 //!
-//! The record lies in memory that keeps its contents over a reset, under the symbol `FLIGHT`. Every tick writes its
-//! inputs before the controller runs, and its outputs after. A tool that reads the record after every tick can run the
-//! same ticks on a PC and must get the same bits. Host frames are named by type, length and CRC; only the host has
-//! their bytes.
+//! The record is in memory that keeps its contents over a reset, under the symbol `FLIGHT`. Every tick writes its
+//! inputs before the controller runs, and its outputs afterwards. A tool that reads the record after every tick can run
+//! the same ticks on a PC, and must get identical bits. For host frames the record contains only type, length and CRC;
+//! their bytes are known only to the host.
 //!
-//! All numbers are little-endian, as in the processor's memory. The layout is that of the structures below, which have
-//! no hidden padding; [`Flight::LAYOUT`] changes with it.
+//! All numbers are little-endian, as in the processor's memory. The structures below define the layout; they have no
+//! hidden padding. [`Flight::LAYOUT`] changes if they change.
 use jtc_bus::{Frame, MAX_LEN};
 use jtc_core::{BusState, HOST_LINES, HostEvent, Inputs, JOINTS, Telemetry};
 use jtc_wire::{EVENTS_MAX, LinkEvent, UrgentCommand, UrgentCommands};
@@ -19,13 +19,13 @@ use crate::message_ram::RX;
 pub struct FlightFrame {
     /// Identifier.
     pub id: u16,
-    /// Bytes of payload.
+    /// Number of payload bytes.
     pub len: u16,
     /// Payload, padded with zeros.
     pub data: [u8; MAX_LEN],
 }
 
-/// Identifier that means “no frame”.
+/// Identifier that means "no frame".
 pub const NO_FRAME: u16 = 0xFFFF;
 
 impl FlightFrame {
@@ -50,22 +50,22 @@ impl FlightFrame {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightEvent {
-    /// 0 no event, 1 a good frame, 2 a bad one, 3 noise; bit 6: it came on a plain line; bit 7: an urgent command has
-    /// overtaken it.
+    /// 0: no event, 1: a valid frame, 2: an invalid frame, 3: noise. Bit 6: it arrived on a line without extensions.
+    /// Bit 7: an urgent command has overtaken it.
     pub kind: u8,
-    /// Its line: 0 RS422, 1 USB.
+    /// Line of the event: 0 RS422, 1 USB.
     pub line: u8,
     /// Type byte, 0 if unknown.
     pub frame_type: u8,
-    /// Frame status as it will be reported.
+    /// Frame status that the controller will report.
     pub status: u8,
     /// Length in bytes, 0 if unknown.
     pub len: u16,
-    /// CRC of a good frame, else 0.
+    /// CRC of a valid frame, else 0.
     pub crc: u16,
 }
 
-/// Urgent commands of a line: kind (1 Stop, 2 Pause) and number received, the kind that came last at the end.
+/// Urgent commands of a line: kind (1 Stop, 2 Pause) and number received. The kind received last is at the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct FlightUrgent(pub [[u8; 2]; 2]);
@@ -90,7 +90,7 @@ impl FlightUrgent {
     }
 }
 
-/// The record.
+/// The flight record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Flight {
@@ -102,54 +102,54 @@ pub struct Flight {
     pub size: u16,
     /// Progress of the tick: one of the `PHASE_` constants.
     pub phase: u32,
-    /// [`crate::reset::Cause`] of the start of this program.
+    /// Cause of the start of this program, a [`crate::reset::Cause`].
     pub cause: u32,
     /// Number of the tick, from 1.
     pub tick: u64,
 
-    // Inputs.
+    // Inputs:
     /// Bit 0: the last tick's frame was acknowledged; bit 1: bus-off.
     pub bus_state: u8,
     /// Level of the safety input.
     pub safety_input: u8,
-    /// 1 if both lines could take a status.
+    /// 1 if both lines could accept a status.
     pub status_free: u8,
-    /// Frames in `received`.
+    /// Number of frames in `received`.
     pub received_count: u8,
-    /// Frames of the wrong format that were received instead (J-15), since the start.
+    /// Number of received frames with a wrong format since the start (J-15). They are not in `received`.
     pub wrong_format: u32,
-    /// Stop and Pause that arrived on each line.
+    /// Stop and Pause commands that arrived on each line.
     pub urgent: [FlightUrgent; HOST_LINES],
-    /// Number of host events that were offered.
+    /// Number of host events that were passed to the controller.
     pub event_count: u8,
     reserved: u8,
-    /// Ticks before this one that did not come or came late.
+    /// Number of ticks before this one that were missed or late.
     pub missed_ticks: u16,
-    /// These events, oldest first.
+    /// The host events, oldest first.
     pub events: [FlightEvent; EVENTS_MAX],
     /// Frames received since the last tick.
     pub received: [FlightFrame; RX],
 
-    // Outputs.
+    // Outputs:
     /// State of the controller.
     pub state: u8,
     /// Trajectory execution state.
     pub trajectory: u8,
     /// Level of the safety output.
     pub safety_output: u8,
-    /// A status was sent.
+    /// 1 if a status was sent.
     pub status: u8,
-    /// The frame sent.
+    /// Frame that was sent on the joint bus.
     pub sent: FlightFrame,
-    /// Index of the current 1 ms point.
+    /// Index of the current point, in ms.
     pub point: u32,
     /// Current error word.
     pub errors: u16,
-    /// Events that are done.
+    /// Number of host events that the controller has finished.
     pub host_done: u8,
-    /// Line of the response record in the status; 0xFF: the status has no record.
+    /// Line of the response record in the status; 0xFF if the status has no record.
     pub record_line: u8,
-    /// Torques commanded, N·m.
+    /// Commanded torques, N·m.
     pub torque: [f64; JOINTS],
 }
 
@@ -162,14 +162,14 @@ impl Flight {
     pub const LAYOUT: u16 = 3;
     /// Value of `record_line` for a status without a record.
     pub const NO_LINE: u8 = 0xFF;
-    /// No tick yet.
+    /// No tick has begun yet.
     pub const PHASE_NONE: u32 = 0;
-    /// The inputs are those of tick `tick`, the outputs those of the one before.
+    /// The inputs belong to tick `tick`, the outputs to the previous tick.
     pub const PHASE_INPUTS: u32 = 1;
-    /// The outputs belong to tick `tick`, too.
+    /// Inputs and outputs belong to tick `tick`.
     pub const PHASE_COMPLETE: u32 = 2;
 
-    /// The record before the first tick.
+    /// Creates the record before the first tick.
     pub const fn new(cause: u32) -> Self {
         Self {
             magic: Self::MAGIC,
@@ -202,7 +202,7 @@ impl Flight {
         }
     }
 
-    /// Returns `true` if this version of the program wrote the record.
+    /// Returns `true` if a program with this layout wrote the record.
     pub fn valid(&self) -> bool {
         self.magic == Self::MAGIC
             && self.layout == Self::LAYOUT

@@ -13,7 +13,7 @@ pub mod message_ram;
 pub mod reset;
 pub mod version;
 
-/// Name of the board this is built for, as in its feature.
+/// Name of the board for which the firmware is built, spelled as its feature.
 pub const BOARD: &str = match (
     cfg!(feature = "nucleo-h745zi-q"),
     cfg!(feature = "nucleo-h745zi-q-ldo"),
@@ -28,7 +28,7 @@ pub const BOARD: &str = match (
     ),
 };
 
-/// Rate of both serial lines, Bd: `OPENJTC_BAUD` of the build.
+/// Rate of both serial lines, Bd: `OPENJTC_BAUD` at build time.
 pub const BAUD: u32 = match u32::from_str_radix(env!("OPENJTC_BAUD"), 10) {
     Ok(baud) => baud,
     Err(_) => panic!("the build script checks it"),

@@ -1,9 +1,7 @@
-//! From bytes to frames: each line has its own parser. The events of the parsers go to the tick in batches, through one
-//! slot.
-//!
-//! A batch is a copy, so that a parser can take more bytes while the tick executes a long frame, slice by slice. If
-//! bytes come faster than the tick executes frames, they fill the parser's buffer, then the ring, and in the end some
-//! are lost. Stop and Pause are not lost, because the tick finds them by itself.
+//! Converts bytes to frames. Each line has its own parser, whose events go to the tick in batches, through one slot.
+//! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
+//! arrive faster than the tick executes frames, they fill first the parser's buffer, then the ring, and finally some
+//! are lost. Stop and Pause are not lost, because the tick searches the received bytes for them itself.
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -17,23 +15,23 @@ use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart;
 
-/// Inter-byte timeout: silence that ends a frame, µs (J-03).
+/// Inter-byte timeout, µs: a frame ends after this silence (J-03).
 pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
-/// Bytes that are given to a parser at once.
+/// Largest number of bytes passed to a parser at once.
 const CHUNK: usize = 1024;
-/// Largest number of rounds before the links wait for the next tick.
+/// Largest number of passes over the links before they wait for the next tick.
 const ROUNDS: usize = 64;
-/// Largest lag of the links, bytes: DMA overwrites bytes that are older than the ring is long, and continues while the
-/// links read.
+/// Largest lag of the links behind DMA, bytes. DMA overwrites bytes that are older than the length of the ring, and it
+/// continues while the links read.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
-/// Number of rounds of the links. The tick uses it to see that they are alive.
+/// Number of passes of the links. The tick reads it to detect that the links have stopped.
 pub static ROUNDS_DONE: AtomicU32 = AtomicU32::new(0);
 
-/// Bytes received on each line, modulo 2³², as of the last tick.
+/// Number of bytes received on each line, modulo 2³², at the last tick.
 pub static RECEIVED: [AtomicU32; lines::LINES] = [const { AtomicU32::new(0) }; lines::LINES];
 
-/// Place in which one side leaves the slot for the other. The side that holds the only reference may use it.
+/// A place through which one side passes the slot to the other. The side that holds the only reference may use it.
 type Place = Mutex<Cell<Option<&'static mut EventBatch>>>;
 static FULL: Place = Mutex::new(Cell::new(None));
 static EMPTY: Place = Mutex::new(Cell::new(None));
@@ -44,14 +42,14 @@ pub struct SlotIn(Option<&'static mut EventBatch>);
 /// The tick's end of the slot, with the batch that it executes.
 pub struct SlotOut(Option<&'static mut EventBatch>);
 
-/// Returns both ends of the slot, which is empty.
+/// Creates both ends of the slot, which is empty at first.
 pub fn slot(memory: &'static mut EventBatch) -> (SlotIn, SlotOut) {
     critical_section::with(|cs| EMPTY.borrow(cs).set(Some(memory)));
     (SlotIn(None), SlotOut(None))
 }
 
 impl SlotIn {
-    /// Adds an event to the batch; returns `false` if the tick holds the batch, or if it is full.
+    /// Adds an event to the batch. Returns `false` if the tick holds the batch, or if the batch is full.
     fn push(&mut self, received: &ReceivedEvent<'_>) -> bool {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| EMPTY.borrow(cs).take());
@@ -59,7 +57,7 @@ impl SlotIn {
         self.0.as_mut().is_some_and(|batch| batch.push(received))
     }
 
-    /// Hands the batch to the tick if it contains an event.
+    /// Passes the batch to the tick if it contains an event.
     fn send(&mut self) {
         if let Some(batch) = self.0.take_if(|batch| !batch.is_empty()) {
             critical_section::with(|cs| FULL.borrow(cs).set(Some(batch)));
@@ -68,7 +66,7 @@ impl SlotIn {
 }
 
 impl SlotOut {
-    /// Returns the batch, until all of it is done.
+    /// Returns the batch until all of its events are done.
     pub fn batch(&mut self) -> Option<&EventBatch> {
         if self.0.is_none() {
             self.0 = critical_section::with(|cs| FULL.borrow(cs).take());
@@ -92,13 +90,13 @@ pub struct Link {
     line: usize,
     uart: uart::Receiver,
     parser: Receiver<&'static mut [u8]>,
-    /// Bytes taken from the line, including lost ones.
+    /// Number of bytes taken from the line, including lost ones.
     taken: u64,
-    /// Bytes that were lost.
+    /// Number of bytes that were lost.
     lost: u64,
     /// Time at which the ring was last checked, µs.
     looked_us: u64,
-    /// Bytes that were left in the ring at that time.
+    /// Number of bytes left in the ring at that time.
     left: usize,
 }
 
@@ -109,9 +107,9 @@ impl Link {
         Self { line, uart, parser, taken: 0, lost: 0, looked_us: 0, left: 0 }
     }
 
-    /// Takes the bytes that have arrived and looks for an event; returns `true` if there is more to do at once.
+    /// Takes the bytes that have arrived and searches for an event. Returns `true` if there is more to do at once.
     fn receive(&mut self) -> bool {
-        // The clock first, so that a byte that arrives after it is not counted as silence before it.
+        // The clock is read first. Otherwise silence before a byte that arrives in between would be measured too long.
         let now = Instant::now().as_micros();
         self.catch_up();
         let waiting = self.uart.waiting();
@@ -134,11 +132,11 @@ impl Link {
         self.taken += count as u64;
     }
 
-    /// Drops all waiting bytes if DMA has come round to bytes that were not taken.
+    /// Drops all waiting bytes if DMA may have overwritten bytes that were not taken yet.
     fn catch_up(&mut self) {
         let received = RECEIVED[self.line].load(Ordering::Relaxed);
         let behind = received.wrapping_sub(self.taken as u32);
-        // Bytes taken since the last tick make the value negative.
+        // The value is negative if bytes were taken since the last tick.
         if behind > BEHIND && behind < 1 << 31 {
             self.lost += u64::from(behind);
             self.taken += u64::from(behind);
@@ -148,8 +146,8 @@ impl Link {
         }
     }
 
-    /// Gives the first of `new` bytes to the parser with its time of arrival, which matters for a gap before it: `now`
-    /// minus the duration of `new` bytes, but not before the ring was last checked.
+    /// Passes the first of `new` bytes to the parser, with its time of arrival, which decides if there was a gap before
+    /// it. The time is `now` minus the duration of `new` bytes, but not before the last check of the ring.
     fn begin(&mut self, now: u64, new: usize) {
         let first = (now.saturating_sub(duration_us(new))).max(self.looked_us);
         let mut byte = [0];
@@ -157,7 +155,7 @@ impl Link {
         self.take(taken);
     }
 
-    /// Adds the event of the parser to the batch if there is space.
+    /// Adds the parser's event to the batch if there is space.
     fn hand_over(&mut self, slot: &mut SlotIn) -> bool {
         let moved = self.parser.received(self.line).is_some_and(|received| slot.push(&received));
         if moved {
@@ -167,14 +165,14 @@ impl Link {
     }
 }
 
-/// Returns the time of `bytes` on the line: ten bits each.
+/// Returns the time of `bytes` on the line, with ten bits per byte.
 fn duration_us(bytes: usize) -> u64 {
     bytes as u64 * 10_000_000 / u64::from(BAUD)
 }
 
-/// Serves both lines for ever, stores arms, and reads the program in flash.
+/// Runs forever: serves both lines, stores arms, and computes the checksum of the program in flash.
 pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: Store) -> ! {
-    // Line whose turn it is, so that a line that floods the slot does not block the other.
+    // Line that is served next, so that a line that fills the slot does not block the other.
     let mut turn = 0;
     let mut report = Report::new();
     let mut program = program::Reader::new();
@@ -204,8 +202,8 @@ pub async fn run(mut links: [Link; lines::LINES], mut slot: SlotIn, mut store: S
     }
 }
 
-/// Logs changes, at most once a second. Each line has one number: interrupts are masked while a line is written, and
-/// the tick must begin in time.
+/// Logs changes, at most once a second. Each log line contains only one number, because interrupts are masked while a
+/// line is written, and the tick must begin in time.
 struct Report {
     next: Instant,
     line_errors: [u32; lines::LINES],

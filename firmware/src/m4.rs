@@ -1,11 +1,10 @@
-//! The second core of the H745 starts at bank 2 of the flash, with or without a program there. This is its program:
-//! sleep.
+//! The second core of the H745 always starts at bank 2 of the flash. This is its program, which only sleeps.
 
-/// `wfi` and a branch back to it.
+/// Instructions: `wfi`, then a branch back to it.
 const SLEEP: u32 = 0xE7FD_BF30;
-/// Address of the instructions, with the bit that stands for Thumb.
+/// Address of the instructions, with the bit that selects Thumb.
 const PROGRAM: u32 = 0x0810_0000 + 16 * 4 + 1;
-/// End of the small SRAM3. The stack would start here, but no exception ever uses it.
+/// End of the small SRAM3. The stack would start here, but no exception uses it.
 const STACK: u32 = 0x3004_8000;
 
 /// Vector table (stack, reset, fourteen exceptions) and program.

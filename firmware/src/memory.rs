@@ -1,4 +1,4 @@
-//! Memory: protection, caches, and the large buffers that live outside the fast memory.
+//! Memory: protection, caches, and the large buffers outside the fast memory.
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
@@ -12,11 +12,11 @@ use jtc_wire::{ANSWER_MAX, EventBatch, FRAME_MAX, RawPoint};
 use crate::arm_store;
 use crate::uart::RING;
 
-/// A value outside .data and .bss: no code initialises it before [`take`].
+/// A value outside .data and .bss, so no code initialises it before [`take`].
 #[repr(C, align(32))]
 struct Place<T>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: the value is reached through `Place::take` only, which hands it out once.
+// SAFETY: the value is accessed only through `Place::take` or `Place::keep`, and each is called once.
 unsafe impl<T: Send> Sync for Place<T> {}
 
 impl<T> Place<T> {
@@ -30,36 +30,37 @@ impl<T> Place<T> {
     /// Must be called once, and zero bytes must be a valid value of `T`.
     #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn take(&'static self) -> &'static mut T {
-        // SAFETY: the only reference there will ever be, by the contract.
+        // SAFETY: by the contract, this is the only reference that will ever exist.
         let place = unsafe { &mut *self.0.get() };
         *place = MaybeUninit::zeroed();
-        // SAFETY: zero bytes are a value, by the contract.
+        // SAFETY: by the contract, zero bytes are a valid value.
         unsafe { place.assume_init_mut() }
     }
 
-    /// Returns the value as the last program left it; after a loss of power with all bytes zero, because then the
-    /// memory is random, with wrong check bits.
+    /// Returns the value as the last program left it. After a loss of power the memory and its check bits are random,
+    /// and the value is returned with all bytes zero.
     ///
     /// # Safety
-    /// Must be called once, any bytes must be a valid value of `T`, and the linker must keep the place out of the
+    /// Must be called once. Any bytes must be a valid value of `T`, and the linker must keep the place out of the
     /// initialised sections.
     #[allow(clippy::mut_from_ref, reason = "the only reference, by the contract")]
     unsafe fn keep(&'static self, lost_power: bool) -> &'static mut T {
         if lost_power {
-            // SAFETY: zero bytes are any bytes.
+            // SAFETY: any bytes are valid, so zero bytes are valid.
             return unsafe { self.take() };
         }
-        // SAFETY: the only reference there will ever be, to memory that was written since power came on, by the contract.
+        // SAFETY: by the contract, this is the only reference that will ever exist, and the memory was written since
+        // power-on.
         unsafe { (*self.0.get()).assume_init_mut() }
     }
 }
 
-/// Blocks in the pieces of the flight recorder's memory.
+/// Number of blocks in each part of the flight recorder's memory.
 const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
 /// Memory of the flight recorder (J-56): the part of SRAM1 that DMA does not use, SRAM3, and SRAM4. None of it is
-/// cached: written data is in memory at the next instruction and survives any reset. The symbols keep the compiler from
-/// assuming their contents.
+/// cached: data is in memory at the next instruction after a write, and survives any reset. The symbols keep the
+/// compiler from making assumptions about the contents.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".sram1")]
 #[used]
@@ -79,13 +80,13 @@ static POINTS: Place<[RawPoint; POINTS_MAX]> = Place::new();
 /// The frames that the controller executes.
 #[unsafe(link_section = ".axisram")]
 static BATCH: Place<EventBatch> = Place::new();
-/// The stored arm, and an arm that will be stored.
+/// The stored arm, and the next arm to be stored.
 #[unsafe(link_section = ".axisram")]
 static ARMS: Place<[arm_store::Buffer; 2]> = Place::new();
-/// Buffers that the lines' DMA writes; not cached.
+/// Buffers into which the lines' DMA writes; not cached.
 #[unsafe(link_section = ".sram1")]
 static RINGS: Place<[[u8; RING]; 2]> = Place::new();
-/// Buffers that the lines' DMA reads; not cached.
+/// Buffers from which the lines' DMA reads; not cached.
 #[unsafe(link_section = ".sram1")]
 static STATUSES: Place<[[u8; ANSWER_MAX]; 2]> = Place::new();
 /// Buffers in which frames are assembled, one for each line.
@@ -104,20 +105,21 @@ pub struct Memory {
     pub receive: [&'static mut [u8; FRAME_MAX]; 2],
     /// The slot between links and tick.
     pub batch: &'static mut EventBatch,
-    /// Buffers for the stored arm and for an arm that will be stored.
+    /// Buffers for the stored arm and for the next arm to be stored.
     pub arms: [&'static mut arm_store::Buffer; 2],
-    /// Memory of the flight recorder, with the records of the last program.
+    /// Memory of the flight recorder, including the records of the last program.
     pub recorder: [&'static mut [Block]; 3],
 }
 
-/// Hands out the buffers, zeroed. The flight recorder's are zeroed only if the device has `lost_power`. Call it once,
-/// after [`init`].
+/// Returns the buffers, filled with zeros. The flight recorder's memory is filled with zeros only if the device has
+/// `lost_power`. Must be called once, after [`init`].
 pub fn take(lost_power: bool) -> Memory {
-    // SAFETY: `main` calls this once, and zero bytes are a value of arrays of integers and of `EventBatch`, which consists of
-    // integers, too.
+    // SAFETY: `main` calls this once. Zero bytes are a valid value of arrays of integers and of `EventBatch`, which
+    // consists of integers.
     let (points, rings, statuses, receive, batch, arms) =
         unsafe { (POINTS.take(), RINGS.take(), STATUSES.take(), RECEIVE.take(), BATCH.take(), ARMS.take()) };
-    // SAFETY: as above; all are in sections that are neither loaded nor cleared, and integers may be any bytes.
+    // SAFETY: as above. All of them are in sections that are neither loaded nor cleared, and any bytes are valid
+    // integers.
     let recorder: [&mut [Block]; 3] = unsafe {
         [RECORDER_SRAM1.keep(lost_power), RECORDER_SRAM3.keep(lost_power), RECORDER_SRAM4.keep(lost_power)]
     };
@@ -134,24 +136,24 @@ pub fn take(lost_power: bool) -> Memory {
 
 /// Regions of the protection unit: base, log2 of the size, attributes.
 const REGIONS: [(u32, u32, u32); 7] = [
-    // External memory that does not exist: without this the core may read it speculatively and hang. The lowest three
-    // eighths and the highest of the 4 GB are left out.
+    // External memory that does not exist. Without this region the core may read it speculatively and hang. The lowest
+    // three eighths and the highest eighth of the 4 GB are excluded.
     (0x0000_0000, 32, NO_ACCESS | 0x87 << 8),
-    // The instruction memory at address 0 is not used: following a null pointer is a fault.
+    // The instruction memory at address 0 is not used, so that a null pointer causes a fault.
     (0x0000_0000, 16, NO_ACCESS),
-    // Below the stack: an overflow is a fault at the very store that overflows.
+    // Memory below the stack, so that a stack overflow causes a fault at the store that overflows.
     (0x1FFC_0000, 18, NO_ACCESS),
     // Memory that DMA reads and writes: normal memory, not cached.
     (0x3000_0000, 17, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     // Memory that the flight recorder writes.
     (0x3004_0000, 15, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
     (0x3800_0000, 16, FULL_ACCESS | NO_EXECUTE | NORMAL_UNCACHED),
-    // A read of the second flash bank while it is busy halts the reader: only [`bank2`] opens it.
+    // Flash bank 2: a read while it is busy would halt the reader. Only [`bank2`] opens it.
     (BANK2, 20, NO_ACCESS),
 ];
 /// Flash bank 2.
 pub const BANK2: u32 = 0x0810_0000;
-/// Number of its region.
+/// Region number of bank 2.
 const BANK2_REGION: u32 = 6;
 const NO_ACCESS: u32 = NO_EXECUTE;
 const FULL_ACCESS: u32 = 0b011 << 24;
@@ -159,7 +161,7 @@ const NO_EXECUTE: u32 = 1 << 28;
 /// TEX 1, C 0, B 0, shareable.
 const NORMAL_UNCACHED: u32 = 1 << 19 | 1 << 18;
 
-/// Switches on the memories, their protection and the caches.
+/// Enables the memories, their protection and the caches.
 pub fn init() {
     // The HAL leaves the memories of domain D2 without a clock.
     pac::RCC.ahb2enr().modify(|w| {
@@ -167,7 +169,7 @@ pub fn init() {
         w.set_sram2en(true);
         w.set_sram3en(true);
     });
-    // Reading back makes sure that the clock runs.
+    // Reading the register back makes sure that the clock runs.
     pac::RCC.ahb2enr().read();
 
     // SAFETY: only the HAL has used the core's peripherals so far, and it does not use these three.
@@ -188,24 +190,24 @@ fn protect(mpu: &MPU) {
         }
     }
     const ENABLE: u32 = 1 << 0;
-    // HFNMIENA. Without it, bank 2 would be cached memory for the loads of `bank2`, which mask faults.
+    // HFNMIENA. Without it, bank 2 would be cached memory for the loads in `bank2`, which run with faults masked.
     const WITH_FAULTS_MASKED: u32 = 1 << 1;
     const DEFAULT_MAP_ELSEWHERE: u32 = 1 << 2;
-    // SAFETY: as above; everything else keeps the processor's default attributes.
+    // SAFETY: as above. All other addresses keep the processor's default attributes.
     unsafe { mpu.ctrl.write(ENABLE | WITH_FAULTS_MASKED | DEFAULT_MAP_ELSEWHERE) };
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
 }
 
-/// Allows loads and stores in flash bank 2, or blocks them. While open, it is strongly ordered memory: not cached, and
-/// never read before the program requests it. Only for the main program.
+/// Permits loads and stores in flash bank 2, or blocks them. While open, it is strongly ordered memory: not cached, and
+/// never read speculatively. Only the main program may call this.
 pub fn bank2(open: bool) {
     let (_, size, closed) = REGIONS[BANK2_REGION as usize];
     let attributes = if open { FULL_ACCESS | NO_EXECUTE } else { closed };
-    // Completes accesses that began before the change.
+    // Waits for accesses that began before the change.
     cortex_m::asm::dsb();
-    // SAFETY: the region holds nothing of this program but what `bank2` reads and writes while it is open; interrupts use
-    // neither the bank nor these registers.
+    // SAFETY: this program accesses the region only in `bank2`, while it is open. Interrupts use neither the bank nor
+    // these registers.
     unsafe {
         (*MPU::PTR).rnr.write(BANK2_REGION);
         (*MPU::PTR).rasr.write(attributes | (size - 1) << 1 | 1);

@@ -1,18 +1,18 @@
-//! The CAN controller's message memory: the buffer of each filter, and the position of each buffer (J-10).
+//! The CAN controller's message memory: its filters and the position of each buffer (J-10).
 //!
-//! Buffers are dedicated: each of the 21 possible answers of nodes has a buffer of its own, in the order of their
-//! identifiers. The controller rejects all other frames. A buffer that was not read is not overwritten.
+//! Buffers are dedicated: each of the nodes' 21 possible answers has its own buffer, in the order of the identifiers.
+//! The controller rejects all other frames. A buffer that was not read is not overwritten.
 use jtc_bus::{MAX_LEN, NODES, id};
 
-/// Bytes of the message memory.
+/// Size of the message memory, bytes.
 pub const BYTES: usize = 10 * 1024;
-/// Identifiers that are received: answers of seven nodes to Move, ChangeFsm and ChangeMode.
+/// Number of receive buffers: answers of seven nodes to Move, ChangeFsm and ChangeMode.
 pub const RX: usize = 3 * NODES;
-/// Transmit buffers: one for this tick's frame, one for the last tick's frame while it is being cancelled.
+/// Number of transmit buffers: one for this tick's frame, one for the last tick's frame while it is being cancelled.
 pub const TX: usize = 2;
-/// Words of a buffer: two of header, the remainder payload.
+/// Words per buffer: two for the header, the others for the payload.
 pub const BUFFER_WORDS: usize = 2 + MAX_LEN / 4;
-/// Code of a payload of 24 bytes in RXESC and TXESC.
+/// Code of a 24-byte payload in RXESC and TXESC.
 pub const SIZE_CODE: u8 = 4;
 
 /// First word of the filters.
@@ -21,14 +21,14 @@ pub const FILTERS: usize = 0;
 pub const RX_BUFFERS: usize = FILTERS + RX;
 /// First word of the transmit buffers.
 pub const TX_BUFFERS: usize = RX_BUFFERS + RX * BUFFER_WORDS;
-/// Words used.
+/// Number of words used.
 pub const END: usize = TX_BUFFERS + TX * BUFFER_WORDS;
 
 const _: () = {
     assert!(END * 4 <= BYTES);
-    // The codes 0..4 stand for 8, 12, 16, 20 and 24 bytes.
+    // The codes 0..4 mean 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // A register of new-data flags covers all receive buffers.
+    // One register with new-data flags must cover all receive buffers.
     assert!(RX <= 32 && TX <= 32);
 };
 

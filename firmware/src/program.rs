@@ -1,8 +1,8 @@
-//! The program in flash: its length and its CRC-32 as it reads back (J-67). A host that has written the program to the
-//! board compares both with its file.
+//! The program in flash: its length and its CRC-32, computed by reading the flash (J-67). A host that has written the
+//! program to the board compares both with its file.
 //!
-//! The rounds of the links read it, a piece in each ([`Reader::step`]), so neither the first tick nor any interrupt
-//! waits for it. The tick finds the result in [`read`] a tenth of a second after the start.
+//! The links read the program, one piece per pass ([`Reader::step`]), so that neither the first tick nor any interrupt
+//! waits for it. The result is available in [`read`] a tenth of a second after the start.
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
@@ -10,26 +10,26 @@ use jtc_wire::Program;
 
 /// First byte of the flash.
 const FLASH: usize = 0x0800_0000;
-/// Bytes that a round reads, in about 50 µs.
+/// Number of bytes per piece; reading one takes about 50 µs.
 const PIECE: usize = 2048;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// Result for the tick and for debuggers: bytes of the program, 0 until all are read, and their CRC-32.
+/// Result for the tick and for debuggers: length of the program in bytes (0 until all bytes are read), and CRC-32.
 #[unsafe(no_mangle)]
 #[used]
 pub static PROGRAM: [AtomicU32; 2] = [AtomicU32::new(0), AtomicU32::new(0)];
 
 unsafe extern "C" {
-    /// Place of the initial values of .data in flash: after everything else in bank 1.
+    /// Address of the initial values of .data in flash, after everything else in bank 1.
     static __sidata: u8;
     /// First byte of .data, and the byte after its last.
     static __sdata: u8;
     static __edata: u8;
 }
 
-/// Reads the program, from the first byte of the flash to its last. Does not read the few words of the second core in
-/// bank 2, which is closed.
+/// Reads the program from the first byte of the flash to the last byte of the program. Skips the few words of the
+/// second core's program in bank 2, which is closed.
 pub struct Reader {
     program: &'static [u8],
     at: usize,
@@ -41,7 +41,7 @@ impl Reader {
     pub fn new() -> Self {
         let initial_values = &raw const __edata as usize - &raw const __sdata as usize;
         let end = &raw const __sidata as usize + initial_values;
-        // SAFETY: the linker has put the program there, and bank 1 is not written while the program runs.
+        // SAFETY: the linker has placed the program there, and bank 1 is not written while the program runs.
         let program = unsafe { core::slice::from_raw_parts(FLASH as *const u8, end - FLASH) };
         Self { program, at: 0, digest: Some(CRC.digest()) }
     }
@@ -63,7 +63,7 @@ impl Reader {
     }
 }
 
-/// Returns the length and the CRC-32 of the program; `None` until all of it is read.
+/// Returns the length and the CRC-32 of the program; `None` until all bytes are read.
 pub fn read() -> Option<Program> {
     let [bytes, crc32] = &PROGRAM;
     let bytes = bytes.load(Ordering::Acquire);

@@ -14,17 +14,17 @@ pub enum Cause {
     Watchdog = 4,
     /// A hard fault of the processor.
     HardFault = 5,
-    /// The program panicked: it reached a state that must be impossible.
+    /// The program panicked: it reached a state that should be impossible.
     Panic = 6,
 }
 
 impl Cause {
-    /// Returns `true` if the program failed. The controller then reports it to the host until the host has cleared it.
+    /// Returns `true` if the program failed. The controller then reports the failure until a host clears it.
     pub const fn failed(self) -> bool {
         matches!(self, Self::Watchdog | Self::HardFault | Self::Panic)
     }
 
-    /// Returns the cause in words.
+    /// Returns the cause as text.
     pub const fn name(self) -> &'static str {
         match self {
             Self::PowerOn => "power-on",
@@ -52,15 +52,15 @@ const POWER_ON: u32 = 1 << 23;
 const SOFTWARE: u32 = 1 << 24;
 const WATCHDOG: u32 = 1 << 26;
 
-/// Returns `true` if the memory has lost its contents: data of the last program must not be used.
+/// Returns `true` if the memory has lost its contents, so that the data of the last program is invalid.
 pub const fn lost_power(rsr: u32) -> bool {
     rsr & (POWER_ON | BROWN_OUT) != 0
 }
 
 /// Determines the cause from the register RCC_RSR and from the data that the last program kept.
 ///
-/// Any reset pulls the reset pin, so that flag is checked last. `failure` counts only if the program itself requested
-/// the reset, or hung before it could.
+/// Every reset pulls the reset pin, so the pin's flag is checked last. `failure` is used only if the program itself
+/// requested the reset, or hung before it could.
 pub const fn cause(rsr: u32, failure: Option<Failure>) -> Cause {
     match failure {
         _ if lost_power(rsr) => Cause::PowerOn,

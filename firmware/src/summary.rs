@@ -5,26 +5,26 @@ use critical_section::Mutex;
 
 use crate::fdcan::Counters;
 
-/// The tick in the log.
+/// Summary of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// State of the controller.
     pub state: u8,
     /// Current error word.
     pub errors: u16,
-    /// Joint bus.
+    /// Error counters of the joint bus.
     pub bus: Counters,
-    /// Ticks that were skipped because the one before took too long.
+    /// Number of ticks that were skipped because the previous tick took too long.
     pub left_out: u32,
 }
 
 impl Summary {
-    /// Before the first tick.
+    /// Creates the summary before the first tick.
     pub const fn new() -> Self {
         Self { state: 0, errors: 0, bus: Counters::new(), left_out: 0 }
     }
 
-    /// Logs the values that have changed since `last`, a line for each number.
+    /// Logs the values that have changed since `last`, one line per value.
     pub fn log(&self, last: &Self) {
         let (bus, before) = (&self.bus, &last.bus);
         if self.state != last.state {

@@ -1,5 +1,5 @@
-//! The tick: TIM7 at the highest priority, a thousand times a second. The tick owns the controller and everything that moves or stops the
-//! arm. The tick shares only the slot and a summary for the log with the rest of the program.
+//! The tick: TIM7 at the highest priority, a thousand times a second. The tick owns the controller and everything that
+//! moves or stops the arm. It shares with the rest of the program only the slot and a summary for the log.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -29,19 +29,19 @@ use crate::program;
 use crate::summary::{self, Summary};
 use crate::uart::{self, Lookahead, Transmitter};
 
-/// The controller with its trajectory elsewhere.
+/// The controller; the trajectory is in separate memory.
 type Jtc = Controller<&'static mut [RawPoint]>;
 
-/// The flight recorder, with its memory elsewhere.
+/// The flight recorder; its blocks are in separate memory.
 pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
-/// Largest number of bytes of a line that a tick looks through: more than two ticks bring at 15 MBd.
+/// Largest number of bytes that a tick searches on a line. It is more than arrive in two ticks at 15 MBd.
 const LOOK_MAX: usize = 4096;
 
-/// Ticks without a sign of life of the links after which the arm is stopped, because a host could not stop it.
+/// Number of ticks without activity of the links after which the arm is stopped, because a host could not stop it then.
 const LINKS_SILENT_ERROR: u32 = 100;
-/// Ticks without a sign of life of the links after which the tick stops feeding the watchdog, so that a reset restarts
-/// them.
+/// Number of ticks without activity of the links after which the tick stops feeding the watchdog, so that the watchdog
+/// resets the processor.
 const LINKS_SILENT_RESET: u32 = 200;
 
 /// Parts that a tick needs.
@@ -52,15 +52,15 @@ pub struct Parts {
     pub can: Fdcan,
     /// Safety wires and LEDs.
     pub pins: Pins,
-    /// Readers of the received bytes, to find Stop and Pause.
+    /// Readers that search the received bytes for Stop and Pause.
     pub ahead: [Lookahead; lines::LINES],
     /// Events of the hosts.
     pub slot: SlotOut,
     /// RS422, USB.
     pub lines: [Transmitter; lines::LINES],
-    /// Watchdog that resets the processor unless a tick completes.
+    /// Watchdog that resets the processor if no tick completes in time.
     pub watchdog: IndependentWatchdog<'static, IWDG1>,
-    /// The flight recorder, with what it held before this start.
+    /// The flight recorder, with the records from before this start.
     pub recorder: FlightRecorder,
     /// Origin of this start.
     pub boot: Boot,
@@ -80,14 +80,14 @@ struct Tick {
     recorder: FlightRecorder,
     links: Links,
     left_out: u32,
-    /// Result of the last attempt to store an arm, and its number.
+    /// Result of the last attempt to store an arm, and the number of the attempt.
     stored: arm_store::Progress,
     stored_number: u32,
-    /// When the last tick began.
+    /// Time at which the last tick began.
     began: Option<Instant>,
 }
 
-/// Check that the links are alive.
+/// Checks that the links are active.
 #[derive(Default)]
 struct Links {
     rounds: u32,
@@ -95,7 +95,7 @@ struct Links {
 }
 
 impl Links {
-    /// Returns the number of ticks since their last sign of life.
+    /// Returns the number of ticks since the links were last active.
     fn silent(&mut self) -> u32 {
         let rounds = link::ROUNDS_DONE.load(Ordering::Relaxed);
         self.silent = if rounds == self.rounds { self.silent.saturating_add(1) } else { 0 };
@@ -104,18 +104,18 @@ impl Links {
     }
 }
 
-/// The tick's own data. The tick takes it out while it runs.
+/// The tick's own data. The interrupt takes it out while it runs.
 static TICK: Mutex<Cell<Option<&'static mut Tick>>> = Mutex::new(Cell::new(None));
 
-/// Creates the controller in its place. Not inlined, because the controller is large and passes through the stack: the
-/// stack is free again when this returns.
+/// Creates the controller in its static memory. Not inlined: the controller is large and passes through the stack,
+/// which is free again after this function returns.
 #[inline(never)]
 fn controller(points: &'static mut [RawPoint]) -> &'static mut Jtc {
     static PLACE: StaticCell<Jtc> = StaticCell::new();
     PLACE.init_with(|| Controller::new(Config::default(), points))
 }
 
-/// Starts the ticks. Not inlined, so that its stack is free again afterwards.
+/// Starts the ticks. Not inlined, so that its stack is free again after it returns.
 #[inline(never)]
 pub fn start(parts: Parts) {
     static PLACE: StaticCell<Tick> = StaticCell::new();
@@ -155,19 +155,19 @@ pub fn start(parts: Parts) {
     rcc::enable_and_reset::<TIM7>();
     pac::TIM7.psc().write_value((clock::TICK_PRESCALER - 1) as u16);
     pac::TIM7.arr().write(|w| w.set_arr((clock::TICK_US - 1) as u16));
-    // Prescaler and period take effect with an update, which is not a tick.
+    // Prescaler and period take effect with an update event, which must not be treated as a tick.
     pac::TIM7.egr().write(|w| w.set_ug(true));
     pac::TIM7.sr().write(|w| w.set_uif(false));
     pac::TIM7.dier().write(|w| w.set_uie(true));
     interrupt::TIM7.set_priority(Priority::P0);
-    // The time driver of the HAL would have the same priority as the tick.
+    // By default the HAL's time driver has the same priority as the tick.
     interrupt::TIM5.set_priority(crate::clocks::LOW);
-    // SAFETY: everything that its handler uses is in place.
+    // SAFETY: everything that the interrupt handler uses is initialised.
     unsafe { interrupt::TIM7.enable() };
     pac::TIM7.cr1().write(|w| w.set_cen(true));
 }
 
-/// Puts the stored arm into use from the start (J-54).
+/// Uses the stored arm from the start (J-54).
 #[inline(never)]
 fn load_arm(controller: &mut Jtc) {
     match arm_store::loaded() {
@@ -222,8 +222,7 @@ impl Tick {
         if let Some(frame) = &outputs.bus {
             self.can.send(frame);
         }
-        // Before the frames that the step executed are returned to the links, and after everything that the arm waits
-        // for.
+        // Recorded before the executed frames are returned to the links, and after everything on which the arm depends.
         record_step(&mut self.recorder, self.controller, &inputs, &outputs);
         self.slot.done(outputs.host_done);
         if outputs.status {
@@ -242,7 +241,7 @@ impl Tick {
         if silent == LINKS_SILENT_ERROR {
             self.controller.raise_internal();
         }
-        // The tick is complete. Only this line keeps the watchdog from resetting the processor.
+        // The tick is complete. Only this line prevents the watchdog from resetting the processor.
         if silent < LINKS_SILENT_RESET {
             self.watchdog.pet();
         }
@@ -250,7 +249,7 @@ impl Tick {
         Summary { state: state as u8, errors, bus: counters, left_out: self.left_out }
     }
 
-    /// Hands an arm over to be stored, and reports the result to the controller (J-54).
+    /// Starts storing an arm if requested, and reports the result to the controller (J-54).
     fn store_arm(&mut self, requested: bool) {
         let state = if requested && arm_store::begin(self.controller.stored_arm()).is_err() {
             Some(StoreState::Failed)
@@ -271,7 +270,7 @@ impl Tick {
         }
     }
 
-    /// Looks for Stop and Pause in the bytes that have arrived since the last tick (J-04).
+    /// Searches the bytes that have arrived since the last tick for Stop and Pause (J-04).
     fn look_ahead(&mut self) {
         let now_us = self.flight.tick * u64::from(clock::TICK_US);
         for (line, ahead) in self.ahead.iter_mut().enumerate() {
@@ -282,8 +281,8 @@ impl Tick {
         }
     }
 
-    /// Returns the number of ticks that did not come since the last one, or came late by half a tick or more, from the
-    /// microseconds between them.
+    /// Returns the number of ticks that were missed since the last one, or came late by half a tick or more, computed
+    /// from the microseconds between the ticks.
     fn missed_ticks(&mut self) -> u16 {
         let now = Instant::now();
         let before = self.began.replace(now).unwrap_or(now);
@@ -292,7 +291,7 @@ impl Tick {
         u16::try_from(periods.saturating_sub(1)).unwrap_or(u16::MAX)
     }
 
-    /// Skips a tick that is already due: drives must not get two frames back to back (J-12).
+    /// Skips a tick that is already due, because drives must not get two frames back to back (J-12).
     fn leave_out_late_tick(&mut self) {
         if pac::TIM7.sr().read().uif() {
             pac::TIM7.sr().write(|w| w.set_uif(false));
@@ -301,22 +300,21 @@ impl Tick {
     }
 }
 
-/// Runs one step of the controller. A separate function with a symbol of its own, so that its instructions can be
-/// counted.
+/// Runs one step of the controller. A separate function, so that its instructions can be counted by its symbol.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn control_step(controller: &mut Jtc, inputs: &Inputs<'_>) -> Outputs {
     controller.tick(inputs)
 }
 
-/// Runs the flight recorder after the step. Separate for the same reason.
+/// Runs the flight recorder after the step. A separate function for the same reason.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn record_step(recorder: &mut FlightRecorder, controller: &mut Jtc, inputs: &Inputs<'_>, outputs: &Outputs) {
     recorder.record(controller, inputs, outputs);
 }
 
-/// Filler for places without an event.
+/// Value for array elements without an event.
 const NO_EVENT: HostEvent<'_> = HostEvent {
     line: lines::RS422,
     overtaken: false,
@@ -324,7 +322,7 @@ const NO_EVENT: HostEvent<'_> = HostEvent {
     event: LinkEvent::Noise(Response::NONE),
 };
 
-/// Collects the events of the batch for the controller; returns their number.
+/// Converts the events of the batch for the controller; returns their number.
 fn collect<'a>(
     batch: &'a EventBatch,
     watch: &UrgentWatch<{ lines::LINES }>,
@@ -340,7 +338,7 @@ fn collect<'a>(
     count
 }
 
-/// Sends a status to both lines, and its record only to the line that it answers (J-04).
+/// Sends a status on both lines. Only the line of the answered frame gets the response record (J-04).
 fn send(lines: &mut [Transmitter; lines::LINES], record_line: Option<usize>, status: &[u8; STATUS_LEN]) {
     let other = if record_line.is_some() { lines::without_record(status) } else { *status };
     for (n, line) in lines.iter_mut().enumerate() {

@@ -1,8 +1,8 @@
-//! A serial line: bytes come in through a ring that DMA fills and never stops filling, even after line errors; statuses
-//! go out by DMA, started by the tick.
+//! A serial line. DMA fills a ring with received bytes and never stops, even after line errors. Statuses are sent by
+//! DMA, which the tick starts.
 //!
-//! No byte causes an interrupt. The tick looks through the ring for Stop and Pause; the links look at it after every
-//! tick, and at once when the line falls idle.
+//! No byte causes an interrupt. The tick searches the ring for Stop and Pause. The links check the ring after every
+//! tick, and immediately if the line becomes idle.
 use core::sync::atomic::{Ordering, fence};
 
 use embassy_stm32::interrupt::InterruptExt;
@@ -23,10 +23,10 @@ use openjtc_firmware::clock::Baud;
 
 use crate::clocks;
 
-/// Signals work for the links: a tick has ended, or a line has fallen idle.
+/// Wakes the links: a tick has ended, or a line has become idle.
 pub static WORK: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Bytes of a ring: about 21 ms at 15 MBd.
+/// Bytes per ring: about 21 ms at 15 MBd.
 pub const RING: usize = 32 * 1024;
 
 /// A USART and the streams of DMA1 that serve it.
@@ -65,7 +65,7 @@ impl Line {
 #[derive(Clone, Copy)]
 struct Stream {
     registers: St,
-    /// Register and bits that clear the flags of the stream.
+    /// Register that clears the flags of the stream, and the flags.
     clear: Reg<Ixr, W>,
     flags: Ixr,
     multiplexer: Reg<Ccr, RW>,
@@ -74,7 +74,7 @@ struct Stream {
 
 impl Stream {
     const fn new(number: usize, request: u8) -> Self {
-        // Five flags of each stream; four streams share a register.
+        // Each stream has five flags; four streams share a register.
         const SHIFT: [u32; 4] = [0, 6, 16, 22];
         Self {
             registers: DMA1.st(number),
@@ -85,7 +85,7 @@ impl Stream {
         }
     }
 
-    /// Configures byte transfers between a register and memory; `start` starts them.
+    /// Configures transfers of bytes between a register and memory; `start` starts them.
     fn configure(self, direction: Dir, register: *mut (), memory: *mut u8, ring: bool) {
         self.multiplexer.write(|w| w.set_dmareq_id(self.request));
         let stream = self.registers;
@@ -97,7 +97,7 @@ impl Stream {
             w.set_minc(true);
             w.set_psize(Size::BITS8);
             w.set_msize(Size::BITS8);
-            // Reception must not wait, transmission may.
+            // Reception must not wait; transmission may.
             w.set_pl(if ring { Pl::VERY_HIGH } else { Pl::LOW });
             // A USART needs buffered transfers; without them the stream can lock up.
             w.set_trbuff(true);
@@ -106,11 +106,11 @@ impl Stream {
 
     /// Transfers `count` bytes. The stream must have stopped.
     fn start(self, count: usize) {
-        // A stream with flags of its last transfer set does not start.
+        // A stream does not start while flags of its last transfer are set.
         self.clear.write_value(self.flags);
         let stream = self.registers;
         stream.ndtr().write(|w| w.set_ndt(count as u16));
-        // The data in memory must be written before the stream reads it.
+        // The data must be in memory before the stream reads it.
         fence(Ordering::SeqCst);
         cortex_m::asm::dmb();
         stream.cr().modify(|w| w.set_en(true));
@@ -120,7 +120,7 @@ impl Stream {
         self.registers.cr().read().en()
     }
 
-    /// Returns the number of bytes that are still to be transferred.
+    /// Returns the number of bytes still to be transferred.
     fn remaining(self) -> usize {
         self.registers.ndtr().read().ndt().into()
     }
@@ -142,7 +142,7 @@ pub fn open(
     });
     usart.cr1().write(|w| {
         w.set_over8(if baud.over8 { Over8::OVERSAMPLING8 } else { Over8::OVERSAMPLING16 });
-        // The FIFO tolerates a DMA delay of 16 bytes.
+        // The FIFO allows a DMA delay of 16 bytes.
         w.set_fifoen(true);
         w.set_te(true);
         w.set_re(true);
@@ -159,7 +159,7 @@ pub fn open(
     usart.cr1().modify(|w| w.set_ue(true));
 
     line.interrupt.set_priority(clocks::LOW);
-    // SAFETY: its handler only touches the line's flags and wakes the links.
+    // SAFETY: the handler only accesses the line's flags and wakes the links.
     unsafe { line.interrupt.enable() };
     (
         Receiver { usart, ring: Ring { stream: line.receive, bytes: ring.as_ptr(), next: 0 }, errors: 0 },
@@ -171,26 +171,26 @@ pub fn open(
 /// Reader of the ring that DMA fills. Each line has two independent readers.
 struct Ring {
     stream: Stream,
-    /// Written by DMA: no reference to it may exist.
+    /// Written by DMA, so no reference to it may exist.
     bytes: *const u8,
-    /// Position of the first byte that was not taken.
+    /// Position of the first byte that was not taken yet.
     next: usize,
 }
 
 impl Ring {
-    /// Returns the number of bytes that have arrived and were not taken, if there are fewer of them than the ring
-    /// holds.
+    /// Returns the number of bytes that have arrived and were not taken yet. The result is valid only if fewer bytes
+    /// are waiting than the ring holds.
     fn waiting(&self) -> usize {
         let end = RING - self.stream.remaining();
         (end + RING - self.next) % RING
     }
 
-    /// Copies the oldest bytes without taking them: as many as are contiguous and fit.
+    /// Copies the oldest bytes without taking them: as many as are contiguous and fit into the buffer.
     fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         let count = self.waiting().min(into.len()).min(RING - self.next);
         cortex_m::asm::dmb();
-        // SAFETY: `next + count` is at most the ring's length. DMA has written these bytes and overwrites them only
-        // after all others.
+        // SAFETY: `next + count` is at most the length of the ring. DMA has written these bytes, and overwrites them
+        // only after all other bytes of the ring.
         unsafe { core::ptr::copy_nonoverlapping(self.bytes.add(self.next), into.as_mut_ptr(), count) };
         &into[..count]
     }
@@ -200,15 +200,15 @@ impl Ring {
     }
 }
 
-/// The tick's reader of a line: it sees every byte, before the links do, at its own pace.
+/// The tick's reader of a line. It sees every byte, independently of the links.
 pub struct Lookahead(Ring);
 
-// SAFETY: it reads a register and memory that only DMA writes, which can be done from any context.
+// SAFETY: it reads a register and memory that only DMA writes; both are possible from any context.
 unsafe impl Send for Lookahead {}
 
 impl Lookahead {
-    /// Passes the bytes that have arrived since the last call to `look`, piece by piece: at most `most` bytes, the
-    /// remainder next time.
+    /// Passes the bytes that have arrived since the last call to `look`, in pieces. Passes at most `most` bytes; the
+    /// next call continues.
     pub fn read(&mut self, most: usize, mut look: impl FnMut(&[u8])) {
         let mut left = self.0.waiting().min(most);
         let mut piece = [0; 64];
@@ -230,17 +230,17 @@ impl Lookahead {
 pub struct Receiver {
     usart: Usart,
     ring: Ring,
-    /// Overruns, framing errors and noise seen since the start.
+    /// Number of overruns, framing errors and noise errors since the start.
     errors: u32,
 }
 
 impl Receiver {
-    /// Returns the number of bytes that have arrived and were not taken.
+    /// Returns the number of bytes that have arrived and were not taken yet.
     pub fn waiting(&self) -> usize {
         self.ring.waiting()
     }
 
-    /// Copies the oldest bytes without taking them: as many as are contiguous and fit.
+    /// Copies the oldest bytes without taking them: as many as are contiguous and fit into the buffer.
     pub fn peek<'a>(&self, into: &'a mut [u8]) -> &'a [u8] {
         self.ring.peek(into)
     }
@@ -250,12 +250,12 @@ impl Receiver {
         self.ring.take(count);
     }
 
-    /// Continues at byte `position`, counted over all received bytes.
+    /// Continues at byte `position`, counted from the first byte received.
     pub fn jump(&mut self, position: u64) {
         self.ring.next = (position % RING as u64) as usize;
     }
 
-    /// Returns the errors of the line since the start. Reception continues: the parser detects wrong bytes.
+    /// Returns the number of line errors since the start. Reception continues, because the parser detects wrong bytes.
     pub fn errors(&mut self) -> u32 {
         let flags = self.usart.isr().read();
         if flags.ore() || flags.fe() || flags.ne() {
@@ -273,20 +273,20 @@ impl Receiver {
 /// The sending half of a line.
 pub struct Transmitter {
     stream: Stream,
-    /// Read by DMA while the stream runs.
+    /// DMA reads it while the stream runs.
     buffer: &'static mut [u8; ANSWER_MAX],
 }
 
-// SAFETY: registers can be used from any context, and only this value owns the buffer.
+// SAFETY: the registers can be used from any context, and only this value owns the buffer.
 unsafe impl Send for Transmitter {}
 
 impl Transmitter {
-    /// Returns `true` if the last frame has left the buffer.
+    /// Returns `true` if the last frame has been transferred completely.
     pub fn is_free(&self) -> bool {
         !self.stream.running()
     }
 
-    /// Sends a frame. Does nothing while the last frame is still being sent, or if the frame is longer than the buffer.
+    /// Sends a frame. Does nothing if the last frame is still being sent, or if the frame is longer than the buffer.
     pub fn send(&mut self, frame: &[u8]) {
         if self.is_free()
             && let Some(place) = self.buffer.get_mut(..frame.len())
@@ -307,7 +307,7 @@ fn USART3() {
     idle(pac::USART3);
 }
 
-/// Handles the idle interrupt: the line has been silent for the time of a byte.
+/// Handles the idle interrupt: the line has been silent for the duration of a byte.
 fn idle(usart: Usart) {
     usart.icr().write(|w| w.set_idle(true));
     WORK.signal(());

@@ -1,4 +1,5 @@
-//! Identity of this firmware: a record at a fixed place in flash, for tools that can read only the file or the memory.
+//! Identity of this firmware: a record at a fixed address in flash, for tools that can only read the file or the
+//! memory.
 use jtc_core::{POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
 use crate::{BAUD, BOARD, clock};
@@ -8,7 +9,7 @@ pub const ADDRESS: usize = 0x0800_0400;
 /// First bytes of the record.
 pub const MAGIC: [u8; 8] = *b"OPENJTC\0";
 
-/// The record; little-endian like everything in this processor. Texts are padded with zeros.
+/// The record, little-endian like all data of this processor. Texts are padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Version {
@@ -16,21 +17,21 @@ pub struct Version {
     pub magic: [u8; 8],
     /// Layout version of this record: 1.
     pub layout: u16,
-    /// Bytes of this record.
+    /// Size of this record, bytes.
     pub size: u16,
     /// Version of the firmware, for example `0.1.0`.
     pub version: [u8; 12],
-    /// Board, named as its feature.
+    /// Board, spelled as its feature.
     pub board: [u8; 24],
-    /// Commit, with `+` when files were changed since, or `not-in-a-repo`.
+    /// Commit, followed by `+` if files were changed since, or `not-in-a-repo`.
     pub build: [u8; 24],
-    /// Capacity of the trajectory store, points.
+    /// Capacity of the trajectory memory, points.
     pub points: u32,
-    /// Segments of a trajectory.
+    /// Largest number of segments of a trajectory.
     pub segments: u32,
-    /// Points of a segment.
+    /// Largest number of points of a segment.
     pub segment_points: u32,
-    /// Ticks in a second.
+    /// Ticks per second.
     pub tick_hz: u32,
     /// Rate of the serial lines, Bd.
     pub baud: u32,

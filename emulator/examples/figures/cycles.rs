@@ -1,5 +1,5 @@
-//! Cycles of one control step, and of the flight recorder after it: the executed instructions in order, through
-//! llvm-mca's model of the core.
+//! Cycles of one control step, and of the flight recorder after it. llvm-mca's model of the core estimates them from
+//! the sequence of executed instructions.
 use std::collections::BTreeMap;
 use std::error::Error;
 use std::io::Write;
@@ -11,13 +11,13 @@ use openjtc_emulator::{BoardConfig, Elf, Machine, RegisterARM};
 use crate::rig::{Rig, Version};
 use crate::session::Session;
 
-/// Measured parts: name, symbol, and maximum of cycles.
+/// Measured functions: name, symbol, and maximum number of cycles.
 const PARTS: [(&str, &str, u64); 2] = [
     ("control step in Operate", "control_step", 12_000),
     ("tick of the flight recorder", "record_step", 500),
 ];
 
-/// Measures a step in Operate and prints it.
+/// Measures a control step in Operate and prints the result.
 pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     let elf = Elf::parse(&std::fs::read(path)?)?;
     let rig = Rig::of(elf, &BoardConfig { baud: version.baud, ..Default::default() });
@@ -39,7 +39,7 @@ pub fn print(path: &str, version: &Version) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Returns the addresses of the instructions in the next call of a function of the tick.
+/// Returns the addresses of the instructions that the tick executes in the next call of a function.
 fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
     let entry = rig.board.machine.elf().symbol(symbol)?.address;
     let flight = rig.board.machine.elf().symbol("FLIGHT")?.address;
@@ -49,7 +49,7 @@ fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
         let until = machine.now() + n * cycle;
         machine.run_until(until);
     };
-    // The record is marked with the inputs of the tick shortly before the step begins.
+    // The tick marks the record with its inputs shortly before the step begins.
     let phase = |machine: &Machine| machine.word(flight + 8);
     while phase(machine) != Some(1) {
         steps(machine, 10);
@@ -72,7 +72,7 @@ fn trace(rig: &mut Rig, symbol: &str) -> Result<Vec<u32>, Box<dyn Error>> {
     Ok(addresses)
 }
 
-/// Returns the text of each instruction.
+/// Returns the text of each instruction, by address.
 fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     let mut objdump = tool("llvm-objdump")?;
     let out = objdump.args(["-d", "--no-show-raw-insn", "--mcpu=cortex-m7", path]).output()?;
@@ -87,8 +87,8 @@ fn disassembly(path: &str) -> Result<BTreeMap<u32, String>, Box<dyn Error>> {
     Ok(lines)
 }
 
-/// Returns the instructions in order, as an assembler takes them: without jumps. The machine runs an IT block in one
-/// step; all its instructions are counted, because the hardware fetches them all.
+/// Returns the executed instructions in order, as input for an assembler, without jumps. The machine runs an IT block
+/// in one step; all its instructions are included, because the hardware fetches them all.
 fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, String> {
     let mut lines = Vec::new();
     for at in trace {
@@ -97,7 +97,7 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
         let code = code.ok_or_else(|| format!("no instruction at {at:#010x}"))?;
         let name = code.split(' ').next().unwrap_or_default();
         if name.starts_with("it") {
-            // The model does not know IT, which the core joins with its neighbour.
+            // The model does not know IT, which the core executes together with the next instruction.
             lines.extend(following.take(name.len() - 1).map(|code| unconditional(code)));
         } else {
             lines.push(without_target(code));
@@ -106,8 +106,8 @@ fn straight(trace: &[u32], text: &BTreeMap<u32, String>) -> Result<Vec<String>, 
     Ok(lines)
 }
 
-/// Replaces the target of a branch by one that is always near. A call becomes a branch: llvm-mca would charge 100
-/// cycles for each, according to its documentation because it does not model calls.
+/// Replaces the target of a branch by a nearby one. A call becomes a branch, because llvm-mca does not model calls and,
+/// according to its documentation, assumes 100 cycles for each.
 fn without_target(code: &str) -> String {
     let (name, operands) = code.split_once(' ').unwrap_or((code, ""));
     let name = match name {
@@ -119,7 +119,7 @@ fn without_target(code: &str) -> String {
         let register = operands.split(',').next().unwrap_or_default();
         return format!("{name} {register}, #4");
     }
-    // The model has no comparison with zero, only a comparison of two registers, which takes as long.
+    // The model lacks the comparison with zero. The comparison of two registers takes the same time.
     if let Some(register) = operands.strip_suffix(", #0").filter(|_| name.starts_with("vcmp")) {
         return format!("{name} {register}, {}", register.trim());
     }
@@ -140,7 +140,7 @@ fn unconditional(code: &str) -> String {
     without_target(&format!("{plain}{width} {operands}"))
 }
 
-/// Returns the cycles of the model for these instructions, executed once.
+/// Returns the number of cycles that the model estimates for executing these instructions once.
 fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     let mut mca = tool("llvm-mca")?;
     mca.args(["-mtriple=thumbv7em-none-eabihf", "-mcpu=cortex-m7", "-iterations=1"]);
@@ -158,7 +158,7 @@ fn simulate(assembly: &str) -> Result<u64, Box<dyn Error>> {
     }
 }
 
-/// Finds a program of LLVM, under its plain name or with a version.
+/// Finds an LLVM program by its plain name or by its name with a version.
 fn tool(name: &str) -> Result<Command, Box<dyn Error>> {
     let versions = (14..=22).rev().map(|version| format!("{name}-{version}"));
     for program in std::iter::once(name.to_owned()).chain(versions) {

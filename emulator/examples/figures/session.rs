@@ -1,4 +1,4 @@
-//! The measured session: every state, with continuous traffic on both lines.
+//! The measured session: it reaches every state, with continuous traffic on both lines.
 use std::collections::BTreeMap;
 use std::error::Error;
 
@@ -10,14 +10,14 @@ use openjtc_emulator::{FIRST_LINE, Machine, Port, RegisterARM};
 
 use crate::rig::Rig;
 
-/// The commanding host.
+/// Port of the host that sends commands.
 const HOST: Port = Port::Usart2;
 /// Exception of the tick.
 const TIM7: usize = FIRST_LINE + 55;
 /// Port of the host that only generates traffic.
 const OTHER: Port = Port::Usart3;
 
-/// Instruction counts of a group of steps.
+/// Instruction counts of a group of control steps.
 #[derive(Clone, Copy, Default)]
 pub struct Steps {
     pub count: u64,
@@ -34,7 +34,7 @@ impl Steps {
         self.count += 1;
     }
 
-    /// Returns the mean of one step.
+    /// Returns the mean number of instructions per step.
     pub fn mean(&self) -> u64 {
         self.sum / self.count.max(1)
     }
@@ -43,20 +43,20 @@ impl Steps {
 /// Time longer than any ramp of the path time, ms.
 const RAMP: u32 = 250;
 
-/// A rig whose control steps are counted.
+/// A rig that counts the instructions of control steps.
 pub struct Session {
     pub rig: Rig,
     counter: openjtc_emulator::Counter,
     recorder: openjtc_emulator::Counter,
     calls: u64,
-    /// Counts of the flight recorder after each control step.
+    /// Instruction counts of the flight recorder after each control step.
     recorded: Steps,
     steps: BTreeMap<(u8, bool), Steps>,
     serving: BTreeMap<(u8, u8), Steps>,
-    /// Steps on the path at full speed, without other work.
+    /// Steps along the path at full speed, without other work.
     on_path: Steps,
-    /// Point of the last step, and number of steps since the path time last advanced by other than one millisecond per
-    /// tick.
+    /// Point of the last step, and number of consecutive steps in which the path time advanced by exactly one
+    /// millisecond per tick.
     point: u32,
     steady: u32,
     traffic: Vec<Vec<u8>>,
@@ -69,10 +69,11 @@ impl Session {
         let counter = rig.board.machine.count("control_step")?;
         let recorder = rig.board.machine.count("record_step")?;
         let mut long = vec![0; 60_000];
-        // Not segment 0, which would stop the arm (J-30).
+        // The segment must not be segment 0, which would stop the arm (J-30).
         let n = trajectory(&mut long, (1, 1, 2), 10, std::iter::repeat_n(RawPoint::default(), 1_666))?;
         long.truncate(n);
-        // Traffic that a host could send at any time: rejected frames, good frames, and invalid bytes full of headers.
+        // Traffic that a host could send at any time: frames that are rejected, valid frames, and invalid bytes with
+        // many frame headers.
         let traffic = vec![
             long,
             fixed::CLEAR_OCCURRED_ERRORS.to_vec(),
@@ -122,8 +123,8 @@ impl Session {
         self.until("the arm is held again", 20_000, |rig| rig.state() == ControllerState::HoldPos);
     }
 
-    /// Pushes a joint of the taught arm: the controller brings the arm to rest in the middle of its motion, without a
-    /// command (J-25).
+    /// Pushes a joint while the arm is taught. The controller brings the arm to rest in the middle of its motion,
+    /// without a command (J-25).
     fn lead_too_fast(&mut self) {
         let push = FaultKind::Push { joint: Joint::ALL[3], torque: 100.0 };
         self.rig.board.inject(push);
@@ -134,7 +135,7 @@ impl Session {
         self.run_ms(200);
     }
 
-    /// Runs from power-on until every joint is enabled and held.
+    /// Runs from power-on until every joint is enabled and holds its position.
     pub fn hold(&mut self) {
         self.until("the first tick", 50, |rig| rig.ticks > 0);
         self.run_ms(300);
@@ -173,7 +174,7 @@ impl Session {
             self.calls = count.calls;
             self.recorded.add(self.rig.board.machine.counted(self.recorder).last);
             let (state, point) = (self.rig.flight.state, self.rig.flight.point);
-            // The last event stands for the events that were served together; the default means no event.
+            // Events served together are counted under the last of them; the default value means no event.
             let event = self.rig.flight.events.last().copied().unwrap_or_default();
             self.steady = if point == self.point + 1 { self.steady + 1 } else { 0 };
             self.point = point;
@@ -205,24 +206,24 @@ impl Session {
         panic!("{what}: not within {ms} ms, {:?}", self.rig.state());
     }
 
-    /// Returns the steps without an event from a host: the name of the state, and `true` if a status was sent.
+    /// Returns the steps without a host event: the name of the state, and `true` if a status was sent.
     pub fn steps(&self) -> impl Iterator<Item = (&'static str, bool, Steps)> {
         self.steps
             .iter()
             .map(|((state, status), steps)| (Code::<ControllerState>::new(*state).name(), *status, *steps))
     }
 
-    /// Returns the steps on the path at full speed, without a status and without an event from a host.
+    /// Returns the steps along the path at full speed, without a status and without a host event.
     pub fn on_path(&self) -> Steps {
         self.on_path
     }
 
-    /// Returns the counts of the flight recorder after each control step.
+    /// Returns the instruction counts of the flight recorder after each control step.
     pub fn recorded(&self) -> Steps {
         self.recorded
     }
 
-    /// Returns the steps that handle an event from a host: the name of the event, and the state.
+    /// Returns the steps that handle a host event: the name of the event, and the state.
     pub fn serving(&self) -> impl Iterator<Item = (String, &'static str, Steps)> {
         self.serving.iter().map(|((frame_type, state), steps)| {
             let name = FrameType::from_byte(*frame_type).map_or("no frame".to_owned(), |t| t.to_string());
@@ -230,8 +231,8 @@ impl Session {
         })
     }
 
-    /// Runs one instruction at a time; returns the largest number of instructions, outside the tick, for which
-    /// interrupts were masked.
+    /// Runs one instruction at a time. Returns the largest number of consecutive instructions, outside the tick, for
+    /// which interrupts were masked.
     pub fn longest_mask(&mut self, ms: u64) -> u64 {
         let (mut masked, mut longest) = (0, 0);
         for _ in 0..ms {
@@ -242,7 +243,7 @@ impl Session {
                 let before = machine.instructions();
                 machine.run_until(machine.now() + cycle);
                 if machine.instructions() == before {
-                    // The core sleeps; the exception that wakes it may be checked a little late.
+                    // While the core sleeps, the exception that wakes it may be checked slightly late.
                     machine.run_until(machine.now() + 100 * cycle);
                 }
                 let tick = machine.chip().core.contexts.contains(&TIM7);
@@ -255,7 +256,7 @@ impl Session {
         longest
     }
 
-    /// Returns the machine, with its counts.
+    /// Returns the machine with its counts.
     pub fn into_machine(self) -> Machine {
         self.rig.board.machine
     }

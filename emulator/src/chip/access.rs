@@ -1,5 +1,4 @@
-//! Loads and stores of the core: the register of the peripheral that each access reaches, and the checks that must
-//! follow.
+//! Loads and stores of the core: finds the peripheral register of each access, and makes the checks that must follow.
 use std::collections::BTreeMap;
 
 use super::map::{
@@ -21,7 +20,7 @@ impl Chip {
         on
     }
 
-    /// Loads for the core; extracts an access smaller than a word from its word.
+    /// Loads for the core. An access smaller than a word gets its part of the word.
     pub fn load(&mut self, address: u32, size: usize, memory: &mut dyn Memory) -> u32 {
         let word = self.read_word(address & !3, memory);
         let value = word >> (8 * (address & 3));
@@ -84,7 +83,7 @@ impl Chip {
         if address >= 0xE000_0000 {
             let at = self.moment();
             let word = if size < 4 {
-                // Priorities are written by byte.
+                // Priorities can be written byte by byte.
                 let mask = ((1u32 << (8 * size)) - 1) << shift;
                 self.scs.read(word_address, &self.nvic, at) & !mask | value << shift
             } else {
@@ -170,13 +169,13 @@ impl Chip {
         }
     }
 
-    /// Returns `true` if the protection unit blocks the program from bank 2.
+    /// Returns `true` if the protection unit blocks access to bank 2.
     fn bank2_closed(&self) -> bool {
         !self.scs.protection(BANK2 + BANK2_SIZE - 1, false).allowed
     }
 
-    /// Requests access of the core to bank 2; returns `false` if it is refused. While the bank is busy the core stands
-    /// still.
+    /// Checks an access of the core to bank 2; returns `false` if it is refused. While the bank is busy, the core
+    /// waits.
     fn reach_bank2(&mut self, address: u32, faults_masked: bool) -> bool {
         let protection = self.scs.protection(address, faults_masked);
         if !protection.allowed {
@@ -222,7 +221,8 @@ impl Chip {
         }
     }
 
-    /// Called after an access that may have changed lines or events: the loop checks them before the next instruction.
+    /// Must be called after an access that may have changed interrupt lines or events. The loop checks them before the
+    /// next instruction.
     fn changed(&mut self) {
         self.update_lines();
         self.core.attention = true;

@@ -18,7 +18,7 @@ pub const EXTICR_END: u32 = 0x5800_0418;
 pub const MPU: core::ops::Range<u32> = 0xE000_ED90..0xE000_EDC0;
 const HSEM: u32 = 0x5802_6400;
 
-/// Register of a peripheral that is modelled and can be switched off.
+/// Register of a peripheral that has a model and a clock gate.
 pub enum Place {
     Timer(usize, u32),
     Usart(usize, u32),
@@ -56,7 +56,7 @@ pub fn place(address: u32) -> Option<(Gate, Place)> {
     })
 }
 
-/// Returns `true` for blocks that are plain memory for the firmware's purposes: CRS, the rest of SYSCFG, RTC, PWR,
+/// Returns `true` for blocks that are plain memory for the firmware: CRS, the other registers of SYSCFG, RTC, PWR,
 /// HSEM, DBGMCU.
 pub fn is_plain(address: u32) -> bool {
     matches!(
@@ -65,7 +65,7 @@ pub fn is_plain(address: u32) -> bool {
     )
 }
 
-/// Returns the bits that read "ready", in blocks that are otherwise plain memory.
+/// Returns the bits that read as "ready" in blocks that are otherwise plain memory.
 pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
     let vos = plain.read(PWR + 0x18) & 0xC000;
     match address {
@@ -74,7 +74,7 @@ pub fn ready_bits(address: u32, plain: &Plain) -> u32 {
         0x5802_480C => 1 << 16,
         0x5802_4818 => 1 << 13,
         0x5800_0420 => 1 << 8,
-        // A semaphore that is locked by a read is given to core 1.
+        // A semaphore that is locked by reading it belongs to core 1.
         0x5802_6480..0x5802_6500 => 0x8000_0300,
         _ => 0,
     }

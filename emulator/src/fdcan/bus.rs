@@ -1,4 +1,5 @@
-//! The wire between the controller and the other members of the joint bus: arbitration, frame times, acknowledge, errors.
+//! The bus line between the controller and the other nodes of the joint bus: arbitration, frame times, acknowledgement,
+//! errors.
 use std::collections::VecDeque;
 
 use can_link::CanFrame;
@@ -7,17 +8,17 @@ use crate::clock::{MICROSECOND, NEVER, Time, from_ns};
 
 /// Bit times of the bus.
 pub const NOMINAL_BIT: Time = MICROSECOND;
-/// Error flag, its echo, delimiter and intermission.
+/// Duration of error flag, its echo, delimiter and intermission.
 pub const ERROR_FRAME: Time = 20 * NOMINAL_BIT;
-/// Entries of the log that are kept.
+/// Largest number of entries in the log.
 const LOG: usize = 100_000;
 
-/// Other members of the bus.
+/// The other nodes of the bus.
 pub trait CanPeers {
-    /// Receives a frame of the controller that has passed at `end`; pushes the answers to `answers`, each with the
-    /// moment at which it is ready.
+    /// Receives a frame that the controller has sent and that ended at `end`. Appends the answers to `answers`, each
+    /// with the time at which it is ready.
     fn receive(&mut self, end: Time, frame: &CanFrame, answers: &mut Vec<(Time, CanFrame)>);
-    /// Returns `true` if a member acknowledges frames.
+    /// Returns `true` if a node acknowledges frames.
     fn acknowledge(&self) -> bool;
 }
 
@@ -26,9 +27,9 @@ pub trait CanPeers {
 pub enum Outcome {
     /// The frame was transmitted.
     Good,
-    /// Destroyed by an error.
+    /// An error destroyed the frame.
     Error,
-    /// No member acknowledged it.
+    /// No node acknowledged the frame.
     NoAcknowledge,
 }
 
@@ -47,14 +48,14 @@ pub struct BusEntry {
     pub outcome: Outcome,
 }
 
-/// Present faults of the bus.
+/// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WireFault {
-    /// Number of frames that are destroyed from now on.
+    /// Number of following frames that are destroyed.
     pub destroy_next: u32,
-    /// `true` if every frame is destroyed.
+    /// `true` if all frames are destroyed.
     pub destroy_all: bool,
-    /// `true` if the controller's line is cut.
+    /// `true` if the controller's bus line is cut.
     pub cut: bool,
 }
 
@@ -65,38 +66,38 @@ struct Queued {
 
 /// A frame that is being sent.
 pub struct Transmission {
-    /// Start, end and frame.
+    /// Start, end and contents of the frame.
     pub entry: BusEntry,
-    /// Transmit buffer of the controller; `None`: another member sends.
+    /// Transmit buffer of the controller; `None` if another node is sending.
     pub buffer: Option<u32>,
 }
 
-/// The wire.
+/// The bus line.
 #[derive(Default)]
 pub struct Wire {
-    /// The other members; without any, no frame is acknowledged.
+    /// The other nodes. Without them no frame is acknowledged.
     pub peers: Option<Box<dyn CanPeers>>,
     queue: Vec<Queued>,
     on_wire: Option<Transmission>,
     free: Time,
-    /// Present faults.
+    /// Current faults.
     pub fault: WireFault,
     log: VecDeque<BusEntry>,
     answers: Vec<(Time, CanFrame)>,
 }
 
 impl Wire {
-    /// Queues a frame that another member sends as soon as possible from `ready` on.
+    /// Queues a frame that another node sends as soon as possible, but not before `ready`.
     pub fn put(&mut self, ready: Time, frame: CanFrame) {
         self.queue.push(Queued { ready, frame });
     }
 
-    /// Returns the number of frames of other members that wait.
+    /// Returns the number of waiting frames of other nodes.
     pub fn waiting(&self) -> usize {
         self.queue.len()
     }
 
-    /// Returns everything that was on the bus, oldest first; the last 100 000 entries.
+    /// Returns the frames that were on the bus, oldest first (at most the last 100 000).
     pub fn log(&self) -> &VecDeque<BusEntry> {
         &self.log
     }
@@ -106,14 +107,14 @@ impl Wire {
         self.log.clear();
     }
 
-    /// Drops the frame that the controller is sending, because the controller stops in the middle of it.
+    /// Removes the frame that the controller is sending, because the controller stops in the middle of it.
     pub fn drop_controller(&mut self) {
         if self.on_wire.as_ref().is_some_and(|t| t.buffer.is_some()) {
             self.on_wire = None;
         }
     }
 
-    /// Returns the time at which the wire changes next without an action of the controller.
+    /// Returns the time of the next change on the bus line that needs no action of the controller.
     pub fn next_change(&self) -> Time {
         match &self.on_wire {
             Some(t) => t.entry.end,
@@ -132,7 +133,7 @@ impl Wire {
         Some(done)
     }
 
-    /// Returns the buffer of the controller that is being sent.
+    /// Returns the transmit buffer whose frame the controller is sending.
     pub fn sending(&self) -> Option<u32> {
         self.on_wire.as_ref().and_then(|t| t.buffer)
     }
@@ -142,14 +143,16 @@ impl Wire {
         self.on_wire.is_some()
     }
 
-    /// Returns the earliest start of a frame up to `now`, if the controller could start its own at `own`.
+    /// Returns the earliest time up to `now` at which a frame can start, if the controller could start its own frame at
+    /// `own`.
     pub fn start_time(&self, own: Time, now: Time) -> Option<Time> {
         let first = self.queue.iter().map(|q| q.ready).min().unwrap_or(NEVER).min(own);
         let start = first.max(self.free);
         (self.on_wire.is_none() && first != NEVER && start <= now).then_some(start)
     }
 
-    /// Arbitrates at `start`: the lowest identifier wins. `readable`: the controller's rates are those of the bus.
+    /// Arbitrates at `start`: the lowest identifier wins. `readable` means that the controller uses the rates of the
+    /// bus.
     pub fn arbitrate(&mut self, start: Time, own: Option<(u32, CanFrame)>, readable: bool) {
         let best = (0..self.queue.len())
             .filter(|&i| self.queue[i].ready <= start)
@@ -176,7 +179,7 @@ impl Wire {
             (Outcome::Good, length)
         };
         if outcome != Outcome::Good && !from_controller {
-            // The sender repeats the frame.
+            // The sender will repeat the frame.
             self.queue.push(Queued { ready: start + length, frame });
         }
         let entry = BusEntry { start, end: start + length, frame, from_controller, outcome };
@@ -189,7 +192,7 @@ impl Wire {
         one || self.fault.destroy_all
     }
 
-    /// Delivers a frame of the controller to the other members.
+    /// Delivers a frame of the controller to the other nodes.
     pub fn deliver(&mut self, end: Time, frame: &CanFrame) {
         let Some(peers) = &mut self.peers else { return };
         peers.receive(end, frame, &mut self.answers);
@@ -197,13 +200,13 @@ impl Wire {
     }
 }
 
-/// Returns the arbitration rank: an 11-bit identifier beats a 29-bit one with the same first bits.
+/// Returns the rank in arbitration. An 11-bit identifier wins against a 29-bit one with the same first bits.
 pub fn rank(frame: &CanFrame) -> u32 {
     let id = frame.id();
     if id.is_extended() { id.value() << 1 | 1 } else { id.value() << 19 }
 }
 
-/// Returns the time of a frame on the wire, intermission included.
+/// Returns the duration of a frame on the bus line, including intermission.
 pub fn frame_time(frame: &CanFrame) -> Time {
     let joint = u16::try_from(frame.id().value()).ok().and_then(|id| jtc_bus::Frame::new(id, frame.data()));
     if let Some(joint) = joint
@@ -213,7 +216,7 @@ pub fn frame_time(frame: &CanFrame) -> Time {
     {
         return from_ns(u64::from(jtc_bus::duration_ns(&joint)));
     }
-    // Frames that do not occur on the joint bus: their stuff bits are estimated as one in ten.
+    // Frames that do not occur on the joint bus. For them one stuff bit per ten bits is assumed.
     let id_bits = if frame.is_extended() { 38 } else { 19 };
     let data_bits = 8 * frame.data().len() as u64;
     let bits = if !frame.is_fd() {

@@ -53,9 +53,9 @@ mod lec {
     pub const UNCHANGED: u32 = 7;
 }
 
-/// Receive sequence after bus-off: 129 times 11 recessive bits.
+/// Duration of the recovery sequence after bus-off: 129 times 11 recessive bits.
 const RECOVERY: Time = 129 * 11 * NOMINAL_BIT;
-/// Recessive bits before a node takes part after INIT.
+/// Duration of the recessive bits that a node must see after INIT before it participates.
 const INTEGRATION: Time = 11 * NOMINAL_BIT;
 
 /// A receive FIFO.
@@ -85,19 +85,19 @@ pub struct FdcanState {
     pub rec: u32,
     /// `true` if the controller is bus-off.
     pub bus_off: bool,
-    /// `true` if the controller takes part on the bus.
+    /// `true` if the controller participates in bus traffic.
     pub online: bool,
     /// Nominal and data bit rate, bit/s.
     pub rates: (u32, u32),
-    /// Transmit requests that are pending.
+    /// Pending transmit requests, one bit per buffer.
     pub pending: u32,
-    /// Frames lost in a full FIFO.
+    /// Number of frames lost because a FIFO was full.
     pub lost: u32,
 }
 
 /// The controller.
 pub struct Fdcan {
-    /// The message RAM, which the core sees from 0x4000_AC00.
+    /// The message RAM, at address 0x4000_AC00 for the core.
     pub ram: MessageRam,
     /// The bus.
     pub wire: Wire,
@@ -127,14 +127,14 @@ pub struct Fdcan {
     txbtie: u32,
     txbcie: u32,
     plain: crate::plain::Plain,
-    /// Time from which the controller takes part; `NEVER` in INIT.
+    /// Time from which the controller participates; `NEVER` in INIT.
     online: Time,
-    /// End of the sequence after bus-off.
+    /// End of the recovery sequence after bus-off.
     recovers: Time,
     lost: u32,
-    /// Frames received and stored.
+    /// Number of frames received and stored.
     pub stored: u64,
-    /// Frames that the filters rejected.
+    /// Number of frames that the filters rejected.
     pub rejected: u64,
 }
 
@@ -179,7 +179,7 @@ impl Default for Fdcan {
 }
 
 impl Fdcan {
-    /// Sets the registers as after reset; the bus continues and the message RAM keeps its contents.
+    /// Sets the registers to their values after reset. The bus continues, and the message RAM keeps its contents.
     pub fn reset(&mut self) {
         let old = core::mem::take(self);
         self.ram = old.ram;
@@ -194,7 +194,7 @@ impl Fdcan {
         self.kernel_hz = hz;
     }
 
-    /// Returns the nominal and data bit rate that the registers give, bit/s.
+    /// Returns the nominal and data bit rates set by the registers, bit/s.
     pub fn rates(&self) -> (u32, u32) {
         let rate =
             |prescaler: u32, quanta: u32| (self.kernel_hz / u64::from((prescaler + 1) * quanta)) as u32;
@@ -203,7 +203,7 @@ impl Fdcan {
         (nominal, data)
     }
 
-    /// Returns `true` if its rates are those of the bus within 1 %.
+    /// Returns `true` if the controller's rates are within 1 % of the rates of the bus.
     fn readable(&self) -> bool {
         let near = |rate: u32, of: u32| u64::from(rate.abs_diff(of)) * 100 <= u64::from(of);
         let (nominal, data) = self.rates();
@@ -236,13 +236,13 @@ impl Fdcan {
         if self.bus_off() || self.cccr & (cccr::INIT | cccr::CSR) != 0 { NEVER } else { self.online }
     }
 
-    /// Returns the time of the next event.
+    /// Returns the time of the controller's next event.
     pub fn next_event(&self) -> Time {
         let own = if self.wire.busy() { NEVER } else { self.tx.since().max(self.takes_part()) };
         self.wire.next_change().min(own).min(self.recovers)
     }
 
-    /// Executes everything up to `now`.
+    /// Executes all events up to `now`.
     pub fn advance(&mut self, now: Time) {
         loop {
             if self.recovers <= now {
@@ -306,7 +306,7 @@ impl Fdcan {
         }
     }
 
-    /// Derives warning, passive and bus-off from the counters.
+    /// Derives the error warning, error passive and bus-off states from the counters.
     fn update_status(&mut self) {
         let passive = self.tec >= 128 || self.rec >= 128;
         let warning = self.tec >= 96 || self.rec >= 96;
@@ -328,7 +328,7 @@ impl Fdcan {
         }
     }
 
-    /// Ends the sequence after bus-off.
+    /// Ends the recovery sequence after bus-off.
     fn recover(&mut self) {
         self.online = self.recovers;
         self.recovers = NEVER;

@@ -6,12 +6,12 @@ use crate::clock::{NEVER, Time};
 pub(super) struct Pending {
     /// TXBRP.
     pub requests: u32,
-    /// TXBTO, TXBCF.
+    /// TXBTO and TXBCF.
     pub sent: u32,
     pub cancelled: u32,
-    /// Buffers to be cancelled after the frame that is on the wire.
+    /// Buffers to be cancelled when the frame now on the bus has ended.
     pub cancel: u32,
-    /// Time since which each buffer has been requested.
+    /// Time at which the transmission of each buffer was requested.
     pub times: [Time; 32],
     /// Get index of the FIFO.
     pub get: u32,
@@ -20,7 +20,7 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// Returns the time since which a request has been pending.
+    /// Returns the time at which the oldest pending request was made.
     pub fn since(&self) -> Time {
         let bits = (0..32).filter(|&b| self.requests >> b & 1 == 1);
         bits.map(|b| self.times[b]).min().unwrap_or(NEVER)

@@ -1,4 +1,4 @@
-//! The registers from 0x4000_A000.
+//! The registers, at address 0x4000_A000.
 use super::{Fdcan, Fifo, INTEGRATION, RECOVERY, cccr, lec};
 use crate::clock::{NEVER, Time};
 use crate::fdcan::pending::Pending;
@@ -73,7 +73,7 @@ impl Fdcan {
             0x84 if open => self.sidfc = value,
             0x88 if open => self.xidfc = value,
             0x90 if open => self.xidam = value,
-            // Writing 1 clears new data flags.
+            // Writing a 1 clears a new-data flag.
             0x98 | 0x9C => self.ndat[(offset as usize - 0x98) / 4] &= !value,
             0xA0 if open => self.fifos[0].config = value,
             0xA8 => self.fifos[0].acknowledge(value),
@@ -107,7 +107,7 @@ impl Fdcan {
             next = next & !cccr::PROTECTED | value & cccr::PROTECTED;
             next = next & !4 | value & 4;
         }
-        // A clock stop is acknowledged at once.
+        // A clock stop request is acknowledged at once.
         next |= (value & cccr::CSR) >> 1;
         self.cccr = next;
         if next & cccr::CCE != 0 && before & cccr::CCE == 0 {
@@ -147,7 +147,7 @@ impl Fifo {
         if size == 0 || self.fill == 0 {
             return;
         }
-        // Everything up to this element is freed.
+        // All elements up to this one become free.
         let freed = (index + size - self.get) % size + 1;
         self.fill = self.fill.saturating_sub(freed);
         self.get = (index + 1) % size;

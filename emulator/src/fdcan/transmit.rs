@@ -1,4 +1,4 @@
-//! Transmission: requests, order, success, failure, cancellation.
+//! Transmission: requests, order, success, failure and cancellation.
 use can_link::CanFrame;
 
 use super::bus::{Outcome, rank};
@@ -22,7 +22,8 @@ impl Fdcan {
         self.ram.load(start, room, self.cccr & cccr::FDOE != 0, self.cccr & cccr::BRSE != 0)
     }
 
-    /// Returns the buffer that is sent next: the lowest identifier; only the oldest entry of a FIFO takes part.
+    /// Returns the buffer to be sent next: the one with the lowest identifier. Of a FIFO only the oldest entry is
+    /// considered.
     pub(super) fn next_buffer(&self) -> Option<u32> {
         let dedicated = self.dedicated();
         let queue = self.txbc >> 30 & 1 == 1;
@@ -49,7 +50,7 @@ impl Fdcan {
         }
     }
 
-    /// Handles a write to TXBCR: a frame on the wire is cancelled only if it fails.
+    /// Handles a write to TXBCR. A frame already on the bus is cancelled only if its transmission fails.
     pub(super) fn cancel(&mut self, bits: u32) {
         let bits = bits & self.tx.requests;
         for buffer in (0..32).filter(|b| bits >> b & 1 == 1) {
@@ -94,7 +95,8 @@ impl Fdcan {
         match outcome {
             Outcome::NoAcknowledge => {
                 self.last_error(lec::ACK);
-                // An error-passive node without acknowledgement does not count further: it may be alone.
+                // An error-passive node does not increase its counter without an acknowledgement, because it may be
+                // alone on the bus.
                 if self.tec < 128 {
                     self.tec += 8;
                 }

@@ -1,4 +1,4 @@
-//! The contents of the bank, and the contents that remain after a loss of power during an operation.
+//! The contents of the bank, and the effect of a power loss during an operation on them.
 use std::fmt;
 
 use super::OperationKind;
@@ -7,10 +7,10 @@ use super::OperationKind;
 pub const BANK2: u32 = 0x0810_0000;
 /// Size of the bank in bytes.
 pub const BANK2_SIZE: u32 = 0x10_0000;
-/// Bytes that are programmed at once.
+/// Bytes that are programmed together.
 pub const WORD: usize = 32;
 const WORDS: usize = BANK2_SIZE as usize / WORD;
-/// Words of a sector.
+/// Number of words per sector.
 const SECTOR_WORDS: usize = 128 * 1024 / WORD;
 /// State of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub enum Cell {
     Unreadable,
 }
 
-/// Contents of the bank, with or without power.
+/// Contents of the bank, which are kept without power.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Bank2 {
     pub(super) bytes: Vec<[u8; WORD]>,
@@ -44,8 +44,8 @@ impl fmt::Debug for Bank2 {
 }
 
 impl Bank2 {
-    /// Creates a bank that begins with these bytes, as [`Self::bytes`] returned them. A word of ones is erased, and no
-    /// word is unreadable. Bytes beyond the bank are ignored.
+    /// Creates a bank that begins with these bytes, as returned by [`Self::bytes`]. A word with all bits 1 is erased,
+    /// and no word is unreadable. Bytes beyond the bank are ignored.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         let mut bank = Self::default();
         for (n, word) in bytes
@@ -59,13 +59,13 @@ impl Bank2 {
         bank
     }
 
-    /// Returns the bytes at an address, without regard to errors.
+    /// Returns the bytes at an address, ignoring read errors.
     pub fn bytes(&self, address: u32, length: usize) -> Vec<u8> {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened()[at..at + length].to_vec()
     }
 
-    /// Overwrites the bytes at an address, regardless of the old contents; afterwards the words are programmed.
+    /// Overwrites the bytes at an address, whatever the old contents. The words are programmed afterwards.
     pub fn put(&mut self, address: u32, bytes: &[u8]) {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened_mut()[at..at + bytes.len()].copy_from_slice(bytes);
@@ -77,7 +77,7 @@ impl Bank2 {
         self.cells[(address - BANK2) as usize / WORD] = Cell::Unreadable;
     }
 
-    /// Simulates a loss of power in the middle of an operation: the affected words may hold any value.
+    /// Simulates a loss of power in the middle of an operation, after which the affected words may have any value.
     pub fn tear(&mut self, kind: OperationKind, word: &[u8; WORD], rng: &mut fastrand::Rng) {
         match kind {
             OperationKind::Erase { sector } => {
@@ -109,7 +109,7 @@ impl Bank2 {
         (sector * SECTOR_WORDS..(sector + 1) * SECTOR_WORDS).for_each(|n| self.erase(n));
     }
 
-    /// Programs a word; returns `false` if it was not erased, after which it is damaged.
+    /// Programs a word. If the word was not erased, it becomes unreadable and the function returns `false`.
     pub fn program(&mut self, n: usize, bytes: &[u8; WORD]) -> bool {
         let erased = self.cells[n] == Cell::Erased;
         self.bytes[n].iter_mut().zip(bytes).for_each(|(old, new)| *old &= new);

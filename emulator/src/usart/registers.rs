@@ -1,4 +1,4 @@
-//! The registers as the core sees them, and the interrupt line that follows from them.
+//! The registers as the core sees them, and the interrupt line that results from them.
 use super::bits::{cr1, isr};
 use super::{FIFO, Usart};
 use crate::clock::Time;

@@ -1,4 +1,4 @@
-//! FDCAN: dedicated buffers, order of transmission, acknowledge, bus-off and recovery.
+//! FDCAN: dedicated buffers, order of transmission, acknowledgement, bus-off and recovery.
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -22,14 +22,14 @@ const TXBCR: u32 = FDCAN1 + 0xD4;
 const TXBTO: u32 = FDCAN1 + 0xD8;
 const TXBCF: u32 = FDCAN1 + 0xDC;
 const BUS_OFF: u32 = 0x80;
-/// Places in the message RAM: filters, receive buffers, transmit buffers.
+/// Offsets in the message RAM: filters, receive buffers, transmit buffers.
 const FILTERS: u32 = 0;
 const RX: u32 = 0x100;
 const TX: u32 = 0x800;
-/// An element with room for 24 bytes.
+/// Size of an element with 24 payload bytes.
 const ELEMENT: u32 = 32;
 
-/// Member that acknowledges and stores the frames that it receives.
+/// Node that acknowledges frames and stores them.
 #[derive(Clone, Default)]
 struct Listener(Rc<RefCell<Vec<(Time, CanFrame)>>>);
 
@@ -42,8 +42,8 @@ impl CanPeers for Listener {
     }
 }
 
-/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz: two filters into receive buffers 0 and
-/// 1, two transmit buffers. `prescaler`: of the nominal phase.
+/// Returns a machine whose FDCAN1 runs at 1 and 5 Mbit/s from a PLL2 of 85 MHz, with two filters into receive buffers 0
+/// and 1 and two transmit buffers. `prescaler` is the one of the nominal phase.
 fn with_prescaler(prescaler: u32, peers: Option<Listener>) -> Machine {
     let mut machine = machine(SLEEP, &[]);
     let rcc = 0x5802_4400;
@@ -158,7 +158,7 @@ fn bus_off_ends_129_times_11_bits_after_init_is_cleared() {
     run(&mut machine, 10 * MILLISECOND);
     assert_eq!(machine.read_register(CCCR) & 1, 1, "INIT is set by bus-off");
     assert_ne!(machine.read_register(PSR) & BUS_OFF, 0);
-    // 32 errors of 8 make 256.
+    // 32 errors count 8 each, so the counter is 256.
     assert_eq!(machine.chip().fdcan.wire.log().len(), 32);
     machine.chip().fdcan.wire.fault.destroy_all = false;
     machine.write_register(TXBCR, 1);

@@ -1,4 +1,4 @@
-//! The core: arithmetic, exceptions, sleep, faults, resets, counting.
+//! The core: arithmetic, exceptions, sleep, faults, resets, instruction counts.
 use openjtc_emulator::clock::{self, MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::observe::FaultKind;
 use openjtc_emulator::{Elf, FIRST_LINE, RegisterARM, ResetCause, Symbol};
@@ -6,14 +6,14 @@ use openjtc_emulator::{Elf, FIRST_LINE, RegisterARM, ResetCause, Symbol};
 use crate::programs::*;
 use crate::{MAIN, RESULT, image, machine, result};
 
-/// Time of an instruction at the 64 MHz after reset.
+/// Duration of an instruction at 64 MHz, the clock after reset.
 const CYCLE: u64 = SECOND / 64_000_000;
 
 #[test]
 fn f64_results_have_the_bits_of_the_pc() {
     const ROUNDS: usize = 500;
     let mut rng = fastrand::Rng::with_seed(7);
-    // Random bits except NaN: includes subnormal numbers, infinities and zeros of both signs.
+    // Random bits except NaN, including subnormal numbers, infinities and zeros of both signs.
     let mut number = || match rng.u8(..) {
         0 => 0.0,
         1 => -0.0,
@@ -27,7 +27,7 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // Pairs are run singly, because the program leaves its results in the place of the next pair.
+    // Each pair is run alone, because the program writes its results where the next pair would be.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());
@@ -50,7 +50,8 @@ fn f64_results_have_the_bits_of_the_pc() {
 #[test]
 fn an_exception_preserves_what_the_program_has() {
     let mut machine = machine(PRESERVE, &[(FIRST_LINE, CLOBBER)]);
-    // Flags and registers are the program's; without its own instruction the floating-point unit is on here.
+    // Checks the flags and registers of the main program. The floating-point unit is enabled without an instruction of
+    // the program.
     machine.run_until(5 * MICROSECOND);
     assert_eq!(result(&machine, 0), 1, "the handler ran once");
     let after: Vec<u32> = (0..9).map(|i| machine.word(RESULT + 0x100 + 4 * i).unwrap()).collect();
@@ -84,7 +85,7 @@ fn primask_holds_an_interrupt_until_the_very_instruction_that_clears_it() {
     machine.run_until(5 * MICROSECOND);
     assert_eq!((result(&machine, 1), result(&machine, 2)), (0, 1));
     let latency = machine.chip().observers.latencies[FIRST_LINE];
-    // Pending by the end of the store: four nop, a load, a store and cpsie pass before the handler.
+    // Pending at the end of the store. Four nop, a load, a store and cpsie are executed before the handler.
     assert_eq!((latency.entries, latency.worst), (1, 7 * CYCLE));
 }
 
@@ -100,7 +101,7 @@ fn wfi_sleeps_until_a_timer_and_costs_no_instructions() {
     machine.run_until(start + 999 * MICROSECOND);
     assert!(machine.instructions() <= 2);
     assert_eq!(result(&machine, 0), 0);
-    // The line stays high because the handler does not clear the flag: it comes again and again.
+    // The handler does not clear the flag, so the line stays high and the interrupt occurs again and again.
     machine.run_until(start + 1000 * MICROSECOND + 40 * CYCLE);
     assert!(result(&machine, 0) >= 3);
     assert_eq!(machine.chip().observers.latencies[FIRST_LINE + 55].worst, 0);
@@ -145,7 +146,7 @@ fn a_requested_reset_keeps_ram_and_adds_its_flag() {
     let chip = machine.chip();
     let causes: Vec<ResetCause> = chip.observers.resets.iter().map(|r| r.cause).collect();
     assert_eq!(causes, [ResetCause::PowerOn, ResetCause::Software, ResetCause::Software]);
-    // SFTRSTF in addition to PORRSTF.
+    // SFTRSTF is set in addition to PORRSTF.
     assert_eq!(chip.rcc.reset_flags() & (1 << 24 | 1 << 23), 1 << 24 | 1 << 23);
     machine.write_register(0x5802_44D0, 1 << 16);
     assert_eq!(machine.read_register(0x5802_44D0), 0);

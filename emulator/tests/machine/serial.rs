@@ -1,4 +1,4 @@
-//! USART and DMA: every byte takes its time on the wire and arrives at the right address.
+//! USART and DMA: every byte takes its real time on the line and arrives at the right address.
 use openjtc_emulator::clock::{MICROSECOND, MILLISECOND, SECOND};
 use openjtc_emulator::{FIRST_LINE, Machine};
 
@@ -114,7 +114,7 @@ fn a_dma_ring_takes_a_stream_and_wraps() {
     machine.chip().usarts[1].host_write(start, &(1..=19).collect::<Vec<u8>>());
     machine.run_until(start + 4 * 10 * MICROSECOND + MICROSECOND);
     assert_eq!(machine.memory(RING, 4).unwrap(), [1, 2, 3, 4]);
-    // Half full: the line is high, and its flag is never cleared.
+    // Half of the transfers are done. The interrupt line is high, because the flag is never cleared.
     assert!(machine.chip().observers.latencies[FIRST_LINE + 12].entries > 0);
     machine.run_until(start + MILLISECOND);
     assert_eq!(machine.memory(RING, 8).unwrap(), [17, 18, 19, 12, 13, 14, 15, 16]);
@@ -130,6 +130,6 @@ fn a_peripheral_without_clock_is_told_of() {
     assert_eq!(machine.read_register(BRR), 0);
     let chip = machine.chip();
     assert_eq!((chip.unclocked[&BRR].reads, chip.unclocked[&BRR].writes), (1, 1));
-    machine.write_register(0x4001_0000, 5); // TIM1 is not modelled
+    machine.write_register(0x4001_0000, 5); // TIM1 has no model
     assert_eq!(machine.chip().unknown[&0x4001_0000].value, 5);
 }

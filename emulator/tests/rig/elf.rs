@@ -1,12 +1,12 @@
-//! The boards' programs, and the record in them that identifies them.
+//! The boards' firmware files, and the version record in them.
 use jtc_wire::Program;
 use openjtc_emulator::Elf;
 use std::path::PathBuf;
 
-/// The boards, by the names of their files.
+/// The boards, by their file names.
 pub const BOARDS: [&str; 3] = ["nucleo-h745zi-q", "nucleo-h745zi-q-ldo", "nucleo-h743zi2"];
 
-/// Rate of the program that [`fast_elf`] returns, Bd.
+/// Rate of the firmware that [`fast_elf`] returns, Bd.
 pub const FAST: u32 = 15_000_000;
 
 fn directory() -> PathBuf {
@@ -26,17 +26,17 @@ fn load(file: &str) -> Elf {
     Elf::parse(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
-/// Returns the program of a board.
+/// Returns the firmware of a board.
 pub fn elf(board: &str) -> Elf {
     load(&format!("{board}.elf"))
 }
 
-/// Returns the program of the first board for lines of 15 MBd.
+/// Returns the firmware of the first board for 15 MBd lines.
 pub fn fast_elf() -> Elf {
     load(&format!("{}-{FAST}.elf", BOARDS[0]))
 }
 
-/// The record at the fixed address, as documented in `docs/board.md`.
+/// The version record at a fixed address, as documented in `docs/board.md`.
 #[derive(Debug)]
 pub struct Version {
     pub version: String,
@@ -50,7 +50,7 @@ pub struct Version {
     pub core_hz: u32,
 }
 
-/// Reads it from the file; returns `None` if it is not there.
+/// Reads the record from the file; returns `None` if the file has no record.
 pub fn version(elf: &Elf) -> Option<Version> {
     const ADDRESS: u32 = 0x0800_0400;
     let bytes = elf.segments.iter().find_map(|(start, data)| {
@@ -68,8 +68,8 @@ pub fn version(elf: &Elf) -> Option<Version> {
     Some(Version { version, board, build, points, segments, segment_points, tick_hz, baud, core_hz })
 }
 
-/// Returns the length and CRC-32 of flash bank 1 after this file was loaded into an erased chip; the CRC is computed
-/// bit by bit from its definition.
+/// Returns the length and CRC-32 of flash bank 1 after this file is loaded into an erased chip. The CRC is computed bit
+/// by bit from its definition.
 pub fn program(elf: &Elf) -> Program {
     const BANK1: std::ops::Range<u32> = 0x0800_0000..0x0810_0000;
     let mut flash = Vec::new();

@@ -1,14 +1,14 @@
-//! The flight record, decoded from its bytes as any tool decodes it.
+//! The flight record, decoded from its bytes as an external tool would.
 use jtc_bus::Frame;
 use jtc_core::{BusState, HOST_LINES};
 use jtc_wire::{UrgentCommand, UrgentCommands};
 
-/// Bytes of the record.
+/// Size of the record, bytes.
 pub const FLIGHT_SIZE: usize = 848;
-/// Version of the layout that is decoded here.
+/// Layout version that this module decodes.
 const LAYOUT: u16 = 3;
 
-/// Tick as the board recorded it.
+/// A tick as the board recorded it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Flight {
     pub phase: u32,
@@ -20,17 +20,17 @@ pub struct Flight {
     pub status_free: bool,
     pub wrong_format: u32,
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// Offered events, oldest first.
+    /// Events passed to the controller, oldest first.
     pub events: Vec<Event>,
     pub received: Vec<Frame>,
     pub state: u8,
     pub trajectory: u8,
     pub safety_output: bool,
-    /// Number of events that are done.
+    /// Number of events that the controller has finished.
     pub host_done: usize,
-    /// Line of the record in the status.
+    /// Line of the response record in the status.
     pub record_line: Option<usize>,
-    /// A status was sent.
+    /// `true` if a status was sent.
     pub status: bool,
     pub sent: Option<Frame>,
     pub point: u32,
@@ -38,14 +38,14 @@ pub struct Flight {
     pub torque: [f64; 6],
 }
 
-/// Event from a host.
+/// An event from a host.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Event {
-    /// 1 a frame, 2 a bad one, 3 noise.
+    /// 1: a frame, 2: an invalid frame, 3: noise.
     pub kind: u8,
-    /// An urgent command was received after it.
+    /// `true` if an urgent command was received after it.
     pub overtaken: bool,
-    /// `true` if it came on a plain line.
+    /// `true` if it arrived on a line without extensions.
     pub plain: bool,
     pub line: u8,
     pub frame_type: u8,
@@ -81,12 +81,12 @@ impl Bytes<'_> {
 }
 
 impl Flight {
-    /// The inputs belong to the tick, the outputs not yet.
+    /// The inputs belong to the tick, but the outputs do not yet.
     pub const PHASE_INPUTS: u32 = 1;
-    /// The outputs also belong to the tick.
+    /// Inputs and outputs belong to the tick.
     pub const PHASE_COMPLETE: u32 = 2;
 
-    /// Returns `None` if these bytes are not a record, as after power-on.
+    /// Returns `None` if these bytes are not a record, which is the case after power-on.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         assert_eq!(bytes.len(), FLIGHT_SIZE);
         let mut b = Bytes(bytes);

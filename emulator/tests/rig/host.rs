@@ -10,33 +10,33 @@ use super::flight::Event;
 /// A host.
 #[derive(Default)]
 pub struct Host {
-    /// Every byte it sent.
+    /// All bytes that the host sent.
     pub sent: Vec<u8>,
-    /// Number of sent bytes up to the last frame that the device has named in its records.
+    /// Number of sent bytes up to the end of the last frame for which the device has sent a record.
     found: usize,
-    /// Bytes that must come next: the statuses of the shadow controller.
+    /// Bytes that must be received next: the statuses of the shadow controller.
     pub expected: VecDeque<u8>,
     receiver: StatusReceiver,
     /// The newest status.
     pub last: Option<Status>,
     /// The newest Info.
     pub info: Option<Info>,
-    /// When statuses were complete.
+    /// Times at which statuses were complete.
     pub times: Vec<Time>,
     /// Records received, oldest first.
     pub records: Vec<Response>,
-    /// Bytes received.
+    /// Number of bytes received.
     pub received: u64,
-    /// Time of a device reset, while the bytes received so far may be older than it.
+    /// Time of a device reset, as long as received bytes may be older than the reset.
     reset: Option<Time>,
 }
 
 impl Host {
-    /// Receives bytes from the device: each must be the byte of the shadow controller.
+    /// Receives bytes from the device. Each must equal the next byte of the shadow controller.
     pub fn receive(&mut self, bytes: &[WireByte]) {
         for byte in bytes {
             self.received += 1;
-            // Bytes that were on the line during the reset of the device are cut off.
+            // Bytes that were on the line when the device was reset are lost.
             if self.reset.is_some_and(|reset| byte.end < reset) {
                 continue;
             }
@@ -58,19 +58,19 @@ impl Host {
         }
     }
 
-    /// Returns the counts of statuses, bad frames and invalid bytes.
+    /// Returns the numbers of statuses, invalid frames and invalid bytes.
     pub fn counters(&self) -> jtc_wire::StatusCounters {
         self.receiver.counters()
     }
 
-    /// Drops all bytes that were on their way.
+    /// Drops all bytes that are in transmission.
     pub fn device_was_reset(&mut self, time: Time) {
         self.reset = Some(time);
         self.expected.clear();
         self.receiver.clear();
     }
 
-    /// Returns the bytes of a frame that the device has recorded: the host must have sent them after the last recorded
+    /// Returns the bytes of a frame that the device has recorded. The host must have sent them after the last recorded
     /// frame.
     pub fn frame(&self, event: &Event) -> Vec<u8> {
         let length = usize::from(event.len);
@@ -93,7 +93,7 @@ impl Host {
             .unwrap_or_else(|| panic!("the host sent no frame like {event:?}"))
     }
 
-    /// Notes that the device has executed that frame.
+    /// Records that the device has executed this frame.
     pub fn done(&mut self, event: &Event) {
         let (at, bytes) = self.place(event);
         self.found += at + bytes.len();

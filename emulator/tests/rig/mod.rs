@@ -1,9 +1,9 @@
 //! A board under test: the board's own ELF file, the simulated arm on its joint bus, and a host on each serial line. In
-//! parallel, the same controller runs on this machine (the shadow controller) with the inputs of the board's flight
-//! record. Its outputs must be the same.
+//! parallel, the same controller runs on the PC (the shadow controller) with the inputs from the board's flight record.
+//! Its outputs must be the same.
 //!
-//! Every millisecond of every test is checked: no tick is missing, all torques have the same bits as those computed
-//! here, the same frame and the same statuses go out on the wires, and the invariants of the simulator hold.
+//! Every millisecond of every test is checked: no tick is missing, all torques are bit-identical to those of the shadow
+//! controller, the same frame and the same statuses are sent on the lines, and the invariants of the simulator hold.
 #![allow(dead_code, reason = "each test uses its part")]
 
 mod elf;
@@ -44,29 +44,29 @@ pub fn index(port: Port) -> usize {
 
 /// Board, hosts, and the shadow controller.
 pub struct Rig {
-    /// The board.
+    /// The emulated board.
     pub board: Board,
-    /// Bytes that each host sent and received.
+    /// Hosts with the bytes that they sent and received.
     pub hosts: [Host; 2],
-    /// The controller on this machine; `None` until the board's first tick after a start.
+    /// The shadow controller; `None` until the board's first tick after a start.
     pub shadow: Option<Shadow>,
     /// The last complete flight record.
     pub flight: Flight,
     /// Frames on the joint bus in the last millisecond.
     pub bus: Vec<BusEntry>,
-    /// Ticks may be missing, because the test hangs the board.
+    /// `true` if ticks may be missing, because the test makes the board hang.
     pub may_hang: bool,
-    /// Ticks seen since the board started.
+    /// Number of ticks since the board started.
     pub ticks: u64,
-    /// Contents of the flight recorder when the board was reset.
+    /// Contents of the flight recorder at the board's reset.
     log: LogMemory,
     invariants: Invariants,
     flight_at: u32,
     mailbox_at: u32,
-    /// Address at which the program leaves the length and CRC of its flash (J-67).
+    /// Address to which the firmware writes the length and CRC of its flash (J-67).
     program_at: u32,
     resets: usize,
-    /// Frames that the last ticks sent and that were not on the bus yet.
+    /// Frames that the last ticks sent and that have not been on the bus yet.
     to_pass: Vec<jtc_bus::Frame>,
 }
 
@@ -81,7 +81,7 @@ impl Rig {
         Self::of(elf(board), &config)
     }
 
-    /// Creates a board with this program.
+    /// Creates a board with this firmware.
     pub fn of(elf: openjtc_emulator::Elf, config: &BoardConfig) -> Self {
         let flight_at = elf.symbol("FLIGHT").expect("the flight record").address;
         let mailbox_at = elf.symbol("ARM_STORE").expect("the mailbox").address;
@@ -105,13 +105,13 @@ impl Rig {
         }
     }
 
-    /// Advances everything by one millisecond, with all checks.
+    /// Advances everything by one millisecond and makes all checks.
     pub fn step(&mut self) {
         self.board.step();
         let ms = self.board.now_ms();
         let resets = self.board.machine.chip().observers.resets.clone();
         for reset in &resets[self.resets..] {
-            // A new program begins: everything that runs in parallel also restarts, except the log.
+            // A new program begins. Everything that runs in parallel restarts too, except the log.
             if let Some(shadow) = self.shadow.take() {
                 self.log = shadow.into_log();
             }
@@ -175,12 +175,12 @@ impl Rig {
         self.flight = flight;
     }
 
-    /// Returns the program's mailbox of the stored arm: words in the order of `firmware/src/arm_store.rs`.
+    /// Returns the firmware's mailbox of the stored arm, with words in the order of `firmware/src/arm_store.rs`.
     fn mailbox(&self) -> [u32; 8] {
         core::array::from_fn(|n| self.board.machine.word(self.mailbox_at + 4 * n as u32).expect("memory"))
     }
 
-    /// Returns how the board has just started.
+    /// Returns data about the board's start.
     fn start(&self, cause: u32) -> Start {
         let [.., address, length, sequence] = self.mailbox();
         let arm = (address != 0).then(|| {
@@ -192,7 +192,7 @@ impl Rig {
         Start { cause, boots: self.resets as u32, version, program, arm, log: self.log.clone() }
     }
 
-    /// Checks that the frames that the controller sent pass unchanged and in order, or not at all.
+    /// Checks that the frames from the controller are sent unchanged and in order, or not at all.
     fn take_bus(&mut self) {
         let wire = &mut self.board.machine.chip().fdcan.wire;
         self.bus = wire.log().iter().cloned().collect();
@@ -202,18 +202,19 @@ impl Rig {
             assert!(frame.is_fd() && frame.is_brs() && !frame.is_extended(), "{frame:?}");
             let passed = jtc_bus::Frame::new(frame.id().value() as u16, frame.data());
             let Some(at) = self.to_pass.iter().position(|sent| Some(*sent) == passed) else {
-                // The frame of the tick that runs now: its record is read later.
+                // This frame belongs to the tick that is running now, whose record is read later.
                 continue;
             };
             self.to_pass.drain(..=at);
         }
     }
 
-    /// Returns the flight record; waits for a tick that extends over two milliseconds.
+    /// Returns the flight record. If a tick extends over two milliseconds, waits for its end.
     fn complete_flight(&mut self) -> Option<Flight> {
-        // The longest tick takes a third of a millisecond: a model with all that follows from it.
+        // The longest tick takes a third of a millisecond: a model is received and everything that depends on it is
+        // computed.
         for _ in 0..80 {
-            // Half a record is not valid; and a tick may be due at this moment.
+            // A half-written record is not valid. A tick may also be due at this time.
             if !self.in_tick() {
                 let flight = self.read_flight()?;
                 let due = self.ticks > 0 && !self.may_hang && flight.tick == self.ticks;
@@ -227,12 +228,12 @@ impl Rig {
         self.read_flight()
     }
 
-    /// Returns `true` while the interrupt of the tick is executed.
+    /// Returns `true` while the tick interrupt is running.
     fn in_tick(&mut self) -> bool {
         self.board.machine.chip().core.contexts.contains(&TIM7)
     }
 
-    /// Returns the present flight record; `None` if the memory does not hold a record.
+    /// Returns the current flight record; `None` if the memory does not contain a record.
     pub fn read_flight(&mut self) -> Option<Flight> {
         let bytes = self.board.machine.memory(self.flight_at, FLIGHT_SIZE)?;
         Flight::parse(&bytes)
@@ -243,7 +244,7 @@ impl Rig {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Runs until `done`, at most `ms` milliseconds.
+    /// Runs until `done` returns `true`, at most `ms` milliseconds.
     #[track_caller]
     pub fn wait(&mut self, what: &str, ms: u64, mut done: impl FnMut(&mut Self) -> bool) {
         for _ in 0..=ms {
@@ -256,7 +257,7 @@ impl Rig {
         panic!("{what}: not within {ms} ms; {t:?}");
     }
 
-    /// Returns the telemetry of the shadow controller, which has the same bits as the board's.
+    /// Returns the telemetry of the shadow controller, which is bit-identical to the board's.
     pub fn telemetry(&self) -> Telemetry {
         self.shadow.as_ref().map(|s| s.telemetry()).unwrap_or_default()
     }
@@ -266,7 +267,7 @@ impl Rig {
         self.telemetry().state
     }
 
-    /// Sends bytes of the host at a port.
+    /// Sends bytes from the host at a port.
     pub fn write(&mut self, port: Port, bytes: &[u8]) {
         self.hosts[index(port)].sent.extend_from_slice(bytes);
         self.board.write(port, bytes);
@@ -298,7 +299,8 @@ impl Rig {
         self.hosts[index(port)].last.expect("a status was received")
     }
 
-    /// Sends default parameters by the host at `port`, then waits until every joint is enabled and held.
+    /// Sends default parameters from the host at `port`, then waits until every joint is enabled and holds its
+    /// position.
     #[track_caller]
     pub fn bring_up(&mut self, port: Port) {
         self.wait("the board is up", 50, |rig| rig.ticks > 0);
@@ -306,7 +308,7 @@ impl Rig {
         self.wait_for_hold(12_000);
     }
 
-    /// Starts a trajectory from the present position, out and back in `seconds` each, and runs `ms` of it.
+    /// Starts a trajectory from the current position, out and back in `seconds` each, and runs `ms` of it.
     #[track_caller]
     pub fn set_off(&mut self, port: Port, seconds: f64, ms: u64) {
         let here = self.telemetry().joints.map(|j| j.set_position);
@@ -319,7 +321,7 @@ impl Rig {
         assert_eq!(self.state(), ControllerState::Operate);
     }
 
-    /// Waits until every joint is enabled and held.
+    /// Waits until every joint is enabled and holds its position.
     #[track_caller]
     pub fn wait_for_hold(&mut self, ms: u64) {
         self.wait("HoldPos with all joints enabled", ms, |rig| {

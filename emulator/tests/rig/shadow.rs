@@ -1,4 +1,4 @@
-//! The shadow controller: the board's controller, run on this machine.
+//! The shadow controller: the board's controller, run on the PC.
 use jtc_core::recorder::{BLOCK_WORDS, Block, Recorder};
 use jtc_core::{Config, Controller, HostEvent, Identity, Inputs, POINTS_MAX, Telemetry};
 use jtc_sim::{RECORDER_BLOCKS, Worked};
@@ -10,10 +10,10 @@ use super::elf::Version;
 use super::flight::{Event, Flight};
 use super::host::Host;
 
-/// Causes of a start after which the controller reports that it failed (J-12): watchdog, hard fault, panic.
+/// Causes of a start after which the controller reports a failure (J-12): watchdog, hard fault, panic.
 const FAILED: [u32; 3] = [4, 5, 6];
 
-/// Memory of the flight recorder, in the same pieces as on the board.
+/// Memory of the flight recorder, divided into the same parts as on the board.
 pub type LogMemory = [Vec<Block>; 3];
 
 /// Returns the state of the memory after a loss of power.
@@ -25,22 +25,22 @@ pub fn no_log() -> LogMemory {
 pub struct Shadow {
     controller: Controller<Vec<RawPoint>>,
     recorder: Recorder<Vec<Block>, 3>,
-    /// Work of the last tick.
+    /// Frames that the last tick has executed.
     pub worked: Vec<Worked>,
     program: Program,
 }
 
-/// Origin of a board's start.
+/// Data about a board's start.
 pub struct Start {
-    /// Cause, as in the flight record.
+    /// Cause, with the code of the flight record.
     pub cause: u32,
-    /// Number of this start.
+    /// Number of this start since power-on.
     pub boots: u32,
-    /// Version record of the program.
+    /// Version record of the firmware.
     pub version: Version,
     /// Length and CRC of the program in flash (J-67).
     pub program: Program,
-    /// Arm that the board found in its flash, and its number.
+    /// Arm that the board found in its flash, and its sequence number.
     pub arm: Option<(Vec<u8>, u32)>,
     /// Previous contents of the flight recorder.
     pub log: LogMemory,
@@ -75,12 +75,12 @@ impl Shadow {
         Self { controller, recorder, program, worked: Vec::new() }
     }
 
-    /// Notes that the board has read its flash.
+    /// Records that the board has read its flash.
     pub fn flash_is_read(&mut self) {
         self.controller.set_program(Some(self.program));
     }
 
-    /// Sets the result of the last StoreArm, as the board's mailbox shows it after the tick.
+    /// Sets the result of the last StoreArm to the value in the board's mailbox after the tick.
     pub fn stored(&mut self, state: StoreState, sequence: u32) {
         self.controller.set_store_state(state, sequence);
     }
@@ -90,7 +90,7 @@ impl Shadow {
         &self.recorder
     }
 
-    /// Returns the memory that the flight recorder leaves to the next start.
+    /// Returns the memory of the flight recorder for the next start.
     pub fn into_log(self) -> LogMemory {
         self.recorder.into_memory()
     }
@@ -110,7 +110,7 @@ impl Shadow {
         self.controller.config()
     }
 
-    /// Runs the tick that the board recorded; all outputs must be equal to the board's, to the bit.
+    /// Runs the tick that the board recorded. All outputs must be bit-identical to the board's.
     pub fn tick(&mut self, flight: &Flight, hosts: &mut [Host; 2]) {
         let bytes: Vec<Vec<u8>> = flight
             .events
@@ -175,8 +175,8 @@ fn host_event<'a>(event: &Event, bytes: &'a [u8]) -> HostEvent<'a> {
     HostEvent { line: event.line.into(), overtaken: event.overtaken, plain: event.plain, event: what }
 }
 
-/// Adds the expected status (J-04): the record goes to the line of its frame, the other line gets the same status
-/// without a record.
+/// Adds the expected status (J-04). The line of the answered frame gets the response record, the other line gets the
+/// same status without a record.
 fn expect_status(bytes: &[u8], line: Option<usize>, hosts: &mut [Host; 2]) {
     let status = Status::parse(bytes).expect("the controller makes good statuses");
     assert_eq!(status.response().is_some(), line.is_some());

@@ -12,9 +12,9 @@ use safety_input::SafetyInput;
 mod nucleo_144;
 pub use nucleo_144::wire;
 
-/// A board, wired.
+/// A board with its pins assigned.
 pub struct Board {
-    /// RS422, USB.
+    /// RS422 and USB.
     pub lines: [Line; 2],
     /// Safety wires and LEDs.
     pub pins: Pins,
@@ -24,16 +24,16 @@ pub struct Board {
 
 /// Safety wires and LEDs.
 pub struct Pins {
-    /// 0 is an error; pulled down, so that a broken wire is one (J-22).
+    /// 0 means an error; pulled down, so that a broken wire reads as an error (J-22).
     pub safety_input: SafetyInput,
-    /// 0 is an error (J-22).
+    /// 0 means an error (J-22).
     pub safety_output: Output<'static>,
     /// LED1, LED2, LED3.
     pub leds: [Output<'static>; 3],
 }
 
 impl Pins {
-    /// `input` and `output`: pins of the safety wires.
+    /// Creates the pins; `input` and `output` are the pins of the safety wires.
     fn new(
         input: Peri<'static, impl Pin>,
         output: Peri<'static, impl Pin>,
@@ -46,7 +46,7 @@ impl Pins {
         }
     }
 
-    /// Shows the state on the LEDs as the manual specifies.
+    /// Shows the state on the LEDs as the manual describes.
     pub fn show(&mut self, state: ControllerState) {
         let lit = match state {
             ControllerState::Start => [false, false, false],
@@ -73,27 +73,28 @@ fn transmit(pin: Peri<'static, impl Pin>, function: u8) {
     core::mem::forget(pin);
 }
 
-/// Like `transmit`, but pulled up to the level of an idle line, so that an unconnected input receives nothing.
+/// Like `transmit`, but for an input. Pulled up to the level of an idle line, so that an unconnected input receives
+/// nothing.
 fn receive(pin: Peri<'static, impl Pin>, function: u8) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, AfType::input(Pull::Up));
     core::mem::forget(pin);
 }
 
-/// Port D bit of the safety output; all boards have it there.
+/// Bit of the safety output in port D, where it is on all boards.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
-/// Drives the safety output to 0, first of all after a reset, even if the clocks do not start. The drives may still
-/// hold the torque of the last program.
+/// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start: the drives may
+/// still hold the torque that the last program commanded.
 pub fn safety_output_low_at_start() {
     pac::RCC.ahb4enr().modify(|w| w.set_gpioden(true));
-    // Reading back makes sure that the clock runs.
+    // Reading the register back makes sure that the clock runs.
     pac::RCC.ahb4enr().read();
     safety_output_low();
     pac::GPIOD.moder().modify(|w| w.set_moder(SAFETY_OUTPUT_BIT, pac::gpio::vals::Moder::OUTPUT));
 }
 
-/// Takes the safety output to 0. Can be called from anywhere and in any state of the program.
+/// Drives the safety output to 0. Can be called from anywhere and in any state of the program.
 pub fn safety_output_low() {
     pac::GPIOD.bsrr().write(|w| w.set_br(SAFETY_OUTPUT_BIT, true));
 }

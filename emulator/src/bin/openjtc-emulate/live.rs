@@ -1,4 +1,4 @@
-//! Board, terminal and clock in one loop.
+//! Main loop: board, terminal and real-time clock.
 use std::error::Error;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,20 +11,20 @@ use crate::frames::{Frames, GAP, Incoming};
 use crate::log::DefmtLog;
 use crate::pty::{Pty, PtyError};
 
-/// Largest number of bytes of the host that wait for the line.
+/// Largest number of host bytes that may wait for the line.
 const WAITING_MAX: usize = 4096;
-/// Longest wait for a host to read, when virtual time runs free.
+/// Longest wait for a host to read, if virtual time does not follow the clock.
 const READER_WAIT: Duration = Duration::from_millis(100);
-/// Largest delay that is caught up.
+/// Largest delay that virtual time catches up.
 const CATCH_UP: Duration = Duration::from_secs(2);
 const TICK: Duration = Duration::from_millis(1);
 
 /// Speed of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
-    /// Virtual time follows the clock.
+    /// Virtual time follows the real-time clock.
     Realtime,
-    /// As fast as it can.
+    /// Virtual time runs as fast as possible.
     Max,
 }
 
@@ -32,14 +32,14 @@ pub enum Speed {
 pub struct Live {
     board: Board,
     port: Port,
-    /// Rate of the host; `None`: that of the firmware.
+    /// Rate of the host, bit/s; `None`: the rate of the firmware.
     baud: Option<u32>,
     pty: Pty,
     speed: Speed,
     log: Option<DefmtLog>,
     frames: Frames,
     incoming: Incoming,
-    /// Bytes that the terminal did not accept at once.
+    /// Bytes that the terminal has not accepted yet.
     rest: Vec<u8>,
     connected: bool,
     ready: bool,
@@ -48,7 +48,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Creates a board that has just been switched on, with this terminal.
+    /// Creates a board that has just been switched on, connected to this terminal.
     pub fn new(
         board: Board,
         port: Port,
@@ -74,7 +74,7 @@ impl Live {
         }
     }
 
-    /// Returns the contents of bank 2 of the flash if the power fails now.
+    /// Returns the contents of flash bank 2 after a power failure at this moment.
     pub fn cut_power(&self, seed: u64) -> Bank2 {
         self.board.machine.cut_power(seed)
     }
@@ -92,7 +92,7 @@ impl Live {
                     continue;
                 }
                 if due > CATCH_UP {
-                    // A longer delay is not caught up: time continues from here.
+                    // A longer delay is not caught up. Virtual time continues from here.
                     (start, start_ms) = (Instant::now(), self.board.now_ms());
                 }
             }
@@ -136,9 +136,9 @@ impl Live {
         }
     }
 
-    /// Stops virtual time briefly for the next bytes of a frame that are still on their way through the operating
-    /// system, because the board itself measures the gap. Does not wait while bytes of the host still wait for the
-    /// line. Returns `true` if it waited.
+    /// Pauses virtual time briefly while bytes of a frame may still be on their way through the operating system,
+    /// because the board would measure the delay as a gap. Does not wait while host bytes still wait for the line.
+    /// Returns `true` if it waited.
     fn stands_still(&mut self) -> Result<bool, PtyError> {
         if self.board.pending(self.port) > 0 || !self.incoming.mid_frame() {
             return Ok(false);
@@ -193,8 +193,8 @@ impl Live {
         Ok(())
     }
 
-    /// Writes the remaining bytes to the terminal. A host that does not read must not delay the arm: in real time this
-    /// never waits.
+    /// Writes the remaining bytes to the terminal. In real time this never waits, because a host that does not read
+    /// must not delay the arm.
     fn write_rest(&mut self) -> Result<(), PtyError> {
         let end = Instant::now() + READER_WAIT;
         while !self.rest.is_empty() {

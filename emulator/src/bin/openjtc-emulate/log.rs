@@ -1,9 +1,9 @@
-//! The firmware's defmt log as text, by the program `defmt-print`.
+//! The firmware's defmt log as text, decoded by the program `defmt-print`.
 use std::io::{self, Write};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-/// Decoder process: receives the bytes and prints lines.
+/// Decoder process, which receives the bytes and prints lines.
 pub struct DefmtLog(Child);
 
 impl DefmtLog {
@@ -13,13 +13,13 @@ impl DefmtLog {
             .arg("-e")
             .arg(elf)
             .stdin(Stdio::piped())
-            // The standard output is reserved for `ready:`.
+            // Standard output is reserved for the `ready:` line.
             .stdout(io::stderr())
             .spawn();
         child.map(Self).map_err(|e| format!("defmt-print: {e}; install it with `cargo install defmt-print`"))
     }
 
-    /// Passes bytes to the decoder.
+    /// Sends bytes to the decoder.
     pub fn print(&mut self, bytes: &[u8]) -> io::Result<()> {
         match &mut self.0.stdin {
             Some(input) if !bytes.is_empty() => input.write_all(bytes),
@@ -30,7 +30,7 @@ impl DefmtLog {
 
 impl Drop for DefmtLog {
     fn drop(&mut self) {
-        // The decoder ends at the end of its input.
+        // The decoder exits at the end of its input.
         drop(self.0.stdin.take());
         let _ = self.0.wait();
     }

@@ -1,9 +1,9 @@
-//! Lets arms fall freely for a second and prints their positions: one arm per line on stdin, one line of six positions
-//! on stdout.
+//! Lets arms fall freely for a second and prints their positions. Each line on stdin is an arm; for each, a line of six
+//! positions is written to stdout.
 //!
-//! A line holds 154 numbers: for 7 joints x y z roll pitch yaw; for 7 links x y z roll pitch yaw Ixx Ixy Ixz Iyy Iyz
-//! Izz mass; gravity (3); rotor inertia, position and velocity of 6 joints each. No friction, no end stops, no drives;
-//! RK4 in steps of 1 ms, or of the number of ms in the first argument.
+//! A line has 154 numbers: x y z roll pitch yaw for each of 7 joints; x y z roll pitch yaw Ixx Ixy Ixz Iyy Iyz Izz mass
+//! for each of 7 links; gravity (3); rotor inertia, position and velocity for each of 6 joints. There is no friction,
+//! no end stop and no drive. The integration is RK4 in steps of 1 ms, or of the number of ms in the first argument.
 use std::io::{BufRead, Write};
 
 use jtc_sim::{Arm, SimArm, SimFriction};

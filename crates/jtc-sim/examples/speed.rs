@@ -1,5 +1,5 @@
-//! Prints the time that a simulated millisecond takes, as one JSON object: arm, drives, bus and controller while the
-//! arm follows a motion.
+//! Measures the time to simulate a millisecond of arm, drives, bus and controller while the arm follows a motion.
+//! Prints one JSON object.
 use jtc_sim::{ModelError, Operator, SimConfig, host};
 use jtc_wire::ExecCommand;
 use test_kit::clock::CpuTime;
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    // Not the minimum of all, because the motion and the hold after it have different costs.
+    // Not the minimum, because the motion and the hold after it have different costs.
     let ns = times[times.len() / 10];
     println!(
         "{{\"name\":\"simulated_millisecond\",\"ns\":{ns:.1},\"real_time_factor\":{:.0},\"state\":\"{:?}\"}}",

@@ -14,26 +14,27 @@ use gear::OUTPUT;
 use wall::Contact;
 pub use wall::{Side, Wall};
 
-/// Torque per penetration of an end stop, N·m/rad.
+/// Stiffness of an end stop, N·m/rad.
 const STOP_STIFFNESS: f64 = 20_000.0;
-/// Torque per speed inside an end stop, N·m·s/rad.
+/// Damping of an end stop, N·m·s/rad.
 const STOP_DAMPING: f64 = 200.0;
-/// Deceleration of a joint whose brake closes, rad/s².
+/// Deceleration of a joint whose brake is closing, rad/s².
 const BRAKE_DECELERATION: f64 = 40.0;
 /// Inertia that represents a closed brake, kg·m².
 const BRAKED: f64 = 1e9;
-/// Least inertia of a rotor, kg·m²: a lighter one would cross its whole range within a few steps.
+/// Smallest inertia of a rotor, kg·m². A lighter rotor would cross its whole range within a few steps.
 const LIGHTEST: f64 = 0.02;
-/// Largest turn of a joint in a sub-step, rad: a joint of 100 rad/s or more takes several sub-steps in a millisecond.
+/// Largest turn of a joint in a sub-step, rad. A joint at 100 rad/s or more needs several sub-steps per millisecond.
 const LARGEST_TURN: f64 = 0.1;
-/// Largest number of sub-steps of a step because of speed alone.
+/// Largest number of sub-steps per step because of high speed.
 const MOST_SUBSTEPS: f64 = 32.0;
-/// Largest phase angle of a vibration on a wall or on gears in a sub-step, rad; the next constant is the largest part of its decay.
+/// Largest phase angle per sub-step of a vibration on a wall or on gears, rad. The next constant is its largest decay
+/// per sub-step.
 const LARGEST_PHASE: f64 = 0.5;
 const LARGEST_DECAY: f64 = 1.0;
-/// Largest number of sub-steps of a step because of walls and gears. If walls would need more, their damping is reduced.
+/// Largest number of sub-steps per step because of walls and gears. If walls would need more, their damping is reduced.
 const MOST_STIFF_SUBSTEPS: f64 = 64.0;
-/// Decay in a sub-step above which damping is reduced; Runge-Kutta is unstable from 2.7 on.
+/// Decay per sub-step above which damping is reduced. Runge-Kutta is unstable from 2.7 on.
 const UNSTABLE_DECAY: f64 = 2.0;
 /// Time between two updates of the temperatures, s.
 const WARMING: f64 = 0.05;
@@ -42,7 +43,7 @@ const HEAT_CAPACITY: f64 = 900.0;
 /// Heat flow from a bearing to the air, W/K.
 const HEAT_FLOW: f64 = 1.2;
 
-/// Properties of an arm; plain data.
+/// Properties of an arm, without state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimArm {
     /// Kinematics and masses.
@@ -51,11 +52,12 @@ pub struct SimArm {
     pub payload: Payload,
     /// Acceleration of gravity in the base frame, m/s².
     pub gravity: [f64; 3],
-    /// Inertia of the drives' rotors at the joints, kg·m²; less than 0.02 counts as 0.02.
+    /// Inertia of the drives' rotors at the joints, kg·m²; a value below 0.02 is treated as 0.02.
     pub rotor_inertia: JointVec,
     /// Friction per joint.
     pub friction: [SimFriction; JOINTS],
-    /// Speed up to which friction polynomials are valid, rad/s. Beyond it they continue in a straight line that does not fall.
+    /// Speed up to which friction polynomials are valid, rad/s. Above it, friction continues as a straight line that
+    /// does not fall.
     pub polynomial_speed: JointVec,
     /// Friction around standstill.
     pub friction_model: FrictionModel,
@@ -63,14 +65,14 @@ pub struct SimArm {
     pub stops: [(f64, f64); JOINTS],
     /// Elasticity of the gears; rigid by default. An elastic gear moves 0.01 kg·m² of the rotor's inertia to its link.
     pub gears: [Gear; JOINTS],
-    /// Largest torque of the drive, N·m; it clamps larger ones without a report.
+    /// Largest torque of the drive, N·m. The drive limits larger requests without reporting it.
     pub torque_ceiling: JointVec,
     /// Temperature of the air and of the bearings at the start, °C.
     pub ambient: f64,
 }
 
 impl SimArm {
-    /// Creates the arm that these settings and parameters describe, with end stops 0.04 rad outside the limits.
+    /// Creates the arm with these settings and parameters, and with end stops 0.04 rad outside the position limits.
     pub fn new(config: &Config, parameters: &Parameters) -> Self {
         let friction = match &parameters.friction {
             Friction::Polynomial(c) => core::array::from_fn(|j| SimFriction::Polynomial(c[j])),
@@ -81,10 +83,10 @@ impl SimArm {
             model: parameters.model,
             payload: config.payload,
             gravity: config.gravity,
-            // A drive has a rotor even if the arm file gives no inertia for it.
+            // A real drive always has a rotor, even if the arm file has no inertia for it.
             rotor_inertia: core::array::from_fn(|j| if rotor(j) > 0.0 { rotor(j) } else { 0.7 }),
             friction,
-            // Friction is measured only within the limits of the arm.
+            // Friction was measured only within the velocity limits of the arm.
             polynomial_speed: config.joints.map(|j| j.velocity_max),
             friction_model: FrictionModel::default(),
             stops: config.joints.map(|j| (j.position_min - 0.04, j.position_max + 0.04)),
@@ -101,11 +103,11 @@ impl Default for SimArm {
     }
 }
 
-/// Arm in motion.
+/// An arm with its state of motion.
 #[derive(Clone, Debug)]
 pub struct Arm {
     dynamics: Dynamics,
-    /// Inertias without carried payloads; the next field has these payloads.
+    /// Inertias without carried payloads. The next field includes these payloads.
     bare: LinkInertias,
     carried: Vec<Payload>,
     contacts: Vec<Contact>,
@@ -113,33 +115,34 @@ pub struct Arm {
     parts: SimArm,
     friction_scale: JointVec,
     friction: FrictionTorques,
-    /// Deflection of the bristles between the surfaces, rad.
+    /// Deflection of the bristles in the friction model, rad.
     bristles: JointVec,
-    /// Friction heat since the last update of the temperatures, J; the next field is the time since then, s.
+    /// Friction heat since the last update of the temperatures, J. The next field is the time since that update, s.
     heat: JointVec,
     since: f64,
     /// Position, rad.
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors as seen through the gears, rad: equal to the position of the links if gears are rigid.
+    /// Position of the motors at the joints, through the gears, rad. Equal to the position of the links if gears are
+    /// rigid.
     pub motor: JointVec,
-    /// Velocity of the motors as seen through the gears, rad/s.
+    /// Velocity of the motors at the joints, through the gears, rad/s.
     pub motor_speed: JointVec,
     /// Bearing temperature, °C.
     pub temperature: JointVec,
-    /// Closed brakes.
+    /// `true` for joints with a closed brake.
     pub braked: [bool; JOINTS],
-    /// Factor of a fault on the friction: 1 normally.
+    /// Factor by which a fault changes the friction; normally 1.
     pub friction_fault: JointVec,
 }
 
 impl Arm {
-    /// Creates an arm at rest at `q`. Its friction is that of `parts` times `friction_scale`.
+    /// Creates an arm at rest at `q`. Its friction is the friction of `parts` times `friction_scale`.
     pub fn new(parts: SimArm, friction_scale: JointVec, q: JointVec) -> Self {
         let dynamics = Dynamics::with_payload(&parts.model, parts.gravity, &parts.payload);
         let elastic = parts.gears.iter().any(Gear::is_elastic);
-        // The springs carry their loads, so that the links rest.
+        // The springs already carry their loads, so that the links are at rest.
         let load = dynamics.gravity_torque(&q);
         let motor = core::array::from_fn(|j| {
             let gear = &parts.gears[j];
@@ -205,14 +208,14 @@ impl Arm {
         }
     }
 
-    /// Returns the number of sub-steps that gears and walls within reach need in `dt` seconds, and the share of the walls' damping for
-    /// which they suffice.
+    /// Returns the number of sub-steps per `dt` seconds that gears and reachable walls need, and the share of the
+    /// walls' damping for which this number is sufficient.
     fn stiff_substeps(&self, dt: f64) -> (f64, f64) {
         let (mut square, mut decay) = (0.0, 0.0);
         let mut link = self.parts.rotor_inertia.map(|rotor| rotor.max(LIGHTEST));
         for (j, gear) in self.parts.gears.iter().enumerate() {
             if gear.is_elastic() {
-                // Both sides have their least possible inertia here.
+                // Uses the smallest possible inertia on both sides.
                 let mobility = 1.0 / OUTPUT + 1.0 / (link[j] - OUTPUT);
                 square = f64::max(square, gear.stiffness * mobility);
                 decay = f64::max(decay, gear.damping * mobility);
@@ -264,7 +267,7 @@ impl Arm {
         contacts.iter_mut().for_each(|contact| contact.follow(dynamics, q));
     }
 
-    /// Sets the payloads that the arm carries in addition to its own; replaces earlier ones.
+    /// Sets the payloads that the arm carries in addition to its own payload; replaces earlier ones.
     pub fn set_carried(&mut self, payloads: &[Payload]) {
         if self.carried == payloads {
             return;
@@ -273,7 +276,7 @@ impl Arm {
         let of = |payload: &Payload| {
             Dynamics::with_payload(&self.parts.model, self.parts.gravity, payload).inertias().numbers()
         };
-        // The inertias depend linearly on the bodies.
+        // The inertias are linear in the bodies, so they can be added.
         let (mut sum, none) = (self.bare.numbers(), of(&Payload::NONE));
         for payload in payloads {
             let with = of(payload);
@@ -287,8 +290,9 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m²: more than their own if a light rotor on steep friction or at an end
-    /// stop would have a time constant below `dt`. Runge-Kutta of fourth order is unstable from `dt` = 2.7 time constants on.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m². It is increased if a light rotor, with steep
+    /// friction or at an end stop, would have a time constant below `dt`. Fourth-order Runge-Kutta is unstable if `dt`
+    /// is 2.7 time constants or more.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -297,7 +301,7 @@ impl Arm {
         })
     }
 
-    /// Returns the steepness of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
+    /// Returns the damping of the end stop that a joint may touch within `dt` seconds, N·m·s/rad.
     fn stopping(&self, j: usize, dt: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         let reach = 2.0 * self.qd[j].abs() * dt;
@@ -305,7 +309,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction, which change so slowly that an update in every millisecond is not necessary.
+    /// Updates temperatures and friction. They change so slowly that they need no update in every millisecond.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;
@@ -316,8 +320,8 @@ impl Arm {
         self.refresh_friction();
     }
 
-    /// Integrates with the classical Runge-Kutta method of fourth order. The bristles of friction are too stiff for it:
-    /// [`FrictionTorques::bend`] moves them with the velocities of the stages.
+    /// Integrates with the classical fourth-order Runge-Kutta method. The bristles of the friction model are too stiff
+    /// for it: [`FrictionTorques::bend`] moves them with the velocities of the stages.
     fn runge_kutta(&mut self, tau: &JointVec, rotor: &JointVec, damped: f64, dt: f64) {
         let (q0, v0, z0) = (self.q, self.qd, self.bristles);
         let half = 0.5 * dt;
@@ -367,7 +371,7 @@ impl Arm {
         self.dynamics.forward(q, qd, &sum, rotor)
     }
 
-    /// Returns the torque of the end stops, which never pull.
+    /// Returns the torque of the end stop; an end stop never pulls.
     fn stop_torque(&self, j: usize, q: f64, qd: f64) -> f64 {
         let (low, high) = self.parts.stops[j];
         if q < low {
@@ -379,21 +383,21 @@ impl Arm {
         }
     }
 
-    /// Updates the friction curves for the present temperature.
+    /// Updates the friction curves for the current temperature.
     fn refresh_friction(&mut self) {
         let scale = core::array::from_fn(|j| self.friction_scale[j] * self.friction_fault[j]);
         self.friction.warm(&self.temperature, &scale);
     }
 
-    /// Applies a change of `friction_fault` immediately.
+    /// Applies a change of `friction_fault` at once.
     pub fn friction_changed(&mut self) {
         self.friction.forget_tables();
         self.refresh_friction();
     }
 }
 
-/// Returns the speed of a joint after its brake was closed for `dt` seconds, rad/s. An external torque (N·m) against the motion adds to the
-/// braking.
+/// Returns the speed of a joint after its brake has acted for `dt` seconds, rad/s. An external torque (N·m) against the
+/// motion adds to the braking.
 fn braked(speed: f64, torque: f64, inertia: f64, dt: f64) -> f64 {
     let help = if torque * speed < 0.0 { torque.abs() / inertia } else { 0.0 };
     let change = (BRAKE_DECELERATION + help) * dt;

@@ -13,25 +13,25 @@ use jtc_wire::{
 
 /// Number of the host's line; the simulation has only one line.
 const LINE: usize = 0;
-/// Largest number of bytes that wait for the parser, as in the ring that the board's DMA fills.
+/// Largest number of bytes waiting for the parser, equal to the size of the ring that the board's DMA fills.
 const RING: usize = 32 * 1024;
 /// Length of a tick, µs.
 const TICK_US: u32 = 1000;
-/// Largest number of bytes that the parser receives at once.
+/// Largest number of bytes passed to the parser at once.
 const CHUNK: usize = 4096;
 
-/// Ticks for storing an arm, equal to the time for erasing a sector of flash.
+/// Number of ticks for storing an arm, equal to the erase time of a flash sector.
 const STORE_MS: u32 = 2_000;
 
-/// Polls of the parser between two ticks, as by a processor with spare time.
+/// Number of polls of the parser between two ticks, which represents a processor with spare time.
 const POLLS: usize = 64;
 
-/// Host frame that the controller executed.
+/// A host frame that the controller executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worked {
-    /// Valid frame, with its type byte.
+    /// A valid frame, with its type byte.
     Frame(u8),
-    /// Valid Execute, Pause or Stop, with its command byte.
+    /// A valid Execute, Pause or Stop, with its command byte.
     Exec(u8),
     /// Bytes that are not a valid frame.
     Bad(FrameStatus),
@@ -49,7 +49,7 @@ impl From<&LinkEvent<'_>> for Worked {
     }
 }
 
-/// Inputs of a tick, except those of the host link.
+/// Inputs of a tick, except bytes from the host.
 #[derive(Clone, Copy, Debug)]
 pub struct Pins<'a> {
     /// Answers of the nodes.
@@ -62,16 +62,16 @@ pub struct Pins<'a> {
     pub status_free: bool,
 }
 
-/// Memory that keeps an arm during a reset (J-54).
+/// Memory that keeps an arm over a reset (J-54).
 #[derive(Clone, Debug, Default)]
 struct Memory {
     arm: Option<Vec<u8>>,
     sequence: u32,
-    /// Image that is being written, and the ticks until it is stored.
+    /// Image that is being written, and the number of ticks until it is stored.
     writing: Option<(Vec<u8>, u32)>,
 }
 
-/// Board of the controller.
+/// The controller's board.
 pub struct Board {
     controller: Controller<Vec<RawPoint>>,
     ring: VecDeque<u8>,
@@ -82,13 +82,13 @@ pub struct Board {
     memory: Memory,
     inter_byte_timeout_us: u32,
     watchdog_ms: u32,
-    /// Number of missed ticks.
+    /// Number of missed ticks since the last tick.
     missed: u32,
     /// Frames that the tick has executed.
     pub worked: Vec<Worked>,
     /// Number of bytes from the host that were lost because the ring was full.
     pub lost_bytes: u64,
-    /// Resets by the watchdog.
+    /// Number of resets by the watchdog.
     pub watchdog_resets: u32,
     /// Telemetry of the last tick.
     telemetry: Telemetry,
@@ -98,7 +98,7 @@ pub struct Board {
 /// Flight recorder with as much memory as on the board.
 pub type SimRecorder = Recorder<Vec<Block>, 3>;
 
-/// Blocks in each piece of the flight recorder's memory, 157 KiB in total.
+/// Number of blocks in each part of the flight recorder's memory, 157 KiB in total.
 pub const RECORDER_BLOCKS: [usize; 3] = [63, 31, 63];
 
 fn recorder_memory() -> [Vec<Block>; 3] {
@@ -106,7 +106,7 @@ fn recorder_memory() -> [Vec<Block>; 3] {
 }
 
 impl Board {
-    /// Creates a board that was just switched on. Its memory contains this arm.
+    /// Creates a board that was just switched on. Its non-volatile memory contains this arm.
     pub fn new(config: Config, arm: Option<Vec<u8>>, inter_byte_timeout_us: u32, watchdog_ms: u32) -> Self {
         let mut board = Self {
             controller: Controller::new(config.clone(), vec![RawPoint::default(); POINTS_MAX]),
@@ -129,7 +129,7 @@ impl Board {
         board
     }
 
-    /// Performs the actions of the board before the first tick.
+    /// Starts the controller: everything that the board does before the first tick.
     fn boot(&mut self) {
         let boot_cause = if self.watchdog_resets > 0 { BootCause::Watchdog } else { BootCause::PowerOn };
         self.controller.set_identity(Identity {
@@ -157,7 +157,7 @@ impl Board {
             core::mem::replace(&mut self.recorder, Recorder::new([const { Vec::new() }; 3], false));
         *self = Self::new(self.config.clone(), None, self.inter_byte_timeout_us, self.watchdog_ms);
         (self.watchdog_resets, self.memory) = (resets, memory);
-        // The recorder's memory keeps its contents; a reset by the watchdog is a failure.
+        // The recorder's memory keeps its contents. A reset by the watchdog is reported to it as a failure.
         self.recorder = Recorder::new(recorder.into_memory(), resets > 0);
         self.boot();
     }
@@ -167,7 +167,7 @@ impl Board {
         self.controller.config()
     }
 
-    /// Returns the arm in the non-volatile memory, and its number.
+    /// Returns the arm in the non-volatile memory, and its sequence number.
     pub fn stored_arm(&self) -> Option<(&[u8], u32)> {
         self.memory.arm.as_deref().map(|arm| (arm, self.memory.sequence))
     }
@@ -177,7 +177,7 @@ impl Board {
         self.controller.answer_frame()
     }
 
-    /// Writes the arm to the memory, which works while the controller continues.
+    /// Writes the arm to the non-volatile memory while the controller continues.
     fn store(&mut self, requested: bool) {
         let memory = &mut self.memory;
         if requested {
@@ -199,7 +199,7 @@ impl Board {
         &self.recorder
     }
 
-    /// Forgets the log of the flight recorder.
+    /// Clears the log of the flight recorder.
     pub fn clear_log(&mut self) {
         self.recorder.clear();
     }
@@ -219,17 +219,20 @@ impl Board {
         &self.telemetry
     }
 
-    /// Handles bytes that have arrived by `now_us`, between ticks: checks them for urgent commands and passes them to the parser.
+    /// Handles bytes that have arrived by `now_us`, between ticks: searches them for urgent commands and passes them to
+    /// the parser.
     pub fn receive(&mut self, now_us: u64, bytes: &[u8]) {
         self.watch.scan(LINE, now_us, bytes);
         self.ring.extend(bytes);
         if self.ring.len() > RING {
-            // The host has sent more bytes than the controller can execute for too long. The waiting bytes are lost, but no Stop.
+            // The host has sent more bytes than the controller can execute for too long. The waiting bytes are lost,
+            // but a Stop among them is not.
             self.lost_bytes += self.ring.len() as u64;
             self.ring.clear();
             self.receiver.restart(self.watch.received(LINE));
         }
-        // Bytes are taken also while a frame is executed, as an interrupt does. If these bytes waited, the parser would see a gap.
+        // The parser accepts bytes while a frame is executed, as in the board's interrupt. If the bytes waited, the
+        // parser would detect a gap.
         let refill = self.batch.is_empty();
         for _ in 0..POLLS {
             let waiting = self.ring.as_slices().0;
@@ -244,7 +247,7 @@ impl Board {
         }
     }
 
-    /// Passes the event of the parser to the controller; returns `false` if the controller cannot accept it.
+    /// Passes the parser's event to the controller. Returns `false` if the controller cannot accept it.
     fn hand_over(&mut self) -> bool {
         let moved = self.receiver.received(LINE).is_some_and(|received| self.batch.push(&received));
         if moved {
@@ -253,7 +256,7 @@ impl Board {
         moved
     }
 
-    /// Misses a tick. Returns true if the watchdog resets the board because of it.
+    /// Skips a tick. Returns `true` if the watchdog resets the board because of it.
     pub fn miss(&mut self) -> bool {
         self.worked.clear();
         self.missed += 1;
@@ -262,7 +265,7 @@ impl Board {
         }
         self.watchdog_resets += 1;
         self.reset();
-        // The board starts with the reason for its reset, as an internal error that latches (J-12, J-21).
+        // After the restart the board reports the reason for its reset as a latched internal error (J-12, J-21).
         self.controller.raise_internal();
         true
     }

@@ -1,4 +1,4 @@
-//! Joint bus: one broadcast and its answers in each millisecond, with frame times, arbitration, errors and bus-off.
+//! The joint bus: one broadcast and its answers per millisecond, with frame times, arbitration, errors and bus-off.
 
 mod nodes;
 
@@ -14,16 +14,16 @@ use crate::request::NodeRequest;
 
 /// Duration of a tick, µs.
 const TICK_US: u32 = 1000;
-/// Duration of an error frame and the pause before the repetition, µs.
+/// Duration of an error frame and the pause before the frame is repeated, µs.
 const ERROR_FRAME_US: u32 = 23;
-/// Transmit error counter above which a controller leaves the bus (ISO 11898-1).
+/// A controller whose transmit error counter exceeds this goes bus-off (ISO 11898-1).
 const BUS_OFF: u16 = 255;
 /// Recovery time of a controller from bus-off, 128 times 11 recessive bits, µs.
 const RECOVERY_US: u32 = 1408;
 
-/// Bit of an answer's id.
+/// Bit that is set in the identifier of an answer.
 const RESPONSE: u16 = 0x200;
-/// Largest number of waiting frames of other members.
+/// Largest number of waiting frames from nodes outside the simulation.
 const FOREIGN_MAX: usize = 64;
 
 /// Largest number of bytes of a frame on this bus.
@@ -35,8 +35,8 @@ pub const fn frame_us(len: usize) -> u32 {
         let mut times = [0; LEN_MAX + 1];
         let mut len = 0;
         while len <= LEN_MAX {
-            // 31 bits at the nominal rate. ESI, DLC and data at five times this rate: every tenth of these bits causes a stuff bit. Then
-            // stuff count and CRC.
+            // 31 bits are sent at the nominal rate. ESI, DLC and data are sent at five times this rate, with one stuff
+            // bit per ten bits. Stuff count and CRC follow.
             let crc = if len > 16 { 31 } else { 27 };
             let tenths = (5 + 8 * len as u32) * 11 + crc * 10;
             times[len] = 31 + (tenths + 25) / 50;
@@ -47,27 +47,27 @@ pub const fn frame_us(len: usize) -> u32 {
     TIMES[if len < LEN_MAX { len } else { LEN_MAX }]
 }
 
-/// Present faults of the bus.
+/// Current faults of the bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusFault {
-    /// Share of receptions that fail, drawn separately for each receiver, 0..1.
+    /// Share of receptions that fail, 0..1; drawn separately for each receiver.
     pub lost: f64,
-    /// Share of frames that are destroyed on the wire and repeated, 0..1.
+    /// Share of frames that are destroyed on the bus and repeated, 0..1.
     pub corrupted: f64,
     /// Share of answers that reach the controller with changed contents, 0..1.
     pub garbled: f64,
-    /// The controller's line is cut: it receives no frame, and none of its frames is received.
+    /// `true` if the controller's bus line is cut: it receives no frames, and its own frames reach no node.
     pub cut: bool,
-    /// `true` if the controller is kept off the bus.
+    /// `true` if the controller is forced to stay bus-off.
     pub bus_off: bool,
 }
 
 /// Counters of the bus since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BusStatistics {
-    /// Number of carried frames.
+    /// Number of transmitted frames.
     pub frames: u64,
-    /// Time in which the bus was busy, µs.
+    /// Time for which the bus was busy, µs.
     pub busy_us: u64,
     /// Number of receptions that failed.
     pub lost: u64,
@@ -81,12 +81,12 @@ pub struct BusStatistics {
     pub bus_offs: u64,
 }
 
-/// Frame with the time of its end.
+/// A frame and the time at which it ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedFrame {
-    /// Time of the end after the start of the tick, µs.
+    /// End of the frame after the start of the tick, µs.
     pub end_us: u32,
-    /// Frame.
+    /// The frame.
     pub frame: Frame,
 }
 
@@ -96,7 +96,7 @@ struct Pending {
     frame: Frame,
 }
 
-/// Bus, with the controller's transceiver.
+/// The bus, including the controller's transceiver.
 #[derive(Clone, Debug)]
 pub struct Bus {
     scales: [Scale; JOINTS],
@@ -106,20 +106,20 @@ pub struct Bus {
     off_us: Option<u32>,
     rng: fastrand::Rng,
     log: Vec<TimedFrame>,
-    /// Frames of members outside this simulation, oldest first.
+    /// Frames from nodes outside this simulation, oldest first.
     foreign: VecDeque<Frame>,
     /// Delay of answers to the controller.
     pub jitter: Jitter,
-    /// `true` if another device on the bus, such as an analyser, acknowledges frames, too.
+    /// `true` if another device on the bus, such as an analyser, also acknowledges frames.
     pub monitored: bool,
-    /// Present faults.
+    /// Current faults.
     pub fault: BusFault,
     /// Counters since the start.
     pub statistics: BusStatistics,
 }
 
 impl Bus {
-    /// Creates a bus whose drives have these scales.
+    /// Creates a bus for drives with these scales.
     pub fn new(scales: [Scale; JOINTS], seed: u64) -> Self {
         Self {
             scales,
@@ -141,8 +141,8 @@ impl Bus {
         &self.log
     }
 
-    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to `received`. The answers
-    /// wait there until the controller takes them, even if its tick is late.
+    /// Simulates a millisecond: sends `out` to the nodes and adds the answers that are complete by its end to
+    /// `received`. The answers stay in the list until the controller takes them, even if its tick is late.
     pub fn tick(
         &mut self,
         now_us: u64,
@@ -182,7 +182,7 @@ impl Bus {
         BusState { acknowledged, bus_off: self.off_us.is_some() }
     }
 
-    /// Counts down the time off the bus; returns true while it lasts.
+    /// Counts down the bus-off time; returns `true` while it lasts.
     fn recovering(&mut self) -> bool {
         if self.fault.bus_off {
             if self.off_us.is_none() {
@@ -204,7 +204,8 @@ impl Bus {
     /// Sends the controller's request; returns `true` if a node acknowledged it.
     fn send(&mut self, now_us: u64, frame: &Frame, nodes: &mut Nodes, time: &mut u32) -> bool {
         if self.fault.cut || !(self.monitored || nodes.any_on_bus()) {
-            // The request is repeated until the next tick replaces it. Such errors alone do not lead to bus-off.
+            // The request is repeated until the next tick replaces it. A missing acknowledgement alone does not lead to
+            // bus-off.
             self.statistics.unacknowledged += 1;
             self.statistics.busy_us += u64::from(TICK_US);
             self.pending.clear();
@@ -234,7 +235,7 @@ impl Bus {
         }
     }
 
-    /// Puts a frame on the wire, and repeats it after each error. Returns `false` if the time was too short for it.
+    /// Transmits a frame, and repeats it after each error. Returns `false` if the time was too short.
     fn carry(&mut self, frame: &Frame, time: &mut u32, from_controller: bool) -> bool {
         let length = frame_us(frame.data().len());
         while self.fault.corrupted > 0.0 && self.rng.f64() < self.fault.corrupted {
@@ -267,7 +268,8 @@ impl Bus {
         true
     }
 
-    /// Carries the answers in the order of arbitration: the lowest id among those that are ready when the bus is free.
+    /// Transmits the answers in the order of arbitration: when the bus is free, the lowest identifier among the ready
+    /// answers is next.
     fn answers(&mut self, time: &mut u32, received: &mut Vec<Frame>) {
         while !self.pending.is_empty() && *time < TICK_US {
             let ready = |p: &Pending| p.ready_us <= *time;
@@ -289,13 +291,14 @@ impl Bus {
                 received.push(self.garble(frame));
             }
         }
-        // Answers that were not sent compete again in the next tick.
+        // Answers that were not sent take part in arbitration in the next tick.
         for p in &mut self.pending {
             p.ready_us = 0;
         }
     }
 
-    /// Carries as many frames of other members as still fit: answers for the controller, all other frames for the nodes.
+    /// Transmits as many frames of outside nodes as fit into the tick. Answers go to the controller, all other frames
+    /// to the nodes.
     fn carry_foreign(&mut self, now_us: u64, nodes: &mut Nodes, time: &mut u32, received: &mut Vec<Frame>) {
         while let Some(frame) = self.foreign.front().copied() {
             if !self.carry(&frame, time, false) {
@@ -310,7 +313,7 @@ impl Bus {
         }
     }
 
-    /// Queues a frame of a member outside this simulation; returns `false` if too many frames wait already.
+    /// Queues a frame from a node outside this simulation. Returns `false` if too many frames are waiting already.
     pub fn put(&mut self, frame: Frame) -> bool {
         let room = self.foreign.len() < FOREIGN_MAX;
         if room {
@@ -319,7 +322,7 @@ impl Bus {
         room
     }
 
-    /// Returns the frame that a receiver with faulty memory would read.
+    /// Returns the frame as a receiver with faulty memory would read it.
     fn garble(&mut self, frame: Frame) -> Frame {
         if self.fault.garbled == 0.0 || self.rng.f64() >= self.fault.garbled {
             return frame;
@@ -338,7 +341,7 @@ impl Bus {
         Frame::new(id, &data).unwrap_or(frame)
     }
 
-    /// Drops all waiting frames after a reset of the controller.
+    /// Drops all waiting frames, because the controller was reset.
     pub fn clear(&mut self) {
         self.errors = 0;
         self.off_us = None;

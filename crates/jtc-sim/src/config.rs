@@ -6,22 +6,24 @@ use crate::arm::SimArm;
 use crate::drive::DriveConfig;
 use crate::faults::FaultPlan;
 
-/// Over-speed limit of a drive divided by the velocity limit of its joint. With the default arm this gives the limit of known drives.
+/// Over-speed limit of a drive divided by the velocity limit of its joint. For the default arm this gives the limit of
+/// real drives.
 const OVER_SPEED: f64 = 1.2;
 
-/// Distance of the start position from the limit, for a joint that cannot reach 0, rad.
+/// Distance of the start position from the nearest limit, rad, for a joint that cannot reach 0.
 const END_DISTANCE: f64 = 0.2;
 
 /// Deviation of the true arm from its model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelError {
-    /// Random error of each link's mass, and of the inertia with it: the factor is between 1 − `mass` and 1 + `mass`, drawn from the seed.
+    /// Random error of each link's mass and inertia: their factor is between 1 − `mass` and 1 + `mass`, drawn from the
+    /// seed.
     pub mass: f64,
     /// Random error of each joint's friction: the factor is between 1 − `friction` and 1 + `friction`, drawn from the seed.
     pub friction: f64,
-    /// Factors of the link masses, instead of random ones.
+    /// Factors of the link masses; they replace the random factors.
     pub mass_factors: Option<[f64; 7]>,
-    /// Factors of the joint frictions, instead of random ones.
+    /// Factors of the joint frictions; they replace the random factors.
     pub friction_factors: Option<JointVec>,
 }
 
@@ -53,22 +55,22 @@ impl ModelError {
     }
 }
 
-/// Support of the arm while drives are not enabled.
+/// Support of the arm while its drives are not enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Support {
     /// No support: a joint without torque falls.
     None,
-    /// A stand until every joint was enabled once, then no support.
+    /// The arm is on a stand until all joints have been enabled once; afterwards it has no support.
     Stand,
-    /// Holding brakes, which are open only while their drive is enabled. The known drives have none. With brakes the simulated arm keeps a
-    /// usable pose after an error.
+    /// Holding brakes, which are open only while their drive is enabled. Real drives have no brakes. With brakes the
+    /// simulated arm keeps a usable pose after an error.
     Brakes,
 }
 
 /// Configuration of a simulation.
 #[derive(Clone, Debug)]
 pub struct SimConfig {
-    /// Arm before model errors.
+    /// The arm before model errors are applied.
     pub arm: SimArm,
     /// Settings of the controller.
     pub controller: Config,
@@ -76,7 +78,7 @@ pub struct SimConfig {
     pub stored_arm: Option<Vec<u8>>,
     /// Deviation of the true arm from `arm`.
     pub model_error: ModelError,
-    /// Pose at the start, rad; by default 0, or for a joint that cannot reach 0 a pose near its limit.
+    /// Pose at the start, rad. By default each joint is at 0, or near its limit if it cannot reach 0.
     pub start: JointVec,
     /// Support of the arm while drives are not enabled.
     pub support: Support,
@@ -88,12 +90,12 @@ pub struct SimConfig {
     pub absent_drives: u8,
     /// `true` if another device on the joint bus, such as an analyser, acknowledges frames even if no node does.
     pub bus_monitored: bool,
-    /// Largest delay of answers to the controller after their end on the bus, ticks. Each millisecond has a delay drawn from the seed.
-    /// Answers stay in order. 0: answers arrive in the next tick.
+    /// Largest delay between the end of an answer on the bus and its arrival at the controller, ticks. For each
+    /// millisecond a delay is drawn from the seed. Answers stay in order. With 0, answers arrive in the next tick.
     pub answer_jitter_ms: u8,
-    /// Rate of the serial line, bit/s; `None`: no transmission time.
+    /// Rate of the serial line, bit/s; with `None` transmission takes no time.
     pub baud: Option<u32>,
-    /// Inter-byte timeout: silence on the line that ends a frame, µs (J-03).
+    /// Inter-byte timeout, µs: a frame ends after this silence on the line (J-03).
     pub inter_byte_timeout_us: u32,
     /// Number of missed ticks after which the controller's watchdog resets it (J-12).
     pub watchdog_ms: u32,
@@ -103,7 +105,7 @@ pub struct SimConfig {
     pub seed: u64,
     /// Faults with their times.
     pub faults: FaultPlan,
-    /// Capacity of the event log. Only the last entries are kept; earlier ones are counted.
+    /// Capacity of the event log. Only the newest entries are kept; the older ones are counted.
     pub log_entries: usize,
 }
 
@@ -114,7 +116,7 @@ impl Default for SimConfig {
 }
 
 impl SimConfig {
-    /// Creates the configuration of a controller with these settings, whose arm has these parameters.
+    /// Creates the configuration for a controller with these settings and an arm with these parameters.
     pub fn new(controller: Config, parameters: &Parameters) -> Self {
         let drives = core::array::from_fn(|j| DriveConfig {
             velocity_full_scale: controller.velocity_full_scale,
@@ -144,7 +146,8 @@ impl SimConfig {
     }
 }
 
-/// Returns the angle nearest to 0 that keeps a distance from the limits of a joint, rad. Many arms cannot reach 0 with each joint.
+/// Returns the angle nearest to 0 that is not too close to the limits of a joint, rad. Many arms have joints that
+/// cannot reach 0.
 fn near_zero(joint: &JointConfig) -> f64 {
     let (low, high) = (joint.position_min, joint.position_max);
     let distance = END_DISTANCE.min(0.5 * (high - low));

@@ -1,4 +1,5 @@
-//! A joint's drive with the properties of real ones: slow first enable, coarse encoder, delayed speed, and torques without a timeout.
+//! A joint's drive with the properties of real drives: slow first enable, coarse encoder, delayed speed, and no timeout
+//! of the torque.
 use jtc_bus::{NodeState, config as config_bit, error as error_bit};
 
 use crate::inbox::Inbox;
@@ -12,7 +13,7 @@ pub use config::{DriveConfig, DriveFault, EncoderPlace};
 use encoders::Encoders;
 use states::States;
 
-/// Drive of a joint.
+/// The drive of a joint.
 #[derive(Clone, Debug)]
 pub struct Drive {
     node: u8,
@@ -21,7 +22,7 @@ pub struct Drive {
     ceiling: f64,
     states: States,
     encoders: Encoders,
-    /// Ticks until the drive has booted.
+    /// Number of ticks until the drive has booted.
     booting: u32,
     /// `true` if a configuration was accepted since the last reset.
     configured: bool,
@@ -31,7 +32,7 @@ pub struct Drive {
     errors: u8,
     mc_current: u8,
     mc_occurred: u8,
-    /// Position and speed as read in the last tick, rad, rad/s.
+    /// Position (rad) and speed (rad/s) as read in the last tick.
     position: f64,
     velocity: f64,
     temperature: f64,
@@ -44,7 +45,7 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Creates the drive of node `node`, just switched on.
+    /// Creates the drive of node `node`, which has just been switched on.
     pub fn new(node: u8, config: DriveConfig, ceiling: f64) -> Self {
         let mut drive = Self {
             node,
@@ -72,13 +73,13 @@ impl Drive {
         drive
     }
 
-    /// Restarts the processor: configuration and motor alignment are lost.
+    /// Restarts the processor, so that configuration and motor alignment are lost.
     pub fn reset(&mut self) {
         self.states = States::new();
         self.booting = self.config.boot_ms;
         self.configured = false;
         self.mode = 1;
-        // The over-speed trip is on by default.
+        // The over-speed trip is enabled by default.
         self.bits = config_bit::OVER_SPEED_TRIP;
         self.goal = 0.0;
         self.errors = 0;
@@ -88,7 +89,7 @@ impl Drive {
         self.inbox = Inbox::new(self.config.one_message_per_interrupt);
     }
 
-    /// Enters the fault state without an error bit, like a request of 254.
+    /// Enters the fault state without an error bit, as after a request of 254.
     pub fn force_fault(&mut self) {
         if self.state() != NodeState::START {
             self.states.enter(NodeState::FAULT, &self.config);
@@ -118,8 +119,8 @@ impl Drive {
         self.bits & config_bit::WORKING_AREA != 0 && self.position.abs() > self.config.working_area
     }
 
-    /// Simulates a millisecond of the drive: reads sensors, checks, accepts a request, acts. `motor` and `link` are the true positions of
-    /// both sides of the gear, at the joint, rad.
+    /// Simulates a millisecond of the drive: reads the sensors, makes the checks, accepts a request and acts. `motor`
+    /// and `link` are the true positions of the two sides of the gear, at the joint, rad.
     pub fn tick(&mut self, motor: f64, link: f64, temperature: f64) {
         self.read_encoders(motor, link);
         if self.booting > 0 {
@@ -167,7 +168,7 @@ impl Drive {
             self.errors |= error_bit::HARDWARE;
         }
         if self.errors != 0 && !self.states.reacting() {
-            // The remaining reaction follows in the next ticks.
+            // The rest of the fault reaction follows in the next ticks.
             self.states.enter(NodeState::FAULT_REACTION, &self.config);
         }
     }

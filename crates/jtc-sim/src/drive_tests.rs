@@ -1,4 +1,4 @@
-//! Properties of the drives, with one test for each.
+//! Tests of the drives, one for each property.
 use jtc_bus::{Answer, JointReport, Request, warning};
 
 use super::*;
@@ -215,7 +215,7 @@ fn a_request_of_zero_cancels_a_pending_one() {
     change(&mut drive, NodeState::START);
     run(&mut drive, 5, 0.5);
     assert_eq!(drive.state(), NodeState::INIT);
-    // A completed transition also erases a pending one.
+    // A completed transition also clears a pending request.
     change(&mut drive, NodeState::READY);
     run(&mut drive, 1, 0.5);
     change(&mut drive, NodeState::ENABLED);

@@ -1,4 +1,4 @@
-//! Events of the simulation, for reports and for live output.
+//! Events of the simulation, used in reports and in live output.
 use core::fmt;
 use std::collections::VecDeque;
 
@@ -13,32 +13,32 @@ use crate::faults::FaultKind;
 pub enum Event {
     /// The controller changed its state.
     ControllerState {
-        /// Before.
+        /// Previous state.
         from: ControllerState,
-        /// Now.
+        /// New state.
         to: ControllerState,
     },
     /// The trajectory execution state changed.
     Execution {
-        /// Before.
+        /// Previous state.
         from: TrajectoryState,
-        /// Now.
+        /// New state.
         to: TrajectoryState,
     },
     /// The controller's error word changed.
     Errors {
-        /// Before.
+        /// Previous error word.
         from: u16,
-        /// Now.
+        /// New error word.
         to: u16,
     },
     /// A node changed its state.
     Node {
-        /// 0..5 joints, 6 gripper.
+        /// Node: 0..5 are joints, 6 is the gripper.
         node: u8,
-        /// State before.
+        /// Previous state.
         from: NodeState,
-        /// State now.
+        /// New state.
         to: NodeState,
     },
     /// A host frame was processed.
@@ -53,7 +53,7 @@ pub enum Event {
     },
     /// A fault begins.
     FaultBegins(FaultKind),
-    /// A fault is over.
+    /// A fault ends.
     FaultEnds(FaultKind),
     /// The watchdog reset the controller.
     WatchdogReset,
@@ -78,12 +78,12 @@ impl fmt::Display for Event {
     }
 }
 
-/// Event with its time.
+/// An event with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LogEntry {
     /// Time since the start, µs.
     pub time_us: u64,
-    /// Event.
+    /// The event.
     pub event: Event,
 }
 
@@ -102,7 +102,7 @@ pub struct Log {
 }
 
 impl Log {
-    /// Creates a log that keeps the last `most` entries and counts the earlier ones.
+    /// Creates a log that keeps the last `most` entries and counts the removed ones.
     pub fn new(most: usize) -> Self {
         Self { entries: VecDeque::new(), most, dropped: 0 }
     }
@@ -120,7 +120,7 @@ impl Log {
         self.entries.iter()
     }
 
-    /// Returns the number of entries that were removed for later ones.
+    /// Returns the number of entries that were removed to make space.
     pub fn dropped(&self) -> u64 {
         self.dropped
     }

@@ -23,7 +23,7 @@ const STATES: [(&str, ControllerState); 6] = [
     ("error", ControllerState::Error),
 ];
 
-/// Key that every format has.
+/// Key that exists in every format.
 #[derive(Deserialize)]
 struct Head {
     format: Option<f64>,
@@ -68,14 +68,14 @@ struct Entry {
     for_s: Option<f64>,
 }
 
-/// Description of fault files, for people (Markdown).
+/// Description of fault files for users (Markdown).
 pub const FAULT_FILE_HELP: &str = include_str!("fault_file.md");
 
-/// Format of the accepted files; joints count from 1 since format 2.
+/// Format of the accepted files. Since format 2, joints are counted from 1.
 const FORMAT: f64 = 2.0;
 /// Longest time in a file, s.
 const YEAR_S: f64 = 3.2e7;
-/// Largest distance of a place in the base frame, m, and of the centre of a load from the flange, m.
+/// Largest coordinate of a position in the base frame, m; and of the centre of mass of a load in the flange frame, m.
 const PLACE_MAX: f64 = 10.0;
 const COM_MAX: f64 = 2.0;
 /// Largest mass of a load, kg.
@@ -87,18 +87,18 @@ const JOINT_STIFFNESS: (f64, f64) = (1.0, 1e5);
 const JOINT_DAMPING_MAX: f64 = 1e3;
 
 impl FaultPlan {
-    /// Reads a fault file without hands; [`FAULT_FILE_HELP`] describes the format.
+    /// Reads a fault file without trajectories of hands. [`FAULT_FILE_HELP`] describes the format.
     pub fn from_toml(text: &str) -> Result<Self, FaultFileError> {
         Self::from_toml_with(text, |file| Err(format!("{file}: files cannot be read here")))
     }
 
-    /// Reads a fault file. `load` reads the trajectory files of hands and returns the reason if it cannot.
+    /// Reads a fault file. `load` reads the trajectory files of hands, and returns the reason if it cannot.
     pub fn from_toml_with(
         text: &str,
         mut load: impl FnMut(&str) -> Result<HandPath, String>,
     ) -> Result<Self, FaultFileError> {
         let syntax = |e: toml::de::Error| FaultFileError::Syntax(e.to_string());
-        // Checked first, because another format may have other keys.
+        // Checked first, because other formats may have other keys.
         let Head { format } = toml::from_str(text).map_err(syntax)?;
         if format != Some(FORMAT) {
             return Err(FaultFileError::Format { found: format });
@@ -129,7 +129,7 @@ impl Reader<'_> {
         let trigger = self.trigger()?;
         let duration_ms = match self.entry.for_s.take() {
             Some(s) => Some(ms(self.in_range("for_s", s, 0.0, YEAR_S)?)),
-            // A push without an end is a mistake.
+            // A push must have an end.
             None if matches!(kind, FaultKind::Push { .. }) => return Err(self.missing("for_s")),
             None => None,
         };
@@ -303,7 +303,7 @@ impl Reader<'_> {
     }
 
     fn in_range(&self, key: &'static str, value: f64, low: f64, high: f64) -> Result<f64, FaultFileError> {
-        // This also refuses NaN.
+        // This condition is also false for NaN.
         if value >= low && value <= high {
             Ok(value)
         } else {
@@ -311,7 +311,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Reports unused keys as mistakes of the author.
+    /// Reports keys that were not used, because they are mistakes in the file.
     fn nothing_left(&self) -> Result<(), FaultFileError> {
         let e = &self.entry;
         let keys = [

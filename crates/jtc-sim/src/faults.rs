@@ -1,4 +1,4 @@
-//! Faults of the simulation, and their times.
+//! Faults of the simulation and their triggers.
 use core::fmt;
 
 use jtc_bus::Joint;
@@ -7,7 +7,7 @@ use jtc_core::ControllerState;
 use crate::arm::{Side, Wall};
 use crate::hand::HandPath;
 
-/// Declares the kinds of faults: meaning, name, the name in fault files and tables, and the fields.
+/// Declares the kinds of faults. For each kind: meaning, variant name, name in fault files and tables, and fields.
 macro_rules! fault_kinds {
     ($($(#[$doc:meta])* $kind:ident $name:literal $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)+ })?;)+) => {
         /// Kind of fault.
@@ -17,7 +17,7 @@ macro_rules! fault_kinds {
         }
 
         impl FaultKind {
-            /// Names of all kinds.
+            /// Names of all kinds, as used in fault files.
             pub const NAMES: [&str; [$($name),+].len()] = [$($name),+];
 
             /// Returns the name in fault files and tables.
@@ -33,12 +33,12 @@ macro_rules! fault_kinds {
 fault_kinds! {
     /// A node is off the bus; the motor of a joint continues with its last torque.
     NodeSilent "node-silent" {
-        /// 0..5 joints, 6 gripper.
+        /// Node: 0..5 are joints, 6 is the gripper.
         node: u8,
     };
-    /// A node's processor restarts, once.
+    /// A node's processor restarts once.
     NodeReboot "node-reboot" {
-        /// 0..5 joints, 6 gripper.
+        /// Node: 0..5 are joints, 6 is the gripper.
         node: u8,
     };
     /// The motor control reports faults.
@@ -53,12 +53,12 @@ fault_kinds! {
         /// Joint.
         joint: Joint,
     };
-    /// A drive enters its fault state without an error bit, once.
+    /// A drive enters its fault state once, without an error bit.
     FaultState "fault-state" {
         /// Joint.
         joint: Joint,
     };
-    /// A drive answers requests for another state, and stays in its present state.
+    /// A drive answers requests for another state, but stays in its current state.
     IgnoresState "ignores-state" {
         /// Joint.
         joint: Joint,
@@ -70,12 +70,12 @@ fault_kinds! {
         /// Offset of the position, rad.
         rad: f64,
     };
-    /// A drive reports that its position is not accurate.
+    /// A drive reports its position as inaccurate.
     NotAccurate "not-accurate" {
         /// Joint.
         joint: Joint,
     };
-    /// The friction of a joint is multiplied.
+    /// The friction of a joint is multiplied by a factor.
     Friction "friction" {
         /// Joint.
         joint: Joint,
@@ -86,38 +86,38 @@ fault_kinds! {
     Temperature "temperature" {
         /// Joint.
         joint: Joint,
-        /// °C.
+        /// Temperature, °C.
         celsius: f64,
     };
     /// Receptions fail.
     FramesLost "frames-lost" {
-        /// 0..1.
+        /// Probability per reception, 0..1.
         probability: f64,
     };
-    /// Frames are destroyed on the wire and repeated.
+    /// Frames are destroyed on the bus and repeated.
     FramesCorrupted "frames-corrupted" {
-        /// 0..1.
+        /// Probability per frame, 0..1.
         probability: f64,
     };
     /// Answers reach the controller with changed contents.
     FramesGarbled "frames-garbled" {
-        /// 0..1.
+        /// Probability per answer, 0..1.
         probability: f64,
     };
-    /// The controller is kept off the bus.
+    /// The controller is forced to stay bus-off.
     BusOff "bus-off";
     /// The controller's bus line is cut.
     NoAcknowledge "no-acknowledge";
     /// The controller's safety input is low.
     SafetyInput "safety-input";
-    /// The safety line of a drive reads danger.
+    /// The safety line of a drive has the level for danger.
     SafetyLine "safety-line" {
-        /// 0..5 joints, 6 gripper.
+        /// Node: 0..5 are joints, 6 is the gripper.
         node: u8,
     };
     /// Bytes from the host are lost.
     SerialLost "serial-lost" {
-        /// 0..1.
+        /// Probability per byte, 0..1.
         probability: f64,
     };
     /// Bits of bytes from the host are flipped.
@@ -133,18 +133,18 @@ fault_kinds! {
     Push "push" {
         /// Joint.
         joint: Joint,
-        /// N·m.
+        /// Torque, N·m.
         torque: f64,
     };
     /// The flange touches a wall; see [`Wall::Plane`].
     Wall "wall" {
         /// Point of the surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall in the base frame, of any length but 0.
+        /// Direction out of the wall in the base frame; its length must not be 0.
         normal: [f64; 3],
-        /// N/m.
+        /// Stiffness, N/m.
         stiffness: f64,
-        /// N·s/m.
+        /// Damping, N·s/m.
         damping: f64,
     };
     /// A joint touches a wall; see [`Wall::Joint`].
@@ -155,14 +155,14 @@ fault_kinds! {
         rad: f64,
         /// Side of the angle that the wall fills.
         side: Side,
-        /// N·m/rad.
+        /// Stiffness, N·m/rad.
         stiffness: f64,
-        /// N·m·s/rad.
+        /// Damping, N·m·s/rad.
         damping: f64,
     };
     /// The arm has picked up a point mass.
     Payload "payload" {
-        /// kg.
+        /// Mass, kg.
         mass: f64,
         /// Centre of mass in the flange frame, m.
         com: [f64; 3],
@@ -238,25 +238,25 @@ impl FaultKind {
     }
 }
 
-/// Trigger of a fault.
+/// Condition that starts a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Trigger {
     /// At this time after the start, ms.
     At(u64),
-    /// This time after the controller has first entered a state, ms.
+    /// This time after the controller first enters a state, ms.
     InState(ControllerState, u64),
-    /// When the trajectory's point index first reaches this value in Operate.
+    /// As soon as the trajectory's point index reaches this value in Operate.
     AtPoint(u32),
 }
 
-/// Fault with its time.
+/// A fault and the time at which it occurs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fault {
-    /// Kind.
+    /// Kind of the fault.
     pub kind: FaultKind,
-    /// Trigger.
+    /// Condition that starts the fault.
     pub trigger: Trigger,
-    /// Duration, ms, at least 1, because no fault ends between two milliseconds; `None`: without end.
+    /// Duration, ms; at least 1, because faults begin and end only with a millisecond. `None`: the fault never ends.
     pub duration_ms: Option<u64>,
 }
 
@@ -265,7 +265,7 @@ pub struct Fault {
 pub struct FaultPlan {
     /// Faults in any order.
     pub faults: Vec<Fault>,
-    /// Paths of the hands of [`FaultKind::Hand`].
+    /// Paths that the hands of [`FaultKind::Hand`] follow.
     pub hands: Vec<HandPath>,
 }
 
@@ -273,14 +273,14 @@ pub struct FaultPlan {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Waiting,
-    /// The state was entered: the fault begins at this time, ms.
+    /// The state was entered, and the fault begins at this time, ms.
     Armed(u64),
-    /// The fault is present, and ends at this time, ms.
+    /// The fault is active and ends at this time, ms.
     Active(u64),
     Over,
 }
 
-/// Change by a fault.
+/// Begin or end of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Change {
     Begin(FaultKind),
@@ -291,7 +291,7 @@ pub(crate) enum Change {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Running {
     faults: Vec<(Fault, Phase)>,
-    /// Number of faults that have not ended.
+    /// Number of faults that have not ended yet.
     open: usize,
 }
 
@@ -303,13 +303,13 @@ impl Running {
 
     /// Adds a fault.
     pub fn add(&mut self, fault: Fault) {
-        // A soak run adds faults without end, so ended faults are removed.
+        // A soak run adds faults continuously, so ended faults are removed.
         self.faults.retain(|(_, phase)| *phase != Phase::Over);
         self.faults.push((fault, Phase::Waiting));
         self.open += 1;
     }
 
-    /// Returns the kinds of the present faults.
+    /// Returns the kinds of the active faults.
     pub fn active(&self) -> impl Iterator<Item = FaultKind> + '_ {
         self.faults.iter().filter(|(_, phase)| matches!(phase, Phase::Active(_))).map(|(fault, _)| fault.kind)
     }

@@ -1,17 +1,17 @@
 //! Friction of the simulated joints: its dependence on speed and temperature, and its behaviour around standstill.
 //!
-//! At speed both models follow the same measured curve (polynomial or table). The models differ around zero:
-//! [`FrictionModel::LuGre`] sticks, breaks away and slips as real gears do; [`FrictionModel::Smooth`] lets friction change its
-//! sign over a small speed and can neither stick nor hunt.
+//! At speed both models follow the same measured curve (polynomial or table). They differ around zero:
+//! [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`] friction
+//! changes its sign over a small range of speed, so the model can neither stick nor hunt.
 //!
-//! Beyond its range of speeds a curve continues in a straight line that does not fall. An extrapolated cubic would drive the joint (c3 <
-//! 0), or become too steep for any step.
+//! Above its range of speeds a curve continues as a straight line that does not fall. An extrapolated cubic would drive
+//! the joint (c3 < 0), or become too steep for the integration steps.
 use jtc_core::TableOf;
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Largest natural frequency of a rotor on its bristles, rad/s, that a step of 1 ms still integrates well.
+/// Largest natural frequency of a rotor on its bristles, rad/s, that steps of 1 ms still integrate accurately.
 const STIFFEST: f64 = 800.0;
-/// Smallest friction level in divisions by a level, N·m.
+/// Lower bound of the friction level when it is a divisor, N·m.
 const LEAST_LEVEL: f64 = 1e-9;
 
 /// True friction of a joint as a function of speed, without the effects around standstill.
@@ -44,19 +44,22 @@ impl Default for FrictionModel {
     }
 }
 
-/// The LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995): surfaces touch at bristles of mean deflection z (rad), with
+/// The LuGre model (Canudas de Wit, Olsson, Åström, Lischinsky 1995). The surfaces touch through bristles of mean
+/// deflection z (rad), with
 ///
 /// - dz/dt = v − σ0·|v|/g(v)·z,
 /// - friction torque = σ0·z + σ1(v)·dz/dt + viscous part,
 /// - g(v) = Coulomb level·(1 + (`stiction_ratio` − 1)/(1 + (v/`stribeck_speed`)²)).
 ///
-/// Coulomb level (c0) and viscous part (c1..c3) are those of the joint's curve. The Stribeck curve has the rational form of Hess and Soom
-/// (1990). σ1 decreases with speed in the same way, which keeps the model dissipative (Olsson 1996, section 3).
+/// The Coulomb level (c0) and the viscous part (c1..c3) come from the joint's curve. The Stribeck curve has the
+/// rational form of Hess and Soom (1990). σ1 decreases with speed in the same way, which keeps the model dissipative
+/// (Olsson 1996, section 3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LuGre {
-    /// Break-away torque divided by Coulomb torque. The paper's example has 1.5; values for harmonic drives are between 1.1 and 1.6.
+    /// Break-away torque divided by Coulomb torque. The example in the paper uses 1.5; harmonic drives have values
+    /// between 1.1 and 1.6.
     pub stiction_ratio: f64,
-    /// Speed at which half of the excess of stiction remains, rad/s.
+    /// Speed at which half of the excess of stiction over Coulomb friction remains, rad/s.
     pub stribeck_speed: f64,
     /// Deflection at which the bristles carry the Coulomb torque, rad: σ0 = Coulomb torque/deflection. The default is about one step of the
     /// joint's encoder. Stiffer bristles are softened until the natural frequency of a rotor on them is below 800 rad/s.
@@ -71,12 +74,13 @@ impl Default for LuGre {
     }
 }
 
-/// Friction of all joints at their present temperatures. Each array has one entry per joint, so that the compiler can process six at once.
+/// Friction of all joints at their current temperatures. Each array has one entry per joint, so that the compiler can
+/// process six at once.
 #[derive(Clone, Debug)]
 pub(crate) struct FrictionTorques {
     model: FrictionModel,
     curves: [SimFriction; JOINTS],
-    /// Polynomial coefficients, a row for each power; zero for joints with a table.
+    /// Polynomial coefficients, one row per power; zero for joints with a table.
     k: [JointVec; 4],
     /// Speed at which the straight line begins, rad/s; the next field is its slope, N·m·s/rad. Both are zero for joints with a table.
     reach: JointVec,
@@ -93,8 +97,8 @@ pub(crate) struct FrictionTorques {
 }
 
 impl FrictionTorques {
-    /// Creates the friction of all joints. `rotor`: inertia of the rotors at the joints, kg·m². `reach`: speed up to which polynomials are
-    /// valid, rad/s.
+    /// Creates the friction of all joints. `rotor` is the inertia of the rotors at the joints, kg·m². `reach` is the
+    /// speed up to which polynomials are valid, rad/s.
     pub fn new(
         model: FrictionModel,
         curves: [SimFriction; JOINTS],
@@ -130,7 +134,7 @@ impl FrictionTorques {
         new
     }
 
-    /// Updates the curves for these bearing temperatures (°C), times `scale`.
+    /// Updates the curves to these bearing temperatures (°C), multiplied by `scale`.
     pub fn warm(&mut self, temperature: &JointVec, scale: &JointVec) {
         for j in 0..JOINTS {
             let t = temperature[j];
@@ -144,7 +148,7 @@ impl FrictionTorques {
                     self.slope[j] = self.polynomial_slope(j, self.reach[j]).max(0.0);
                 }
                 SimFriction::Table(table) => {
-                    // Also true for NaN, the value at the start.
+                    // This is also false for NaN, the value at the start, so the tables are then updated.
                     if (t - self.table_temperature[j]).abs() < 0.02 {
                         continue;
                     }
@@ -160,12 +164,13 @@ impl FrictionTorques {
         }
     }
 
-    /// Makes the next [`warm`](Self::warm) update the tables as well, because a scale has changed.
+    /// Makes the next [`warm`](Self::warm) also update the tables, because a scale has changed.
     pub fn forget_tables(&mut self) {
         self.table_temperature = [f64::NAN; JOINTS];
     }
 
-    /// Returns the torque against the motion at velocities `v` (rad/s) and bristle deflections `z` (rad), N·m.
+    /// Returns the friction torque, which acts against the motion, for velocities `v` (rad/s) and bristle deflections
+    /// `z` (rad), N·m.
     #[inline]
     pub fn at(&self, v: &JointVec, z: &JointVec) -> JointVec {
         let [k0, k1, k2, k3] = &self.k;
@@ -183,7 +188,7 @@ impl FrictionTorques {
                 core::array::from_fn(|j| {
                     let (v, load) = (v[j], self.stiffness[j] * z[j]);
                     let (b, level) = lugre.stribeck(v * inverse, k0[j]);
-                    // σ1(v)·dz/dt over one denominator, because divisions dominate the cost of this function.
+                    // σ1(v)·dz/dt, computed with one denominator, because divisions take most of this function's time.
                     let bending = (v * level - v.abs() * load * b) / (b * level);
                     load + self.damping[j] * bending + viscous(j)
                 })
@@ -199,8 +204,8 @@ impl FrictionTorques {
         out
     }
 
-    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. The effects around standstill are excluded,
-    /// because their slope has its own bound.
+    /// Returns the slope of the curve at velocities `v` (rad/s), N·m·s/rad, at least 0. The effects around standstill
+    /// are excluded, because their slope has a separate bound.
     pub fn steepness(&self, v: &JointVec) -> JointVec {
         core::array::from_fn(|j| match &self.tables[j] {
             Some(table) => table.slope(v[j]).max(0.0),
@@ -214,11 +219,11 @@ impl FrictionTorques {
         k1[j] + speed * (2.0 * k2[j] + 3.0 * k3[j] * speed)
     }
 
-    /// Returns the bristle deflections `dt` seconds after `z` at velocities `v`.
+    /// Returns the bristle deflections `dt` seconds after they were `z`, at velocities `v`.
     ///
-    /// dz/dt = v − rate·z with a rate up to 10⁴/s at speed is far too stiff for Runge-Kutta at 1 ms. For a constant velocity the exact
-    /// solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). With 1/(1 + x + x²/2) for e it is of second order, needs no
-    /// exponential, and converges to the exact end g/σ0 for any x.
+    /// dz/dt = v − rate·z is far too stiff for Runge-Kutta at 1 ms, because the rate reaches 10⁴/s at speed. For a
+    /// constant velocity the exact solution is z·e + v·dt·(1 − e)/x with x = rate·dt, e = exp(−x). Replacing e by 1/(1
+    /// + x + x²/2) gives second order without an exponential, and converges to the exact end value g/σ0 for any x.
     #[inline]
     pub fn bend(&self, z: &JointVec, v: &JointVec, dt: f64) -> JointVec {
         let FrictionModel::LuGre(lugre) = self.model else { return *z };
@@ -226,7 +231,7 @@ impl FrictionTorques {
         core::array::from_fn(|j| {
             let v = v[j];
             let (b, level) = lugre.stribeck(v * inverse, self.k[0][j]);
-            // x = a/level, numerator and denominator times level².
+            // Computed with x = a/level; numerator and denominator are multiplied by level².
             let a = dt * self.stiffness[j] * v.abs() * b;
             let half = level + 0.5 * a;
             level * (z[j] * level + v * dt * half) / (level * level + a * half)
@@ -235,8 +240,8 @@ impl FrictionTorques {
 }
 
 impl LuGre {
-    /// Returns, for the velocity in Stribeck speeds `r` and a Coulomb torque (N·m): b = 1 + r², whose inverse falls from 1 at
-    /// standstill to 0 far above the Stribeck speed, and b·g(v), N·m.
+    /// For a velocity `r`, in multiples of the Stribeck speed, and a Coulomb torque (N·m), returns b = 1 + r² and
+    /// b·g(v) in N·m. The inverse of b falls from 1 at standstill to 0 far above the Stribeck speed.
     #[inline]
     fn stribeck(&self, r: f64, coulomb: f64) -> (f64, f64) {
         let b = 1.0 + r * r;
@@ -244,7 +249,7 @@ impl LuGre {
     }
 }
 
-/// Friction table at one temperature.
+/// A friction table at one temperature.
 #[derive(Clone, Debug)]
 struct Points {
     /// Velocities, rad/s.
@@ -254,7 +259,8 @@ struct Points {
 }
 
 impl Points {
-    /// Returns the velocities and torques of the table at one temperature (°C), which is limited to the range of the table.
+    /// Returns the velocities and torques of the table at one temperature (°C). A temperature outside the table is
+    /// limited to its range.
     fn cut(table: &TableOf<f32>, temperature: f64, scale: f64) -> Self {
         let axis = table.temperature.map(f64::from);
         let t = temperature.clamp(axis[0], axis[19]);
@@ -267,10 +273,10 @@ impl Points {
         Self { velocity: table.velocity.map(f64::from), torque }
     }
 
-    /// Interpolates linearly between the points, and continues the lines beyond the ends.
+    /// Interpolates linearly between the points, and extrapolates with the last segments.
     fn at(&self, v: f64) -> f64 {
         let i = self.segment(v);
-        // A line beyond an end begins at that end.
+        // A segment beyond an end of the table begins at that end.
         let from = i + usize::from(v > self.velocity[19]);
         self.torque[from] + (v - self.velocity[from]) * self.slope(v)
     }
@@ -287,13 +293,14 @@ impl Points {
         self.velocity[1..19].iter().filter(|&&start| v >= start).count()
     }
 
-    /// Returns the Coulomb torque, N·m. The line through the two slowest points of each direction gives a torque at standstill; the result
-    /// is the mean of both.
+    /// Returns the Coulomb torque, N·m. In each direction, the line through the two slowest points gives a torque at
+    /// standstill; the result is the mean of both.
     fn coulomb(&self) -> f64 {
         let (x, y) = (&self.velocity, &self.torque);
         let start = |near: usize, far: usize, sign: f64| {
             let slope = (y[far] - y[near]) / (x[far] - x[near]);
-            // At most the torque of the slowest point: if the curve falls at first, its Coulomb torque is at that point.
+            // Limited to the torque of the slowest point. If the curve falls at first, its Coulomb torque is at that
+            // point.
             (sign * (y[near] - slope * x[near])).clamp(0.0, (sign * y[near]).max(0.0))
         };
         let above = x.iter().position(|&v| v > 0.0).filter(|&i| i + 1 < x.len());

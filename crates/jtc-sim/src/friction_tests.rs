@@ -1,4 +1,4 @@
-//! The LuGre model sticks, breaks away, slips, and follows the measured curve at speed.
+//! Tests that the LuGre model sticks, breaks away, slips, and follows the measured curve at speed.
 use super::*;
 
 const RIGID: f64 = 0.7;
@@ -14,7 +14,7 @@ fn with(model: FrictionModel, curve: SimFriction) -> FrictionTorques {
     torques
 }
 
-/// Returns a polynomial with 6 N·m Coulomb torque that does not depend on the temperature.
+/// Returns a polynomial with a Coulomb torque of 6 N·m that does not depend on the temperature.
 fn polynomial() -> SimFriction {
     SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0])
 }
@@ -25,7 +25,8 @@ fn table() -> SimFriction {
     SimFriction::Table(TableOf { velocity, temperature: core::array::from_fn(|i| 4.0 * i as f32), torque })
 }
 
-/// Returns position, velocity and friction in every step of `dt`, for a rotor on its bristles under `torque(t, v)`.
+/// Simulates a rotor on its bristles under `torque(t, v)`. Returns position, velocity and friction in every step of
+/// `dt`.
 fn rotor(
     torques: &FrictionTorques,
     dt: f64,
@@ -62,8 +63,8 @@ fn at_speed_both_models_are_the_measured_curve() {
 fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
     for curve in [polynomial(), table()] {
         let torques = with(FrictionModel::LuGre(LuGre::default()), curve);
-        // The torque rises to 1.2 times 6 N·m within a second, and is zero afterwards. The deflection is about 1e-4 rad; its elastic part
-        // returns.
+        // The torque rises to 1.2 times 6 N·m within a second, and is zero afterwards. The deflection is about 1e-4
+        // rad, and its elastic part springs back.
         let held = rotor(&torques, 1e-3, 2.0, |t, _| if t < 1.0 { t * 1.2 * 6.0 } else { 0.0 });
         let (loaded, released) = (held[999][0], held[1999][0]);
         assert!((0.8e-4..4e-4).contains(&loaded), "{loaded} rad");
@@ -77,7 +78,7 @@ fn below_stiction_a_rotor_springs_back_and_above_it_breaks_away() {
 
 #[test]
 fn a_soft_drive_sticks_and_slips_and_smooth_friction_does_not() {
-    // The end of a spring of 20 N·m/rad moves at 5 mrad/s.
+    // The free end of a spring of 20 N·m/rad moves at 5 mrad/s.
     let pull = |model| {
         let torques = with(model, SimFriction::Polynomial([6.0, 2.0, 0.0, 0.0, 0.0, 20.0]));
         let (mut q, mut v, mut z) = (0.0, 0.0, [0.0; JOINTS]);
@@ -120,7 +121,7 @@ fn bristles_stay_within_stiction_at_any_step_and_speed() {
 
 #[test]
 fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
-    // Cubics that end with a driving torque and with a wall; a table whose last line falls.
+    // Cubics that end with a driving torque or with a steep slope; a table whose last segment falls.
     let motor = SimFriction::Polynomial([2.7, 12.6, -3.7, -0.65, 0.0, 20.0]);
     let wall = SimFriction::Polynomial([6.0, 40.0, -30.0, 12.0, 0.0, 20.0]);
     let SimFriction::Table(mut falling) = table() else { unreachable!("a table") };
@@ -138,7 +139,7 @@ fn beyond_the_speeds_that_a_curve_was_made_for_friction_does_not_fall() {
             let mut before = there;
             for v in [1.1 * end, 3.0, 10.0, 300.0] {
                 let torque = at(v);
-                // Tolerance for the remaining part of the Stribeck curve.
+                // The tolerance allows for the remaining part of the Stribeck curve.
                 assert!(torque > before - 0.01, "{torque} N·m at {v} rad/s after {before}");
                 assert!((at(-v) + torque).abs() < 1e-6, "both ways alike");
                 before = torque;

@@ -4,17 +4,17 @@ use jtc_bus::{Answer, GRIPPER, GripperReport, NodeState, Request, config};
 use crate::inbox::Inbox;
 use crate::request::NodeRequest;
 
-/// Ticks until the measured pump current follows the command.
+/// Number of ticks until the measured pump current follows the command.
 const PUMP_LAG: u32 = 100;
-/// Ticks of pumping until the first and second vacuum level are reached.
+/// Number of pumping ticks until the first and the second vacuum level are reached.
 const LEVELS: (u32, u32) = (300, 700);
-/// Transition to Init; its number differs from that of the drives.
+/// Transition to Init; its code differs from the code of the drives.
 const TO_INIT: NodeState = NodeState::new(14);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
-/// Ticks after power-up without an answer.
+/// Number of ticks after power-up in which the gripper does not answer.
 const BOOT: u32 = 250;
 
-/// Vacuum gripper.
+/// The vacuum gripper.
 #[derive(Clone, Debug)]
 pub struct Gripper {
     state: NodeState,
@@ -22,23 +22,23 @@ pub struct Gripper {
     booting: u32,
     command: bool,
     pin: bool,
-    /// Speed of the motor, 0..PUMP_LAG.
+    /// Speed of the pump motor, 0..PUMP_LAG.
     speed: u32,
-    /// Ticks with vacuum, up to those of the second level.
+    /// Number of ticks with vacuum, at most the number for the second level.
     vacuum: u32,
     reacts_to_safety: bool,
     line_before: bool,
     inbox: Inbox,
     /// `true` if the node is off the bus.
     pub silent: bool,
-    /// `true` if the safety line is at the level that means danger.
+    /// `true` if the safety line has the level for danger.
     pub safety_line: bool,
     /// `true` if a part covers the cup, so that the vacuum can build up.
     pub part_present: bool,
 }
 
 impl Gripper {
-    /// Creates a gripper that was just switched on.
+    /// Creates a gripper that has just been switched on.
     pub fn new(one_message_per_interrupt: bool) -> Self {
         Self {
             state: NodeState::START,
@@ -77,7 +77,7 @@ impl Gripper {
         self.booting == 0 && !self.silent
     }
 
-    /// Takes a request that arrives at `now_us`, and returns the answer, if the gripper answers.
+    /// Processes a request that arrives at `now_us`, and returns the answer if the gripper answers.
     pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         if !self.on_bus() {
             return None;
@@ -95,7 +95,7 @@ impl Gripper {
                 self.command = pump;
                 Some(Answer::Gripper(self.report()))
             }
-            // A `NodeRequest` has a separate variant for it.
+            // `NodeRequest` has a separate variant for it.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { gripper, .. } => {
                 let accepted = matches!(self.state, NodeState::INIT | NodeState::READY);
@@ -117,7 +117,7 @@ impl Gripper {
         }
     }
 
-    /// Executes a request in the interrupt: the answer already has the code of the transition.
+    /// Executes a request in the interrupt, so that the answer already contains the code of the transition.
     fn change(&mut self, request: NodeState) {
         self.state = match (request, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -150,7 +150,7 @@ impl Gripper {
             return;
         }
         self.age = self.age.saturating_add(1);
-        // Only the edge counts: if the gripper is enabled while the line is already unsafe, it stays enabled.
+        // Only the edge has an effect: if the gripper is enabled while the line is already unsafe, it stays enabled.
         let edge = self.safety_line && !self.line_before;
         self.line_before = self.safety_line;
         if edge && self.reacts_to_safety && self.state == NodeState::ENABLED {
@@ -221,7 +221,7 @@ mod tests {
         assert!(!pump(&mut gripper, true).pressure1);
         run(&mut gripper, 250);
         assert!(pump(&mut gripper, true).pressure1);
-        // From ENABLED directly to INIT: the pump runs until READY.
+        // Goes from ENABLED directly to INIT; the pump runs until READY.
         assert_eq!(request(&mut gripper, NodeState::INIT), TO_INIT);
         run(&mut gripper, 500);
         assert!(pump(&mut gripper, false).pressure2);

@@ -1,9 +1,9 @@
-//! A hand that leads the arm along a path in Teaching, with a compliant pull of limited force on every joint.
+//! A hand that leads the arm along a path in Teaching. It pulls compliantly, with limited force, on every joint.
 use jtc_dynamics::{JOINTS, JointVec};
 
-/// Torque per distance between a joint and the hand's target, N·m/rad.
+/// Torque per position difference between a joint and the hand's target, N·m/rad.
 const STIFFNESS: f64 = 1500.0;
-/// Torque per speed difference, N·m·s/rad.
+/// Torque per speed difference between them, N·m·s/rad.
 const DAMPING: f64 = 80.0;
 /// Largest torque of the hand on a joint, N·m.
 const STRONGEST: f64 = 60.0;
@@ -11,10 +11,10 @@ const STRONGEST: f64 = 60.0;
 const APPROACH: f64 = 0.2;
 /// Time for which the hand holds the last point, s.
 const HELD: f64 = 0.5;
-/// A millisecond, s.
+/// Duration of a tick, s.
 const TICK: f64 = 1e-3;
 
-/// Path of joint positions with a fixed time step.
+/// A path of joint positions with a fixed time step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HandPath {
     points: Vec<JointVec>,
@@ -22,7 +22,8 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// Creates a path. `points`: joint positions, rad, `step_s` seconds apart. `None`: no points, a non-finite number, or `step_s` ≤ 0.
+    /// Creates a path; `points` are joint positions, rad, `step_s` seconds apart. Returns `None` if there are no
+    /// points, a number is not finite, or `step_s` ≤ 0.
     pub fn new(points: Vec<JointVec>, step_s: f64) -> Option<Self> {
         let finite = points.iter().flatten().all(|q| q.is_finite());
         let good = !points.is_empty() && finite && step_s.is_finite() && step_s > 0.0;
@@ -43,14 +44,15 @@ impl HandPath {
     }
 }
 
-/// Hand that leads along a path.
+/// A hand that leads the arm along a path.
 #[derive(Clone, Debug)]
 pub(crate) struct Hand {
     path: HandPath,
     led: Option<Led>,
 }
 
-/// State since Teaching began: the pose of the arm at that time, the duration of the move to the first point, and the elapsed time, s.
+/// State since Teaching began: pose of the arm at that time, duration of the move to the first point, and elapsed time,
+/// s.
 #[derive(Clone, Copy, Debug)]
 struct Led {
     from: JointVec,
@@ -63,8 +65,8 @@ impl Hand {
         Self { path, led: None }
     }
 
-    /// Returns the torque of a millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching, and releases the arm (`None`) at the
-    /// end of the path or of Teaching.
+    /// Returns the hand's torque in this millisecond, N·m, for an arm at `q`, `qd`. The hand waits for Teaching. At the
+    /// end of the path or of Teaching it releases the arm (`None`).
     pub fn torque(&mut self, teaching: bool, q: &JointVec, qd: &JointVec) -> Option<JointVec> {
         if !teaching {
             return if self.led.is_some() { None } else { Some([0.0; JOINTS]) };
@@ -114,7 +116,7 @@ mod tests {
     fn a_hand_waits_for_teaching_pulls_with_bounded_force_and_lets_go() {
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]; 11], 0.01).unwrap());
         assert_eq!(hand.torque(false, &[0.0; 6], &[0.0; 6]), Some([0.0; 6]));
-        // The arm does not move: the pull grows only to its limit.
+        // If the arm does not move, the pull grows only up to its limit.
         let mut strongest = 0.0f64;
         let mut ms = 0;
         while let Some(torque) = hand.torque(true, &[0.0; 6], &[0.0; 6]) {
@@ -122,7 +124,7 @@ mod tests {
             ms += 1;
         }
         assert_eq!(strongest, STRONGEST);
-        // 3 rad at 0.2 rad/s, the path, and the wait at its end.
+        // The time for 3 rad at 0.2 rad/s, the path, and the wait at its end.
         assert!((15_590..15_610).contains(&ms), "{ms} ms");
         let mut hand = Hand::new(HandPath::new(vec![[3.0; 6]], 0.01).unwrap());
         hand.torque(true, &[0.0; 6], &[0.0; 6]);

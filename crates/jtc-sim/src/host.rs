@@ -1,6 +1,7 @@
-//! A small host for tests, soak runs and the fault matrix, which creates frames, receives statuses, and plans simple motions.
+//! A small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple
+//! motions.
 //!
-//! The client library is `jtc-host`. This host allows tests of the simulation without it.
+//! The real client library is `jtc-host`. This host makes tests of the simulation independent of it.
 use jtc_dynamics::{ArmModel, JOINTS, JointVec, Origin};
 use jtc_wire::{
     ACCELERATION_SCALE, ExecCommand, FrameType, HEADER, POSITION_SCALE, RawPoint, STATUS_LEN, Status,
@@ -13,7 +14,7 @@ use crate::world::World;
 pub fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(body.len() + 6);
     bytes.extend([HEADER, frame_type as u8]);
-    // No body of this protocol is longer than the limit of a frame.
+    // No body of this protocol is longer than a frame permits.
     bytes.extend(u16::try_from(body.len() + 6).unwrap_or(u16::MAX).to_be_bytes());
     bytes.extend(body);
     bytes.extend(crc16(&bytes).to_be_bytes());
@@ -28,7 +29,7 @@ pub fn use_defaults() -> Vec<u8> {
         .collect()
 }
 
-/// Returns the frame of an arm model, which the controller receives rounded to 32-bit floats.
+/// Returns the frame of an arm model. The controller receives its numbers rounded to 32-bit floats.
 pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     let origin = |o: &Origin| o.xyz.into_iter().chain(o.rpy);
     let joints = model.joints.iter().flat_map(origin);
@@ -37,12 +38,12 @@ pub fn arm_model(model: &ArmModel) -> Vec<u8> {
     frame(FrameType::ArmModel, &body)
 }
 
-/// Returns the frame of Execute, Pause or Stop.
+/// Returns the frame for Execute, Pause or Stop.
 pub fn exec(command: ExecCommand) -> Vec<u8> {
     frame(FrameType::TrajSetExecStatus, &[command as u8])
 }
 
-/// Returns the frames that clear all current and occurred errors, those of the controller and of every node.
+/// Returns the frames that clear all current and occurred errors of the controller and of every node.
 pub fn clear_all() -> Vec<u8> {
     frame(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0])
 }
@@ -63,8 +64,8 @@ pub fn trajectory(points: &[RawPoint], step_ms: u16, per_segment: usize) -> Vec<
     segments.iter().enumerate().map(make).collect()
 }
 
-/// Returns a motion from standstill to standstill with points every `step_ms`. The motion leads from `from` to `to` (rad) in `seconds` and
-/// back, `times` times, along the quintic with zero accelerations at its ends.
+/// Returns a motion from standstill to standstill, with a point every `step_ms`. The motion leads from `from` to `to`
+/// (rad) in `seconds` and back, `times` times, along a quintic with zero acceleration at both ends.
 pub fn there_and_back(
     from: &JointVec,
     to: &JointVec,
@@ -95,7 +96,7 @@ fn quintic(a: &JointVec, b: &JointVec, u: f64, seconds: f64) -> RawPoint {
     }
 }
 
-/// Collector of the statuses that the device sends.
+/// Collects the statuses that the device sends.
 #[derive(Clone, Debug, Default)]
 pub struct Listener {
     bytes: Vec<u8>,
@@ -108,7 +109,7 @@ pub struct Listener {
 }
 
 impl Listener {
-    /// Takes the bytes for the host from the simulation.
+    /// Reads the bytes that the simulation has sent to the host.
     pub fn listen(&mut self, world: &mut World) {
         let mut buffer = [0; 1024];
         loop {
@@ -121,7 +122,8 @@ impl Listener {
         }
         while self.bytes.len() >= STATUS_LEN {
             let Some(status) = Status::parse(&self.bytes[..STATUS_LEN]) else {
-                // After a reset of the controller a status may be incomplete: search for the next beginning.
+                // After a reset of the controller a status may be incomplete. Searches for the beginning of the next
+                // one.
                 self.bytes.remove(0);
                 continue;
             };

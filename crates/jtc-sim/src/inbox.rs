@@ -1,14 +1,14 @@
-//! Receive buffer of a node, emptied at once, or by one frame per interrupt as in older firmware.
+//! Receive buffer of a node. It is emptied at once or, in older firmware, by one frame per interrupt.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;
 
-/// Time between two requests below which they cause a single interrupt, µs.
+/// Two requests closer together than this cause a single interrupt, µs.
 const BACK_TO_BACK_US: u64 = 250;
-/// Depth of the receive buffer.
+/// Number of requests that the receive buffer can store.
 const DEPTH: usize = 3;
 
-/// Receive buffer of a node.
+/// The receive buffer of a node.
 #[derive(Clone, Debug)]
 pub struct Inbox {
     one_per_interrupt: bool,
@@ -17,12 +17,13 @@ pub struct Inbox {
 }
 
 impl Inbox {
-    /// Creates a buffer. With `one_per_interrupt`, the second of two consecutive requests stays in the buffer until another one arrives.
+    /// Creates a buffer. With `one_per_interrupt`, the second of two consecutive requests stays in the buffer until
+    /// another request arrives.
     pub fn new(one_per_interrupt: bool) -> Self {
         Self { one_per_interrupt, waiting: VecDeque::new(), last_us: None }
     }
 
-    /// Takes a request that arrives at `now_us`, and returns the request that the node reads then.
+    /// Stores a request that arrives at `now_us`, and returns the request that the node reads at that time.
     pub fn take(&mut self, now_us: u64, request: &NodeRequest) -> Option<NodeRequest> {
         if !self.one_per_interrupt {
             return Some(*request);

@@ -1,4 +1,4 @@
-//! Answers that reach the controller late, because it reads its receiver at irregular times.
+//! Delays answers to the controller, which models a controller that reads its receiver at irregular times.
 use std::collections::VecDeque;
 
 use jtc_bus::Frame;
@@ -10,25 +10,26 @@ pub struct Jitter {
     pub most_ms: u8,
     rng: fastrand::Rng,
     now: u64,
-    /// Delayed answers, the oldest first, with the tick in which they arrive.
+    /// Delayed answers, oldest first, each with the tick in which it arrives.
     waiting: VecDeque<(u64, Vec<Frame>)>,
 }
 
 impl Jitter {
-    /// Creates a jitter without delay, until [`most_ms`](Self::most_ms) is set.
+    /// Creates the state without delay; set [`most_ms`](Self::most_ms) for a delay.
     pub fn new(seed: u64) -> Self {
         let rng = fastrand::Rng::with_seed(seed ^ 0x6A69_7474);
         Self { most_ms: 0, rng, now: 0, waiting: VecDeque::new() }
     }
 
-    /// Processes a tick: the frames of `received` from `first` on arrived in this millisecond. The frames that are due replace them.
+    /// Processes a tick. The frames in `received` from index `first` on have arrived in this millisecond. Replaces them
+    /// by the frames that are due.
     pub fn delay(&mut self, received: &mut Vec<Frame>, first: usize) {
         self.now += 1;
         if self.most_ms == 0 && self.waiting.is_empty() {
             return;
         }
         let late = self.rng.u8(0..=self.most_ms);
-        // An answer does not overtake an older one.
+        // An answer must not overtake an older one.
         let last = self.waiting.back().map_or(0, |(due, _)| *due);
         self.waiting.push_back(((self.now + u64::from(late)).max(last), received.split_off(first)));
         while self.waiting.front().is_some_and(|(due, _)| *due <= self.now) {

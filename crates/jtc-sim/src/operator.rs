@@ -1,4 +1,4 @@
-//! Operator with the small host: brings the controller up, uploads, executes, and waits in virtual time.
+//! An operator who uses the small host: starts the controller, uploads, executes, and waits in virtual time.
 use core::fmt;
 
 use jtc_bus::{JOINTS, NodeState};
@@ -12,15 +12,15 @@ use crate::world::World;
 /// Error of an operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OperatorError {
-    /// A condition was not fulfilled in time.
+    /// A condition was not met in time.
     Late {
         /// Expected condition.
         waited_for: &'static str,
         /// Time waited, ms.
         ms: u64,
-        /// State at that time.
+        /// State of the controller when the wait ended.
         state: ControllerState,
-        /// Error word at that time.
+        /// Error word when the wait ended.
         errors: u16,
     },
     /// A frame was refused.
@@ -43,16 +43,16 @@ impl fmt::Display for OperatorError {
 
 impl std::error::Error for OperatorError {}
 
-/// Operator with a simulation.
+/// An operator and a simulation.
 pub struct Operator {
-    /// Simulation.
+    /// The simulation.
     pub world: World,
-    /// Data from the device.
+    /// Collector of the data from the device.
     pub listener: Listener,
 }
 
 impl Operator {
-    /// Creates an operator for a simulation that was just switched on.
+    /// Creates an operator for a simulation that has just been switched on.
     pub fn new(config: SimConfig) -> Self {
         Self { world: World::new(config), listener: Listener::default() }
     }
@@ -73,7 +73,8 @@ impl Operator {
         (0..ms).for_each(|_| self.step());
     }
 
-    /// Simulates until `done` returns true, at most `ms`; `waited_for` names the condition in the error.
+    /// Simulates until `done` returns `true`, at most `ms` milliseconds. The error contains `waited_for` as the
+    /// condition.
     pub fn wait(
         &mut self,
         waited_for: &'static str,
@@ -93,7 +94,7 @@ impl Operator {
         Err(OperatorError::Late { waited_for, ms, state: telemetry.state, errors: telemetry.errors })
     }
 
-    /// Sends a frame and waits for its response, which must be without an error.
+    /// Sends a frame and waits for its response, which must report no error.
     pub fn ask(&mut self, frame: &[u8]) -> Result<(), OperatorError> {
         let response = self.response(frame)?;
         let good = response.status == FrameStatus::NoError && response.data == DataStatus::NoError;
@@ -104,7 +105,7 @@ impl Operator {
     pub fn response(&mut self, frame: &[u8]) -> Result<Response, OperatorError> {
         self.listener.responses.clear();
         self.world.host_write(frame);
-        // Long frames need time on the line.
+        // A long frame takes time on the line.
         for _ in 0..8_000 {
             self.step();
             if !self.listener.responses.is_empty() {
@@ -120,13 +121,13 @@ impl Operator {
         })
     }
 
-    /// Sends the default parameters and waits until every joint is enabled and held.
+    /// Sends the default parameters and waits until every joint is enabled and holds its position.
     pub fn bring_up(&mut self) -> Result<(), OperatorError> {
         self.world.host_write(&host::use_defaults());
         self.wait_for_hold(12_000)
     }
 
-    /// Waits until every joint is enabled and held.
+    /// Waits until every joint is enabled and holds its position.
     pub fn wait_for_hold(&mut self, ms: u64) -> Result<(), OperatorError> {
         self.wait("HoldPos with all joints enabled", ms, |world| {
             world.telemetry().state == ControllerState::HoldPos
@@ -134,7 +135,7 @@ impl Operator {
         })
     }
 
-    /// Sends a trajectory; every segment must be accepted.
+    /// Sends a trajectory. The controller must accept every segment.
     pub fn upload(&mut self, points: &[RawPoint], step_ms: u16) -> Result<(), OperatorError> {
         for segment in host::trajectory(points, step_ms, 113) {
             self.ask(&segment)?;
@@ -150,13 +151,13 @@ impl Operator {
         })
     }
 
-    /// Clears all errors, and waits until the arm is held again.
+    /// Clears all errors and waits until the controller holds the arm again.
     pub fn recover(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::clear_all())?;
         self.wait_for_hold(15_000)
     }
 
-    /// Switches Teaching on.
+    /// Starts Teaching.
     pub fn teach(&mut self) -> Result<(), OperatorError> {
         self.ask(&host::frame(FrameType::TeachingModeEnable, &[]))?;
         self.wait("Teaching", 600, |world| world.telemetry().state == ControllerState::Teaching)

@@ -1,5 +1,5 @@
-//! Devices on the joint bus: drives, gripper, and the arm that they move. The plant is independent of the controller, which may be the
-//! simulated one of [`World`](crate::World) or any other one that sends frames.
+//! Devices on the joint bus: drives, gripper, and the arm that they move. The plant does not depend on a particular
+//! controller: it works with the simulated one of [`World`](crate::World) or any other controller that sends frames.
 use jtc_bus::{Frame, JOINTS, NODES, NodeState, Scale};
 use jtc_core::BusState;
 use jtc_dynamics::{ArmModel, JointVec, Payload};
@@ -15,7 +15,7 @@ use crate::request::NodeRequest;
 /// Duration of a drive's tick and of a step of the arm, s.
 const TICK: f64 = 1e-3;
 
-/// Answer of a node, with the time from the end of the request until it is ready, µs.
+/// Answer of a node: time from the end of the request until the answer is ready, µs, and the frame.
 pub type ReadyAnswer = (u32, Frame);
 
 /// True state of the arm.
@@ -25,7 +25,7 @@ pub struct Truth {
     pub q: JointVec,
     /// Velocity, rad/s.
     pub qd: JointVec,
-    /// Position of the motors as seen through the gears, rad: `q` if gears are rigid.
+    /// Position of the motors at the joints, through the gears, rad; equal to `q` if gears are rigid.
     pub motor: JointVec,
     /// Torque of the drives, N·m.
     pub torque: JointVec,
@@ -54,20 +54,20 @@ pub struct Plant {
     pub(crate) nodes: Nodes,
     pub(crate) arm: Arm,
     truth: Truth,
-    /// Torque of pushes and a hand on the joints, N·m.
+    /// Torque of pushes on the joints, N·m; the next field is the torque of a hand.
     push: JointVec,
     pub(crate) hand: JointVec,
     model: ArmModel,
     scales: [Scale; JOINTS],
     support: Support,
     stand: bool,
-    /// Brakes that a fault keeps closed.
+    /// `true` for joints whose brake a fault keeps closed.
     stuck: [bool; JOINTS],
     safety_wired: bool,
 }
 
 impl Plant {
-    /// Creates a plant that was just switched on.
+    /// Creates a plant that has just been switched on.
     pub fn new(config: &SimConfig) -> Self {
         let (parts, friction) = config.model_error.apply(&config.arm, config.seed);
         let ceiling = parts.torque_ceiling;
@@ -95,8 +95,8 @@ impl Plant {
         plant
     }
 
-    /// Passes a frame that has ended on the bus at `now_us` to the nodes, and adds their answers to `answers`. Ignores answers of nodes and
-    /// frames that are not requests.
+    /// Passes a frame that ended on the bus at `now_us` to the nodes, and adds their answers to `answers`. Ignores
+    /// frames that are not requests, including answers of nodes.
     pub fn receive(&mut self, now_us: u64, frame: &Frame, answers: &mut Vec<ReadyAnswer>) {
         let Some(request) = NodeRequest::parse(frame) else { return };
         for node in 0..NODES {
@@ -104,8 +104,8 @@ impl Plant {
         }
     }
 
-    /// Simulates a millisecond of a bus with the plant's nodes and one controller: sends `out` to the nodes, adds the answers
-    /// that are complete by its end to `received`.
+    /// Simulates a millisecond of a bus with the plant's nodes and one controller: sends `out` to the nodes, and adds
+    /// the answers that are complete by its end to `received`.
     pub fn exchange(
         &mut self,
         bus: &mut Bus,
@@ -116,20 +116,21 @@ impl Plant {
         bus.tick(now_us, out, &mut self.nodes, received)
     }
 
-    /// Returns true if any node is on the bus and acknowledges frames.
+    /// Returns `true` if any node is on the bus and acknowledges frames.
     pub fn acknowledges(&self) -> bool {
         self.nodes.any_on_bus()
     }
 
-    /// Simulates a millisecond: drives and gripper execute their tick, and the arm moves. `safety_output`: true if the controller's safety
-    /// output has the level for no error.
+    /// Simulates a millisecond: drives and gripper execute their tick, and the arm moves. `safety_output` is `true` if
+    /// the controller's safety output has the level for no error.
     pub fn step(&mut self, safety_output: bool) {
         self.step_nodes(safety_output);
         self.step_arm();
     }
 
-    /// Simulates a millisecond of the arm alone, for a controller without a joint bus. These torques (N·m) act on its joints, limited to
-    /// those of the drives. Brakes are open; drives and gripper do nothing. NaN counts as no torque.
+    /// Simulates a millisecond of the arm without drives, for a controller without a joint bus. These torques (N·m),
+    /// limited to the torques of the drives, act on its joints. Brakes are open; drives and gripper do nothing. NaN is
+    /// treated as no torque.
     pub fn step_free(&mut self, torque: &JointVec) {
         let ceiling = self.arm.parts().torque_ceiling;
         self.truth.torque = core::array::from_fn(|j| {
@@ -189,7 +190,7 @@ impl Plant {
         self.truth.temperature = self.arm.temperature;
     }
 
-    /// Applies the immediate effect of a fault of a node at its begin; ignores other faults.
+    /// Applies the immediate effect of a node's fault when it begins; ignores other faults.
     pub fn begin(&mut self, kind: FaultKind) {
         match kind {
             FaultKind::NodeReboot { node } => match self.nodes.drives.get_mut(usize::from(node)) {
@@ -205,7 +206,7 @@ impl Plant {
         }
     }
 
-    /// Sets the present faults to those of `kinds` that are faults of nodes or of the arm.
+    /// Sets the current faults of the nodes and of the arm to those in `kinds`; ignores other faults.
     pub fn set_faults(&mut self, kinds: impl Iterator<Item = FaultKind>) {
         let mut drives = [DriveFault::default(); JOINTS];
         let (mut gripper_silent, mut gripper_line) = (false, false);
@@ -259,17 +260,17 @@ impl Plant {
         &self.truth
     }
 
-    /// Returns the arm after model errors.
+    /// Returns the arm model after model errors were applied.
     pub fn true_model(&self) -> &ArmModel {
         &self.model
     }
 
-    /// Returns the state bytes of joints and gripper (255: no gripper).
+    /// Returns the state bytes of joints and gripper (255 if there is no gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.nodes.states()
     }
 
-    /// Places a part under the gripper, or removes it. A part is present from the start.
+    /// Places a part under the gripper, or removes it. At the start a part is present.
     pub fn set_part_present(&mut self, present: bool) {
         if let Some(gripper) = &mut self.nodes.gripper {
             gripper.part_present = present;

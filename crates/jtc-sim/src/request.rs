@@ -1,20 +1,20 @@
-//! Requests as nodes receive them: with any state byte, although the controller sends only four of them.
+//! Requests as nodes receive them. They may contain any state byte, although the controller sends only four of them.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
-/// Request that has reached a node.
+/// A request that has reached a node.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NodeRequest {
-    /// ChangeFsm, with the state byte of each node as on the wire.
+    /// ChangeFsm, with the state byte of each node as transmitted.
     ChangeFsm([NodeState; NODES]),
-    /// Another request.
+    /// Any other request.
     Other(Request),
 }
 
 impl NodeRequest {
-    /// Returns the request in a frame; `None` for answers and for frames without a meaning for nodes.
+    /// Returns the request in a frame; `None` for answers and for frames without a meaning to nodes.
     pub fn parse(frame: &Frame) -> Option<Self> {
         if frame.id == id::CHANGE_FSM {
-            // Bytes beyond a short frame read as 0, which requests no change.
+            // Bytes missing in a short frame are read as 0, which requests no change.
             let state = |n| NodeState::new(frame.data().get(n).copied().unwrap_or(0));
             return Some(Self::ChangeFsm(core::array::from_fn(state)));
         }

@@ -1,4 +1,5 @@
-//! Connects the simulated joint bus to another bus: its members see every frame, and their frames take part in the simulation.
+//! Connects the simulated joint bus to another bus. The nodes on the other bus receive every frame, and their frames
+//! take part in the simulation.
 use core::time::Duration;
 
 use can_link::{CanBus, CanError, CanFrame, Id};
@@ -6,7 +7,7 @@ use jtc_bus::Frame;
 
 use crate::world::World;
 
-/// Largest number of frames that are taken from the other bus in one millisecond.
+/// Largest number of frames that are taken from the other bus per millisecond.
 const MOST: usize = 32;
 
 /// Tap on the joint bus of a simulation.
@@ -16,7 +17,7 @@ pub struct BusTap<B> {
     pub sent: u64,
     /// Number of frames taken from the other bus.
     pub taken: u64,
-    /// Number of frames of the other bus that are not valid on this bus, or that it could not take.
+    /// Number of frames from the other bus that are not valid on the joint bus, or for which its queue was full.
     pub refused: u64,
 }
 
@@ -26,14 +27,14 @@ impl<B: CanBus> BusTap<B> {
         Self { bus, sent: 0, taken: 0, refused: 0 }
     }
 
-    /// Sends the frames of the simulated bus, and takes frames of other members, which are carried in the next millisecond. Must be called
-    /// after each `World::step`.
+    /// Sends the frames of the simulated bus, and takes frames of nodes on the other bus, which are transmitted in the
+    /// next millisecond. Must be called after each `World::step`.
     pub fn exchange(&mut self, world: &mut World) -> Result<(), CanError> {
         for timed in world.bus_frames() {
             let frame = &timed.frame;
             let converted =
                 Id::standard(u32::from(frame.id)).and_then(|id| CanFrame::fd_padded(id, frame.data()));
-            // Every frame of the joint bus has an id and a length that can be converted.
+            // Every frame of the joint bus has an identifier and a length that can be converted.
             let Ok(converted) = converted else { continue };
             self.bus.send(&converted)?;
             self.sent += 1;

@@ -3,7 +3,7 @@ use core::fmt;
 
 use jtc_bus::{JOINTS, Joint};
 
-/// Description of the events, for display.
+/// Description of the events, for display to the user.
 pub const TYPED_EVENTS_HELP: &str =
     "push JOINT TORQUE_NM SECONDS (as in `push 3 12 0.5`), hand FILE (as in `hand lead.csv`)";
 
@@ -12,10 +12,10 @@ pub const PUSH_MAX: f64 = 400.0;
 /// Longest push, s.
 const PUSH_MAX_S: f64 = 60.0;
 
-/// Typed event.
+/// An event that the user typed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TypedEvent {
-    /// Push on a joint.
+    /// A push on a joint.
     Push {
         /// Joint.
         joint: Joint,
@@ -24,9 +24,9 @@ pub enum TypedEvent {
         /// Duration, s.
         seconds: f64,
     },
-    /// Hand that leads the arm along the joint positions of a trajectory file, while the arm is taught.
+    /// A hand that leads the arm along the joint positions of a trajectory file while the arm is taught.
     Hand {
-        /// Name as typed.
+        /// File name as typed.
         file: String,
     },
 }
@@ -47,18 +47,18 @@ impl fmt::Display for TypedEvent {
 pub enum TypedEventError {
     /// Unknown event.
     Unknown(String),
-    /// Wrong number of words of a push, which has three after its name.
+    /// A push with the wrong number of words; it must have three after its name.
     PushWords(usize),
-    /// Invalid word of a push, as typed, and its allowed range.
+    /// An invalid word of a push, and the permitted range.
     Value {
-        /// Name.
+        /// Name of the value.
         what: &'static str,
         /// Word as typed.
         word: String,
-        /// Smallest and largest allowed value.
+        /// Smallest and largest permitted value.
         allowed: (f64, f64),
     },
-    /// Hand without a file.
+    /// A hand without a file.
     NoFile,
 }
 

@@ -23,7 +23,7 @@ pub use moment::Moment;
 /// Duration of a tick, µs.
 const TICK_US: u64 = 1000;
 
-/// Simulation of a controller with its arm.
+/// A simulated controller with its arm.
 pub struct World {
     config: SimConfig,
     ticks: u64,
@@ -31,10 +31,10 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Clock of the board for silence on its line, µs; the next field is the time of the last byte.
+    /// Clock with which the board measures silence on its line, µs; the next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
-    /// Longest silence on the line, µs; `None`: as in virtual time.
+    /// Longest silence on the line that the board measures, µs; with `None` it is the silence in virtual time.
     silence_us: Option<u64>,
     to_host: Line,
     host_inbox: Vec<u8>,
@@ -56,11 +56,11 @@ pub struct World {
     good_frames: u64,
     bad_frames: u64,
     log: Log,
-    /// Inputs and outputs of the board, if they are recorded.
+    /// Inputs and outputs of the board, if recording is enabled.
     exchange: Option<Box<Exchange>>,
 }
 
-/// State of the controller in the last log entries.
+/// State of the controller in its last log entries.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Seen {
     state: ControllerState,
@@ -69,7 +69,7 @@ struct Seen {
 }
 
 impl World {
-    /// Creates a simulation that was just switched on.
+    /// Creates a simulation that has just been switched on.
     pub fn new(config: SimConfig) -> Self {
         let plant = Plant::new(&config);
         let scales = config.drives.map(|d| Scale { velocity: d.velocity_full_scale });
@@ -164,7 +164,7 @@ impl World {
     /// Applies the hand's pull of this millisecond.
     fn lead_by_hand(&mut self) {
         let Some(hand) = &mut self.hand else { return };
-        // Closed brakes do not yield to a hand, so it waits until every drive is enabled.
+        // Closed brakes do not yield to a hand, so the hand waits until every drive is enabled.
         let free = self.plant.node_states()[..JOINTS] == [NodeState::ENABLED; JOINTS];
         let teaching = free && self.board.telemetry().state == ControllerState::Teaching;
         let truth = self.plant.truth();
@@ -175,7 +175,7 @@ impl World {
         }
     }
 
-    /// Applies the present faults, and no others.
+    /// Applies exactly the active faults.
     fn apply_faults(&mut self) {
         let mut bus = BusFault::default();
         let mut line = LineFault::default();
@@ -193,7 +193,7 @@ impl World {
                 FaultKind::SerialFlipped { probability } => line.flipped = probability,
                 FaultKind::SerialDelayed => line.held = true,
                 FaultKind::TickOverrun => self.overrun = true,
-                // The other faults are applied by the plant.
+                // The plant applies the other faults.
                 _ => {}
             }
         }
@@ -213,7 +213,7 @@ impl World {
             }
         }
         if let Some(most) = self.silence_us.filter(|_| self.to_device.is_idle()) {
-            // The time never decreases.
+            // The board's clock never runs backwards.
             let before = self.line_us.saturating_sub(TICK_US).max(self.heard_us);
             self.line_us = self.line_us.min(self.heard_us.saturating_add(most)).max(before);
         }
@@ -221,7 +221,7 @@ impl World {
             self.heard_us = self.line_us;
         }
         if let Some(exchange) = &mut self.exchange {
-            // The pin keeps its level without a tick.
+            // Without a tick the pin keeps its level.
             let safety_output = self.safety_output;
             **exchange = Exchange { host: fresh.clone(), safety_output, ..Exchange::default() };
         }
@@ -277,7 +277,7 @@ impl World {
         }
     }
 
-    /// Applies the effects of a board reset to its surroundings.
+    /// Applies the effects of a board reset on the rest of the simulation.
     fn restart(&mut self) {
         self.safety_output = false;
         self.bus.clear();
@@ -286,7 +286,7 @@ impl World {
         self.to_host.clear();
     }
 
-    /// Logs changes.
+    /// Adds changes to the log.
     fn note(&mut self) {
         let time = self.now_us();
         let telemetry = self.board.telemetry();

@@ -12,7 +12,7 @@ fn held(faults: FaultPlan) -> Operator {
     operator
 }
 
-/// Returns a path out and back by 0.4 rad in every joint, in 4 s.
+/// Returns a path that moves every joint out by 0.4 rad and back, in 4 s.
 fn path() -> HandPath {
     let at = |i: u32| {
         let s = (core::f64::consts::PI * f64::from(i) / 400.0).sin().powi(2);
@@ -33,7 +33,7 @@ fn farthest(operator: &mut Operator, j: usize, ms: u64) -> f64 {
 fn a_push_moves_the_joint_that_was_meant_and_the_arm_comes_back() {
     let mut operator = held(FaultPlan::default());
     operator.run(500);
-    // Less than a push to which the joint would yield.
+    // Less than the push at which the joint would yield.
     operator.world.push(Joint::ALL[2], 30.0, 200);
     let far = farthest(&mut operator, 2, 300);
     assert!((1e-3..0.05).contains(&far), "{far} rad");
@@ -60,7 +60,7 @@ fn a_push_of_a_fault_file_concerns_the_joint_counted_from_1() {
 fn j25_a_hand_leads_the_taught_arm_along_its_path_and_lets_go() {
     let mut operator = held(FaultPlan::default());
     operator.world.lead(path());
-    // The hand waits until the arm is taught.
+    // The hand waits until Teaching begins.
     assert!(farthest(&mut operator, 0, 1000) < 1e-3);
     operator.teach().unwrap();
     let (mut led, mut fastest) = ([0.0f64; 6], 0.0f64);

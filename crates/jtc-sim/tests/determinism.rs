@@ -1,10 +1,10 @@
-//! Equal seeds give equal bytes on both links.
+//! The same seed gives the same bytes on both links.
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use jtc_sim::{Fault, FaultKind, FaultPlan, Operator, SimConfig, Trigger, host};
 use jtc_wire::ExecCommand;
 
-/// Returns the hash of every frame on the joint bus with its time, and of every byte to the host.
+/// Returns a hash of all frames on the joint bus with their times, and of all bytes to the host.
 fn hash(seed: u64) -> u64 {
     let fault = |kind, at, ms| Fault { kind, trigger: Trigger::At(at), duration_ms: Some(ms) };
     let faults = FaultPlan {

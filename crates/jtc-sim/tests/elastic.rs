@@ -21,7 +21,7 @@ fn undamped(stiffness: f64) -> Gear {
     Gear { stiffness, damping: 0.0 }
 }
 
-/// Returns the kinetic energy of links and motors plus the energy of springs and of the heights of the links, J.
+/// Returns the kinetic energy of links and motors plus the potential energy of springs and links, J.
 fn energy(arm: &Arm) -> f64 {
     let parts = arm.parts();
     let dynamics = Dynamics::new(&parts.model, parts.gravity);
@@ -39,7 +39,7 @@ fn energy(arm: &Arm) -> f64 {
             sum += 0.5 * rotor * arm.qd[j].powi(2);
         }
     }
-    // The frames of the joints are those of the links.
+    // The frames of the joints are also the frames of the links.
     let poses = dynamics.forward_kinematics(&arm.q);
     for (link, pose) in parts.model.links[1..].iter().zip(&poses) {
         let com: f64 = (0..3).map(|i| pose.rotation[2][i] * link.origin.xyz[i]).sum();
@@ -65,7 +65,7 @@ fn an_arm_on_undamped_gears_keeps_its_energy() {
     }
 }
 
-/// The energy changes by the work of the drives minus the dissipation of the damping.
+/// The change of energy equals the work of the drives minus the dissipation in the damping.
 #[test]
 fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     let gear = Gear { stiffness: 8_000.0, damping: 15.0 };
@@ -93,7 +93,7 @@ fn the_energy_changes_by_the_work_of_drives_pushes_and_damping() {
     assert!(most > 5.0 && (change - work).abs() < 2e-3 * most, "{change} J, {work} J put in");
 }
 
-/// Each joint in turn with an elastic gear, its motor held: it swings at √(K/J) of its link.
+/// Each joint in turn has an elastic gear and a blocked motor. Its link oscillates at √(K/J).
 #[test]
 fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     for joint in 0..JOINTS {
@@ -105,7 +105,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
         arm.q[joint] += 1e-4;
         let inertia = Dynamics::new(&arm.parts().model, [0.0; 3]).mass_matrix(&POSE)[joint][joint] + OUTPUT;
         let expected = (stiffness / inertia).sqrt();
-        // Ten whole swings, between crossings of the middle.
+        // Measures ten whole periods between crossings of the middle.
         let (mut t, mut first, mut crossings) = (0.0, None, 0);
         let dt = 1e-4;
         while crossings <= 10 {
@@ -131,7 +131,7 @@ fn a_link_swings_on_its_gear_at_its_natural_frequency() {
     }
 }
 
-/// With a held motor, the link hangs by torque over stiffness.
+/// With a blocked motor, a loaded link sags by the torque divided by the stiffness.
 #[test]
 fn a_loaded_link_rests_at_torque_over_stiffness() {
     let gear = Gear { stiffness: 20_000.0, damping: 200.0 };
@@ -148,7 +148,7 @@ fn a_loaded_link_rests_at_torque_over_stiffness() {
     }
 }
 
-/// With increasing stiffness the arm approaches an arm with rigid gears, with friction too.
+/// With increasing stiffness, also with friction, the arm approaches an arm with rigid gears.
 #[test]
 fn stiff_gears_move_the_arm_as_rigid_ones_do() {
     for model in [FrictionModel::default(), FrictionModel::Smooth { width: 0.01 }] {

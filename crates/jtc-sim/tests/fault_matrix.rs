@@ -1,16 +1,16 @@
-//! The table of reactions in docs/safety.md shows the behaviour of the controller. `UPDATE_DOCS=1` updates it.
+//! The tables of reactions in docs/safety.md agree with the behaviour of the controller. `UPDATE_DOCS=1` updates them.
 use sim_checks::matrix::{contact_table, fault_matrix, standstill_table, stopping_table};
 
 #[test]
 fn j12_j14_j16_j21_j22_each_fault_in_each_state_has_the_documented_reaction() {
-    // All in one test, because they write the same file.
+    // One test for all tables, because they are written to the same file.
     documented("fault matrix", &fault_matrix().unwrap_or_else(|error| panic!("{error}")));
     documented("standstill", &standstill_table().unwrap_or_else(|error| panic!("{error}")));
     documented("stopping", &stopping_table().unwrap_or_else(|error| panic!("{error}")));
     documented("contact", &contact_table().unwrap_or_else(|error| panic!("{error}")));
 }
 
-/// Checks that the table between the marks of that name in docs/safety.md is `table`, or updates it.
+/// Checks that the table between the marks with this name in docs/safety.md equals `table`, or updates it.
 fn documented(name: &'static str, table: &str) {
     println!("{table}");
     test_kit::page::part("safety.md", name, table);

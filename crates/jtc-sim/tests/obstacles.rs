@@ -1,5 +1,5 @@
-//! The controller with an arm that meets walls, picks up loads, and has elastic gears and drives with an over-speed
-//! trip of their own.
+//! The controller with an arm that meets walls, picks up loads, and has elastic gears and drives with their own
+//! over-speed trip.
 use jtc_bus::{Joint, NodeState};
 use jtc_core::{ControllerState, error, joint_error};
 use jtc_sim::{
@@ -26,9 +26,9 @@ fn inject(operator: &mut Operator, kind: FaultKind, ms: Option<u64>) {
     operator.world.inject(Fault { kind, trigger: now, duration_ms: ms });
 }
 
-/// Joint 1 alone turns from 0 to 1 rad and back; a wall stands at 0.5 rad. The largest torque of the wall is that of
-/// the kinetic energy, v·√(K·J), plus the torque of the drive. The wall never pulls, and its torque is gone when it is
-/// removed.
+/// Only joint 1 turns, from 0 to 1 rad and back, with a wall at 0.5 rad. The largest torque of the wall is the torque
+/// v·√(K·J) from the kinetic energy plus the torque of the drive. The wall never pulls, and its torque becomes 0 when
+/// the wall is removed.
 #[test]
 fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     let start = [0.0, -0.4, 0.9, 0.2, -0.3, 0.5];
@@ -69,7 +69,8 @@ fn a_joint_that_runs_into_a_wall_is_pushed_back() {
     }
 }
 
-/// A load is picked up and dropped again: the torque that holds the arm changes by its weight, and returns.
+/// A load is picked up and dropped again. The holding torque changes by the load's weight, and returns to its old
+/// value.
 #[test]
 fn a_load_that_is_taken_up_is_held_and_dropped() {
     let mut operator = held(config());
@@ -90,7 +91,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     let load = jtc_dynamics::Payload { mass, com, ..jtc_dynamics::Payload::NONE };
     let (loaded, empty) = (of(load), of(jtc_dynamics::Payload::NONE));
     for j in 0..6 {
-        // Stiction carries a part of it.
+        // Stiction carries a part of the weight.
         let weight = loaded[j] - empty[j];
         assert!(
             (with[j] - before[j] - weight).abs() < 9.0,
@@ -106,7 +107,7 @@ fn a_load_that_is_taken_up_is_held_and_dropped() {
     assert!(events.iter().any(|event| event.contains("payload 1.5 kg at (0, 0.02, 0.06) m")), "{events:?}");
 }
 
-/// The controller's own check of the speed (J-35) can be seen with drives that trip later than the default.
+/// The controller's own speed check (J-35) is visible only with drives that trip later than the default drives.
 #[test]
 fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     let run = |over_speed: Option<f64>| {
@@ -129,7 +130,7 @@ fn j35_the_controller_sees_over_speed_before_drives_that_trip_later() {
     assert_eq!(run(Some(50.0)), (true, false));
 }
 
-/// A brake that stays closed holds its joint, for any torque of its drive, and opens when the fault is over.
+/// A brake that stays closed holds its joint against any torque of its drive, and opens when the fault ends.
 #[test]
 fn a_brake_that_stays_closed_holds_the_joint() {
     for support in [Support::Brakes, Support::Stand] {
@@ -146,7 +147,7 @@ fn a_brake_that_stays_closed_holds_the_joint() {
     }
 }
 
-/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved; the drives' positions are those of the
+/// With gears of 20,000 N·m/rad the default arm is brought up, held and moved. The drives report the positions of the
 /// motors.
 #[test]
 fn an_arm_with_gears_that_yield_is_held_and_moved() {
@@ -173,7 +174,7 @@ fn an_arm_with_gears_that_yield_is_held_and_moved() {
     assert!(twist.abs() > 2e-4 && twist.abs() < 0.02, "joint 2 is loaded: {twist} rad");
 }
 
-/// A fault without a duration is present for one tick, if a tick can show it.
+/// A fault of the shortest duration is active for one tick, if a tick can show it.
 #[test]
 fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     let mut operator = held(config());
@@ -187,9 +188,9 @@ fn a_fault_of_no_duration_is_there_for_a_millisecond() {
     assert_eq!(pushed, [5.0, 0.0, 0.0, 0.0, 0.0]);
 }
 
-/// Elastic gears twist between the encoder of the joint and that of the motor. For any motion and contact of the arm,
-/// the twist is detected neither as a jump of an encoder nor as a speed of another scale, in both places of the drives'
-/// encoder.
+/// Elastic gears twist between the joint's encoder and the motor's encoder. For any motion and contact of the arm, the
+/// controller reports the twist neither as a jump of an encoder nor as another speed scale, whether the drives measure
+/// the position at the motor or at the link.
 #[test]
 fn j35_gears_that_yield_are_no_false_alarm() {
     for (trial, place) in
@@ -214,7 +215,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
         if trial % 2 == 0 {
             inject(&mut operator, FaultKind::Push { joint, torque }, Some(20 + (500.0 * rng.f64()) as u64));
         } else {
-            // At the position of the joint, on the side to which it moves.
+            // At the position of the joint, on the side towards which it moves.
             let speed = operator.world.truth().qd[joint.index()];
             let side = if speed >= 0.0 { Side::Above } else { Side::Below };
             let rad = operator.world.truth().q[joint.index()] + 0.05 * speed.signum();
@@ -232,7 +233,7 @@ fn j35_gears_that_yield_are_no_false_alarm() {
             let telemetry = operator.world.telemetry();
             assert_eq!(telemetry.errors & error::EXTERNAL_JOINTS, 0, "{what}");
             if operator.state() == ControllerState::Error {
-                // A push that no joint can stop: the joint exceeds its speed.
+                // A push that no joint can resist, so that the joint exceeds its speed limit.
                 let fast = telemetry.joints.iter().any(|joint| joint.internal & joint_error::VELOCITY != 0);
                 assert!(fast, "{what}: {:?}", telemetry.joints.map(|j| (j.internal, j.velocity, j.torque)));
                 break;

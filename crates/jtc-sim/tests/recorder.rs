@@ -1,4 +1,4 @@
-//! The flight recorder in whole sessions: its contents, and a replay with the same results (J-56).
+//! The flight recorder in whole sessions: its contents, and a replay that gives the same results (J-56).
 use std::collections::HashMap;
 
 use jtc_core::recorder::{Block, Log, Outcome, Record, Replay, SNAPSHOT_MS, Unsure};
@@ -10,7 +10,7 @@ use sim_checks::soak::Soak;
 const FROM: [f64; 6] = [0.1, -0.4, 0.9, 0.2, -0.3, 0.5];
 const TO: [f64; 6] = [1.1, 0.4, -0.3, 1.2, 0.8, -0.9];
 
-/// Results of the ticks of a log.
+/// Numbers of ticks in a log, by the result of their replay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Counts {
     ticks: u64,
@@ -23,10 +23,10 @@ fn blocks(world: &World) -> Vec<Block> {
     world.recorder().blocks().copied().collect()
 }
 
-/// Replays the log and compares each tick with the values computed in the session.
+/// Replays the log and compares each tick with the values that the controller computed in the session.
 fn replay(world: &World, seen: &HashMap<u64, Telemetry>) -> Counts {
     let blocks = blocks(world);
-    // Only settings and points are taken from the controller of the session: its memory is in the snapshots.
+    // The replay takes only settings and points from the session's controller. Everything else is in the snapshots.
     let then = world.controller();
     let mut controller = Controller::new(then.config().clone(), vec![RawPoint::default(); POINTS_MAX]);
     controller.put_points(0, then.points());
@@ -91,7 +91,7 @@ fn loaded() -> Operator {
     operator
 }
 
-/// Returns the commands of a run along the path, tick by tick; `sends`: bytes that a host sends in each tick.
+/// Runs along the path and returns the telemetry of each tick; `sends` returns the bytes that a host sends in a tick.
 fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
@@ -108,7 +108,7 @@ fn run(sends: impl Fn(u32) -> Vec<u8>) -> (Operator, Vec<Telemetry>) {
 #[test]
 fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     let (_, undisturbed) = run(|_| Vec::new());
-    // Page after page, as fast as the answers come.
+    // Requests page after page, as fast as the answers arrive.
     let (_, read) =
         run(
             |ms| {
@@ -118,15 +118,15 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
     assert!(undisturbed == read, "a torque differs");
 }
 
-/// Keeps two seconds before an error and the time after it, with more traffic than a controller executes, for any part
-/// of a snapshot's time that is lost at the beginning.
+/// The recorder keeps at least two seconds before an error and the time after it, with more traffic than the controller
+/// can execute. This holds whatever part of the first snapshot's interval is lost.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();
     operator.ask(&host::exec(ExecCommand::Execute)).unwrap();
     let mut least = usize::MAX;
     for ms in 0..3_500 + u32::from(SNAPSHOT_MS) {
-        // Frames that take a few instructions each, and parameters, which require a snapshot.
+        // Frames that take only a few instructions each, and parameters, which require a snapshot.
         for n in 0..12 {
             operator.world.host_write(&fixed::gripper_control((ms + n) % 2 == 0));
         }
@@ -146,7 +146,7 @@ fn ticks(blocks: &[Block]) -> usize {
     Log::new(blocks).filter(|record| matches!(record, Record::Tick { .. })).count()
 }
 
-/// A changed point of the trajectory: the replay is equal up to that point, and differs from there on.
+/// With a changed point of the trajectory, the replay is equal up to that point and differs afterwards.
 #[test]
 fn j56_the_first_tick_that_differs_is_named() {
     const POINT: usize = 120;
@@ -168,7 +168,8 @@ fn j56_the_first_tick_that_differs_is_named() {
     let differs = Replay::new(Log::new(&blocks), controller, hash)
         .find(|step| step.outcome == Outcome::Differs)
         .expect("a tick differs");
-    // The point acts from the point before it on; its effect reaches the torque on the bus within a few ticks.
+    // A point has an effect from the point before it on, and the effect reaches the torque on the bus within a few
+    // ticks.
     let acts = seen[&(10 * (POINT as u32 - 1))];
     let tick = differs.telemetry.tick;
     assert!((acts..=acts + 8).contains(&tick), "{tick}, where it acts from {acts} on");

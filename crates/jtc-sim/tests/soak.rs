@@ -1,4 +1,4 @@
-//! The short form of the soak run, and its repeatability.
+//! A short soak run, and a test that it is repeatable.
 use sim_checks::soak::Soak;
 
 #[test]

@@ -1,9 +1,9 @@
-//! An arm whose gears have stiction: at rest the controller must not hunt.
+//! An arm whose gears have stiction. At rest the controller must not hunt.
 //!
 //! With bristle friction a joint stops as soon as stiction holds it, slightly off the command. An integral that
-//! continues there raises the torque until the joint breaks away and stops on the other side. The torque swings by
-//! twice the stiction for ever, at a few tenths of a hertz or, because of the encoder's steps, faster. The test uses
-//! the torque command averaged over 50 ms, which keeps the swing and removes the single encoder step.
+//! continues there raises the torque until the joint breaks away and stops on the other side. The torque then swings by
+//! twice the stiction forever, at a few tenths of a hertz or, because of the encoder's steps, faster. The test averages
+//! the torque command over 50 ms, which keeps the swing and removes single encoder steps.
 use jtc_core::JOINTS;
 use jtc_sim::{FrictionModel, LuGre, Operator, SimConfig, host};
 
@@ -14,7 +14,8 @@ const MEAN_MS: u16 = 50;
 /// Largest peak-to-peak torque at rest, N·m: two encoder steps times the largest Kp.
 const AT_REST: f64 = 1.6;
 
-/// Peak-to-peak torque command of each joint (means over 50 ms), N·m, over 20 s of HoldPos after a motion and 2 s of settling.
+/// Returns the peak-to-peak torque command of each joint (means over 50 ms), N·m, over 20 s of HoldPos that begin 2 s
+/// after a motion.
 fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     let mut config = SimConfig { start: FROM, seed, baud: None, ..SimConfig::default() };
     config.arm.friction_model = model;
@@ -38,7 +39,7 @@ fn swing(seed: u64, model: FrictionModel) -> [f64; JOINTS] {
     range.map(|(low, high)| high - low)
 }
 
-/// An integral that continues at rest swings joints 1 to 3 by 7 to 8 N·m here.
+/// An integral that continues at rest would make joints 1 to 3 swing by 7 to 8 N·m here.
 #[test]
 fn j41_no_hunting_in_stiction() {
     for seed in [1, 2, 3] {

@@ -1,10 +1,10 @@
-//! Pause and Stop while a joint carries nearly its full torque (J-33): time, distance and speed until the arm stands.
+//! Pause and Stop while a joint needs nearly its full torque (J-33): time, distance and speed until the arm is at rest.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_sim::{ModelError, Support};
 use jtc_wire::ExecCommand;
 use sim_checks::lowering::{LOADED, Lowering, angle_of, holding_torque, with_payload};
 
-/// The torque limit minus the model's torque is sufficient.
+/// The torque limit minus the model's torque is sufficient to stop in time.
 #[test]
 fn j33_a_loaded_arm_stands_within_its_time() {
     for (share, speed) in [(0.8, 0.9), (0.9, 0.3), (0.9, 0.2), (0.95, 0.2), (0.95, 0.1), (0.97, 0.1)] {
@@ -33,7 +33,7 @@ fn j33_a_loaded_arm_stands_within_its_time() {
     }
 }
 
-/// 3.3 kg in the arm model, lowered through the position in which they need 95 % of the limit.
+/// A payload of 3.3 kg in the arm model is lowered through the position in which it needs 95 % of the torque limit.
 #[test]
 fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     let model = with_payload(3.3);
@@ -52,20 +52,20 @@ fn j33_a_known_payload_is_stopped_near_the_torque_limit() {
     }
 }
 
-/// If the torque is not sufficient, the full limit brakes; a joint that still moves after the time lowers its load,
-/// slower and slower.
+/// If the torque is not sufficient, the controller brakes with the full limit. A joint that still moves after the time
+/// for stopping lowers its load, slower and slower.
 #[test]
 fn j33_the_full_limit_brakes_where_the_time_cannot_be_kept() {
     for (share, speed) in [(0.97, 0.4), (0.99, 0.2), (0.99, 0.4), (1.02, 0.2), (1.02, 0.4)] {
         let outcome = Lowering::at_share(share, speed).run().expect("it is lowered");
         println!("{share} {speed}: {outcome:?}");
-        // Set values follow the motion that the arm achieves; it gains speed only if its load becomes heavier than it
-        // can hold.
+        // Set values follow the motion that the arm can achieve. The arm gains speed only if its load becomes heavier
+        // than the arm can hold.
         let peak = if share < 0.99 { 1.03 * speed } else { 0.6 };
         assert!(outcome.error < 5e-3 && outcome.peak <= peak, "{outcome:?}");
-        // Friction, which is not included, brakes as well: the speed falls, and the distance is short.
+        // Friction, which this bound does not include, brakes as well, so the speed falls and the distance is short.
         assert!(outcome.way <= if share < 0.99 { 0.7 * speed } else { 1.0 }, "{outcome:?}");
-        // In Operate for at most a second; the arm is held all the time.
+        // The arm is in Operate for at most a second, and is held the whole time.
         assert!(outcome.commanded_ms <= 1_002 && outcome.state == ControllerState::HoldPos, "{outcome:?}");
         assert!(outcome.standing_ms <= if share < 0.99 { 1_100 } else { 6_000 }, "{outcome:?}");
     }

@@ -49,7 +49,7 @@ fn j33_pause_and_resume_stay_on_the_path() {
 fn j34_execute_away_from_the_start_is_refused_and_nothing_moves() {
     let mut operator = held();
     operator.upload(&host::there_and_back(&TO, &FROM, 3.0, 1, 10), 10).unwrap();
-    // Existing hosts do not know a data status above 6 (J-51).
+    // Existing hosts do not know data statuses above 6 (J-51).
     let response = operator.response(&host::exec(ExecCommand::Execute)).unwrap();
     assert_eq!(response.data, DataStatus::IncorrectValue);
     operator.ask(&jtc_wire::fixed::GET_INFO).unwrap();
@@ -98,7 +98,7 @@ fn j12_j21_a_stopped_tick_resets_the_controller_and_leaves_an_internal_error_lat
     );
     assert!(!operator.world.safety_output(), "J-22: 0 while the internal error is latched");
     assert_eq!(operator.world.truth().torque, [0.0; 6]);
-    // The error latches: parameters alone do not bring the arm back.
+    // The error latches, so parameters alone do not enable the arm again.
     operator.world.host_write(&host::use_defaults());
     operator.run(1500);
     assert!(operator.state() == ControllerState::Error && internal(&operator));
@@ -114,7 +114,7 @@ fn j25_taught_by_hand_the_arm_floats() {
     operator.run(1000);
     let t = operator.world.telemetry();
     assert_eq!((t.state, t.errors), (ControllerState::Teaching, 0));
-    // Wrong masses make the arm drift slowly; it does not fall.
+    // Wrong masses make the arm drift slowly, but it does not fall.
     let moved = operator.world.truth().q.iter().zip(&before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(moved < 0.2, "{moved}");
     operator.ask(&host::frame(FrameType::TeachingModeDisable, &[])).unwrap();
@@ -161,7 +161,7 @@ fn others_on_the_bus_see_every_frame_and_take_part() {
         }
     }
     assert_eq!(ids.into_iter().collect::<Vec<_>>(), [0x000, 0x200, 0x201, 0x202, 0x203, 0x204, 0x205, 0x206]);
-    // A reset from another bus member: the drive reboots, and the controller notices.
+    // Another node on the bus sends a reset. The drive reboots, and the controller detects it.
     let reset = can_link::CanFrame::fd(can_link::Id::standard(0x1A2).unwrap(), &[]).unwrap();
     can_link::CanBus::send(&mut other, &reset).unwrap();
     for _ in 0..20 {
@@ -178,7 +178,7 @@ fn j07_a_friction_table_and_what_follows_it_at_once_are_taken_without_losing_a_t
         let mut operator = Operator::new(config);
         operator.bring_up().unwrap();
         operator.listener.responses.clear();
-        // A table like a measured one: torques increase with speed.
+        // A table similar to a measured one: torques increase with speed.
         let one = |_| {
             let axis = (0..20).map(|i| -1.9 + 0.2 * i as f32).chain((0..20).map(|i| 5.0 + 4.0 * i as f32));
             let torque = (0..400).map(|i| 3.0 * (-1.9 + 0.2 * (i / 20) as f32));
@@ -210,8 +210,8 @@ fn j11_j12_older_drives_run_with_their_scale_and_one_broadcast_a_tick() {
     operator.bring_up().unwrap();
     operator.upload(&host::there_and_back(&FROM, &TO, 3.0, 1, 10), 10).unwrap();
     operator.execute(10_000).unwrap();
-    // A broadcast of another member directly after one of the controller's leaves the older drives one request late,
-    // for good.
+    // If another node sends a broadcast directly after one of the controller's, an older drive stays one request late
+    // from then on.
     let ask = jtc_bus::Request::ChangeFsm { target: [jtc_bus::Target::NoChange; 7] }.emit();
     operator.world.put_bus_frame(ask);
     operator.run(20);
@@ -235,7 +235,7 @@ fn j12_the_first_frame_after_an_error_is_zero_torque_also_during_bring_up() {
     }
 }
 
-/// Every second tick is left out, as if each tick took too long.
+/// Every second tick is skipped, as if each tick took too long.
 #[test]
 fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     for missing in [9, 10] {
@@ -259,8 +259,8 @@ fn j12_ticks_that_go_on_missing_are_an_internal_error() {
     }
 }
 
-/// Sends a frame in two pieces, `ticks` apart in virtual time; the host was silent for `silence_us` of its own time.
-/// Returns the number of good and of bad frames that the controller found.
+/// Sends a frame in two parts, `ticks` apart in virtual time, while the host was silent for `silence_us` of real time.
+/// Returns the numbers of valid and invalid frames that the controller found.
 fn in_two_pieces(ticks: u64, silence_us: Option<u64>) -> (u64, u64) {
     let mut operator = held();
     let before = operator.world.statistics();

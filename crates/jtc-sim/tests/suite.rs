@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, so that only one program must be linked: each file here is a module of it.
+//! The tests of the crate in one program, so that only one program is linked. Each file here is a module of it.
 mod bring_up;
 mod by_hand;
 mod determinism;

@@ -1,9 +1,9 @@
-//! A violently thrown simulated arm stays in its range, except that its end stops yield a little.
+//! A simulated arm that is thrown around violently stays in its range, except that its end stops yield slightly.
 use jtc_core::{Friction, Parameters};
 use jtc_sim::{Arm, FrictionModel, SimArm, SimFriction};
 
 const TICK: f64 = 1e-3;
-/// Largest travel of the end stops when they yield, rad: a joint of the default arm strikes them with up to 80 rad/s.
+/// Largest yielding of the end stops, rad. A joint of the default arm hits them at up to 80 rad/s.
 const YIELD: f64 = 0.5;
 
 /// Returns an arm with links of `mass` times the default masses and rotors of `rotor` kg·m².
@@ -24,8 +24,8 @@ fn in_range(arm: &Arm, what: &str) {
     }
 }
 
-/// Throws the arm about: pushes of up to 400 N·m on every joint at once, cold and multiplied friction, brakes that
-/// close and open meanwhile.
+/// Throws the arm around: pushes of up to 400 N·m on all joints at once, friction at low temperature or multiplied, and
+/// brakes that close and open meanwhile.
 fn throw_about(parts: &SimArm, seed: u64, what: &str) {
     let mut rng = fastrand::Rng::with_seed(seed);
     let mut arm = Arm::new(parts.clone(), [1.2; 6], [0.0; 6]);
@@ -90,7 +90,7 @@ fn a_brake_that_closes_on_a_fast_joint_lets_the_end_stop_end_its_way() {
         }
         assert_eq!(arm.qd, [0.0; 6]);
         if speed == 5.0 {
-            // 25/(2·40) rad: the joint does not reach the stop.
+            // The braking angle is 25/(2·40) rad, so the joint does not reach the end stop.
             assert!((0.30..0.33).contains(&arm.q[4]), "{} rad", arm.q[4]);
         }
     }

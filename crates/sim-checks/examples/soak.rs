@@ -1,5 +1,5 @@
-//! Runs hours of virtual time with random commands and faults: `soak --hours 24 --seed 1`. Exits with 1 if an invariant
-//! is broken.
+//! Simulates hours of operation with random commands and faults: `soak --hours 24 --seed 1`. Exits with 1 if an
+//! invariant is violated.
 use std::process::ExitCode;
 use std::time::Instant;
 

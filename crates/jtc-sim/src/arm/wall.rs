@@ -1,18 +1,18 @@
-//! Walls that the arm meets: a plane at the flange, or an angle of one joint.
+//! Walls that the arm can touch: a plane at the flange, or an angle of one joint.
 use jtc_bus::Joint;
 use jtc_dynamics::{Dynamics, JOINTS, JointVec};
 
 use super::{Arm, SimArm};
 
-/// Distance below which a wall counts as touched when the number of sub-steps is chosen, m or rad.
+/// A wall closer than this may be touched, and is included when the number of sub-steps is chosen, m or rad.
 const NEAR: f64 = 0.01;
 
-/// Side of an angle.
+/// Side of an angle that a wall fills.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Angles greater than the given one.
+    /// Angles greater than the angle of the wall.
     Above,
-    /// Angles less than the given one.
+    /// Angles less than the angle of the wall.
     Below,
 }
 
@@ -22,21 +22,22 @@ impl core::fmt::Display for Side {
     }
 }
 
-/// Flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the inward speed, and at least 0.
+/// A flat or angular obstacle. A wall only pushes: its force is stiffness times depth plus damping times the inward
+/// speed, but never negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wall {
-    /// Plane that the origin of the flange touches.
+    /// A plane that touches the origin of the flange.
     Plane {
         /// Point of the surface in the base frame, m.
         position: [f64; 3],
-        /// Direction out of the wall in the base frame, of any length but 0.
+        /// Direction out of the wall in the base frame; its length must not be 0.
         normal: [f64; 3],
-        /// N/m.
+        /// Stiffness, N/m.
         stiffness: f64,
-        /// N·s/m.
+        /// Damping, N·s/m.
         damping: f64,
     },
-    /// Angle that a joint touches.
+    /// An angle that stops a joint.
     Joint {
         /// Joint.
         joint: Joint,
@@ -44,9 +45,9 @@ pub enum Wall {
         angle: f64,
         /// Side of the angle that the wall fills.
         side: Side,
-        /// N·m/rad.
+        /// Stiffness, N·m/rad.
         stiffness: f64,
-        /// N·m·s/rad.
+        /// Damping, N·m·s/rad.
         damping: f64,
     },
 }
@@ -58,29 +59,30 @@ enum Surface {
         normal: [f64; 3],
         /// Position of the surface along the normal, m.
         offset: f64,
-        /// Dynamics with a gravity of 1 m/s² into the wall, for the joint torques of a force along the normal at the flange.
+        /// Dynamics with a gravity of 1 m/s² into the wall, used to compute the joint torques of a force along the
+        /// normal at the flange.
         pulled: Box<Dynamics>,
     },
     Joint {
         index: usize,
-        /// Direction of the push: 1 to greater angles, −1 to smaller ones.
+        /// Direction of the push: 1 towards greater angles, −1 towards smaller ones.
         sign: f64,
         angle: f64,
     },
 }
 
-/// Wall with its state, in contact with the arm or not.
+/// A wall with its state. The arm may or may not touch it.
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     wall: Wall,
     surface: Surface,
     stiffness: f64,
     damping: f64,
-    /// Distance from the configured position of the surface inwards to its present position, m or rad.
+    /// Distance between the configured surface and the current surface, measured inwards, m or rad.
     recess: f64,
 }
 
-/// Depth of the arm in a wall, and the joint torques of a unit force of the wall.
+/// Depth of the arm in a wall, and the joint torques of a unit force from the wall.
 struct Touch {
     depth: f64,
     torques: JointVec,
@@ -94,8 +96,9 @@ impl Touch {
 }
 
 impl Contact {
-    /// Creates the state of a wall; `dynamics` computes the flange of the arm at `q`. A wall that would begin inside the arm begins at the
-    /// surface of the arm, and moves to its configured position as the arm leaves. So no wall throws an arm.
+    /// Creates the state of a wall; `dynamics` computes the flange of the arm at `q`. If the wall would begin inside
+    /// the arm, it begins at the surface of the arm instead, and moves to its configured position as the arm leaves.
+    /// This way a new wall cannot throw the arm.
     pub fn new(wall: Wall, parts: &SimArm, dynamics: &Dynamics, q: &JointVec) -> Self {
         let (surface, stiffness, damping) = match wall {
             Wall::Plane { position, normal, stiffness, damping } => {
@@ -134,7 +137,7 @@ impl Contact {
         Touch { depth: depth - self.recess, torques }
     }
 
-    /// Adds the torques of the wall's force (N·m) to `sum`; `damped`: share of the damping that acts.
+    /// Adds the torques of the wall's force (N·m) to `sum`; `damped` is the share of the damping that is applied.
     pub fn push(&self, dynamics: &Dynamics, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
         let touch = self.touch(dynamics, q);
         if touch.depth > 0.0 {
@@ -145,8 +148,9 @@ impl Contact {
         }
     }
 
-    /// Returns the increases by the wall of the square of the highest natural frequency (1/s²) and of the fastest decay (1/s), if the arm
-    /// may touch the wall within `dt`; otherwise 0. `mobility` returns the acceleration of the joints by torques.
+    /// Returns the contributions of the wall to the squared highest natural frequency (1/s²) and to the fastest decay
+    /// (1/s), if the arm may touch the wall within `dt`; otherwise 0. `mobility` returns the joint accelerations caused
+    /// by torques.
     pub fn rates(
         &self,
         dynamics: &Dynamics,
@@ -164,7 +168,7 @@ impl Contact {
         (self.stiffness * inverse_mass, self.damping * inverse_mass)
     }
 
-    /// Moves a surface that is not at its configured position after the arm.
+    /// Moves a surface that is not at its configured position along with the arm.
     pub fn follow(&mut self, dynamics: &Dynamics, q: &JointVec) {
         if self.recess > 0.0 {
             self.recess = (self.recess + self.touch(dynamics, q).depth).clamp(0.0, self.recess);
@@ -173,7 +177,7 @@ impl Contact {
 }
 
 impl Arm {
-    /// Adds the torques of the walls' forces at `q`, `qd` (N·m) to `sum`.
+    /// Adds the torques of all walls' forces at `q`, `qd` (N·m) to `sum`.
     pub(super) fn push_of_walls(&self, q: &JointVec, qd: &JointVec, damped: f64, sum: &mut JointVec) {
         for contact in &self.contacts {
             contact.push(&self.dynamics, q, qd, damped, sum);
@@ -187,7 +191,7 @@ impl Arm {
         sum
     }
 
-    /// Sets the walls. Walls that are already present stay unchanged, others are removed.
+    /// Sets the walls. Walls that already exist keep their state; walls that are not in the list are removed.
     pub fn set_walls(&mut self, walls: &[Wall]) {
         let mut known = core::mem::take(&mut self.contacts);
         for &wall in walls {

@@ -6,7 +6,7 @@ use crate::drive::Drive;
 use crate::gripper::Gripper;
 use crate::request::NodeRequest;
 
-/// Time from the end of a request to the first ready answer, and from each answer to the next, µs.
+/// Time from the end of a request until the first answer is ready, and from each answer to the next, µs.
 pub(super) const ANSWER_US: (u32, u32) = (38, 6);
 /// Length of the gripper's answer to Move, bytes.
 const GRIPPER_ANSWER: usize = 20;
@@ -21,18 +21,19 @@ pub struct Nodes {
 }
 
 impl Nodes {
-    /// Returns true if any node acknowledges frames.
+    /// Returns `true` if any node acknowledges frames.
     pub fn any_on_bus(&self) -> bool {
         self.drives.iter().any(Drive::on_bus) || self.gripper.as_ref().is_some_and(Gripper::on_bus)
     }
 
-    /// Returns the states of the nodes; without a gripper its state is Fault.
+    /// Returns the states of the nodes. Without a gripper, its state is Fault.
     pub fn states(&self) -> [NodeState; NODES] {
         let gripper = self.gripper.as_ref().map_or(NodeState::FAULT, Gripper::state);
         core::array::from_fn(|n| self.drives.get(n).map_or(gripper, Drive::state))
     }
 
-    /// Returns a node's answer to a request that ended at `now_us`, and the time after that until the answer is ready, µs.
+    /// Returns a node's answer to a request that ended at `now_us`, and the time from then until the answer is ready,
+    /// µs.
     pub fn answer(
         &mut self,
         node: usize,

@@ -6,7 +6,7 @@ use super::encoders::floor;
 use crate::request::NodeRequest;
 
 impl Drive {
-    /// Takes a request that arrives at `now_us`, and returns the answer, if the drive answers.
+    /// Processes a request that arrives at `now_us`, and returns the answer if the drive answers.
     pub fn receive(&mut self, now_us: u64, request: &NodeRequest) -> Option<Answer> {
         if !self.on_bus() {
             return None;
@@ -17,7 +17,7 @@ impl Drive {
         }
     }
 
-    /// Takes ChangeFsm with any byte; the tick decides its meaning.
+    /// Processes a ChangeFsm with any byte. The tick decides what the byte means.
     fn change(&mut self, state: NodeState) -> Answer {
         let before = self.states.state();
         if !self.fault.ignores_state {
@@ -37,7 +37,7 @@ impl Drive {
                 self.goal = if self.mode == 1 { torque.get(n).copied().unwrap_or(0.0) } else { 0.0 };
                 Some(Answer::Joint { node: self.node, report: self.report() })
             }
-            // A `NodeRequest` has a separate variant for it.
+            // `NodeRequest` has a separate variant for it.
             Request::ChangeFsm { .. } => None,
             Request::ChangeMode { mode, config, .. } => {
                 let accepted = matches!(self.states.state(), NodeState::INIT | NodeState::READY);
@@ -69,14 +69,14 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        // The warning is also set before the first configuration, at any level of the line.
+        // The warning is also set before the first configuration, whatever the level of the line.
         if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }
         JointReport {
             position: self.position,
             velocity: self.velocity,
-            // The magnitude with the sign of the last command; this is not a measurement.
+            // Reports the magnitude with the sign of the last command. This is not a measurement.
             torque: if self.goal < 0.0 { -self.torque.abs() } else { self.torque.abs() },
             temperature: byte(self.temperature),
             state: self.states.state(),
@@ -89,7 +89,7 @@ impl Drive {
     }
 }
 
-/// Returns a temperature in °C as the bus transmits it: negative values wrap.
+/// Returns a temperature in °C as the bus transmits it; negative values wrap around.
 fn byte(celsius: f64) -> u8 {
     floor(celsius) as u8
 }

@@ -1,12 +1,12 @@
-//! Properties that differ between drives, and effects of faults on them.
+//! Properties that differ between drives, and the effects of faults on drives.
 
-/// Side of the gear.
+/// Side of the gear on which the encoder is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum EncoderPlace {
-    /// Motor's side, seen through the gear.
+    /// On the motor's side; the position refers to the joint through the gear.
     #[default]
     Motor,
-    /// Link's side.
+    /// On the link's side.
     Link,
 }
 
@@ -19,23 +19,27 @@ pub struct DriveConfig {
     pub first_enable_ms: u32,
     /// Duration of later enables, ms.
     pub enable_ms: u32,
-    /// Pause of the motor control after a stop, ms.
+    /// Duration of the pause of the motor control after a stop, ms.
     pub rest_ms: u32,
-    /// Speed at the raw value 32767, rad/s: 2.0, for older drives 6.283185.
+    /// Speed at the raw value 32767, rad/s: 2.0, or 6.283185 for older drives.
     pub velocity_full_scale: f64,
-    /// Measured speed at which the drive trips, rad/s, in both directions. Known drives: 1.8 (older ones 1.5 or 1.0), which is 1.2 times
-    /// the default arm's velocity limit. [`SimConfig::new`](crate::SimConfig::new) uses 1.2 times the limit of each joint.
+    /// Measured speed at which the drive trips, rad/s, in both directions. Real drives have 1.8 (older ones 1.5 or
+    /// 1.0), which is 1.2 times the default arm's velocity limit. [`SimConfig::new`](crate::SimConfig::new) uses 1.2
+    /// times the limit of each joint.
     pub over_speed: f64,
-    /// Side of the gear at which the position is measured; the speed is always that of the motor. The side matters only for elastic gears.
+    /// Side of the gear at which the position is measured. The speed is always measured at the motor. The side matters
+    /// only for elastic gears.
     pub encoder: EncoderPlace,
     /// Half of the working area, rad.
     pub working_area: f64,
-    /// Torque at the joint divided by the requested torque, which the drive reports as delivered. Known drives: about 1/1.3.
+    /// Torque at the joint divided by the requested torque. The drive reports the requested torque as delivered. Real
+    /// drives: about 1/1.3.
     pub delivers: f64,
-    /// `true` if the drive takes one message per interrupt. After two consecutive requests it then stays one message late.
+    /// `true` if the drive processes only one message per interrupt. After two consecutive requests it then stays one
+    /// message late.
     pub one_message_per_interrupt: bool,
-    /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise it answers with the
-    /// previous state.
+    /// `true` if the drive executes ChangeFsm in the interrupt and answers with the code of the transition. Otherwise
+    /// it answers with the previous state.
     pub answers_transition: bool,
     /// `true` if answers to Move have 20 bytes, otherwise 16.
     pub long_answers: bool,
@@ -64,7 +68,8 @@ impl DriveConfig {
     /// Smallest and largest over-speed limit that the simulator's options accept, rad/s.
     pub const OVER_SPEED: (f64, f64) = (0.01, 100.0);
 
-    /// Returns the properties of the firmware before the present one: other speed scale, short answers, one message per interrupt.
+    /// Returns the properties of drives with the previous firmware: other speed scale, short answers, one message per
+    /// interrupt.
     pub fn older() -> Self {
         Self {
             velocity_full_scale: 6.283185,
@@ -76,10 +81,10 @@ impl DriveConfig {
     }
 }
 
-/// Present effects of faults on a drive.
+/// Current effects of faults on a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriveFault {
-    /// `true` if the node is off the bus; its motor continues.
+    /// `true` if the node is off the bus, while its motor continues.
     pub silent: bool,
     /// Motor-control fault bits.
     pub motor_control: u8,
@@ -87,10 +92,10 @@ pub struct DriveFault {
     pub hardware: bool,
     /// Offset of the encoder reading, rad.
     pub encoder_offset: f64,
-    /// `true` if the position is reported as not accurate.
+    /// `true` if the drive reports its position as inaccurate.
     pub not_accurate: bool,
-    /// `true` if the safety line is at the level that means danger.
+    /// `true` if the safety line has the level for danger.
     pub safety_line: bool,
-    /// `true` if requests for another state are answered and have no effect.
+    /// `true` if the drive answers requests for another state but does not execute them.
     pub ignores_state: bool,
 }

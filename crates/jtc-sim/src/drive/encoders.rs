@@ -7,20 +7,20 @@ const ENCODER_COUNTS: f64 = 65_536.0;
 const HALF_TURN: f64 = jtc_wire::POSITION_SCALE;
 /// Counts of the motor's incremental encoder per radian of the joint, with the gear ratio of 121.
 const MOTOR_COUNTS_PER_RAD: f64 = 10_000.0 * 121.0 / core::f64::consts::TAU;
-/// Number of encoder differences of 1 ms in the mean for the speed.
+/// Number of encoder differences of 1 ms that are averaged for the speed.
 const SPEED_WINDOW: usize = 10;
 
 /// Both encoders of a drive.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Encoders {
-    /// Ring with the motor encoder of the last ticks, counts.
+    /// Ring buffer with the motor encoder values of the last ticks, counts.
     history: [i64; SPEED_WINDOW],
     oldest: usize,
 }
 
 impl Encoders {
-    /// Returns the speed of a joint at `q` (rad) after another millisecond, rad/s. The speed comes from the motor's encoder,
-    /// which is much finer than the joint's.
+    /// Returns the speed of a joint that is at `q` (rad) one millisecond later, rad/s. The speed is computed from the
+    /// motor's encoder, which is much finer than the joint's.
     pub fn speed(&mut self, q: f64) -> f64 {
         let motor = floor(q * MOTOR_COUNTS_PER_RAD);
         let oldest = core::mem::replace(&mut self.history[self.oldest], motor);
@@ -28,7 +28,8 @@ impl Encoders {
         (motor - oldest) as f64 / (MOTOR_COUNTS_PER_RAD * SPEED_WINDOW as f64 * 0.001)
     }
 
-    /// Returns the position of a joint at `q` (rad) as the absolute encoder reads it, rad. Whole turns are lost.
+    /// Returns the position of a joint at `q` (rad) as the absolute encoder measures it, rad. The number of whole turns
+    /// is lost.
     pub fn position(&self, q: f64) -> f64 {
         let turns = q / core::f64::consts::TAU;
         let count = floor(turns * ENCODER_COUNTS + 0.5) as i16;
@@ -36,8 +37,8 @@ impl Encoders {
     }
 }
 
-/// Returns the largest whole number that is not above `x`; `f64::floor` is a function call if the processor's own instruction may not be
-/// used.
+/// Returns the largest whole number that is not above `x`. Replaces `f64::floor`, which is a function call if the
+/// compiler may not use the processor's instruction.
 pub(super) fn floor(x: f64) -> i64 {
     let near = x as i64;
     near - i64::from(near as f64 > x)

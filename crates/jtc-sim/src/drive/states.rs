@@ -1,24 +1,24 @@
-//! State machine of a drive. A request stays pending until a transition erases it, and enabling takes time.
+//! State machine of a drive. A request stays pending until a transition clears it, and enabling takes time.
 use jtc_bus::NodeState;
 
 use super::DriveConfig;
 
-/// Transitions whose numbers differ between generations of drives, as in this one.
+/// Codes of transitions that differ between generations of drives. These are the codes of the simulated generation.
 const READY_TO_INIT: NodeState = NodeState::new(14);
 const REACTION_TO_FAULT: NodeState = NodeState::new(15);
 const FAULT_TO_INIT: NodeState = NodeState::new(16);
 
-/// State of a drive, and progress of a transition.
+/// State of a drive and progress of a transition.
 #[derive(Clone, Debug)]
 pub(super) struct States {
     state: NodeState,
-    /// Ticks since `state` was entered.
+    /// Number of ticks since `state` was entered.
     age: u32,
-    /// Last requested state; Start: none.
+    /// Last requested state; Start means none.
     pending: NodeState,
     /// `true` if the motor was aligned since the last reset.
     aligned: bool,
-    /// Ticks until the motor control may start.
+    /// Number of ticks until the motor control may start.
     rest: u32,
 }
 
@@ -32,7 +32,7 @@ impl States {
         self.state
     }
 
-    /// Takes any byte; [`accept`](Self::accept) decides its meaning.
+    /// Stores a request with any byte; [`accept`](Self::accept) decides what the byte means.
     pub fn request(&mut self, state: NodeState) {
         self.pending = state;
     }
@@ -42,7 +42,8 @@ impl States {
         self.age = self.age.saturating_add(1);
     }
 
-    /// Returns true if another error changes nothing, because the drive already reacts to one or has just started.
+    /// Returns `true` if another error changes nothing, because the drive already reacts to an error or has just
+    /// started.
     pub fn reacting(&self) -> bool {
         matches!(
             self.state,
@@ -54,7 +55,7 @@ impl States {
         )
     }
 
-    /// Begins the pending transition, if the present state has one.
+    /// Begins the pending transition, if the current state has one.
     pub fn accept(&mut self, config: &DriveConfig) {
         let next = match (self.pending, self.state) {
             (NodeState::INIT, NodeState::START) => NodeState::START_TO_INIT,
@@ -62,14 +63,14 @@ impl States {
             (NodeState::INIT, NodeState::FAULT) => FAULT_TO_INIT,
             (NodeState::READY, NodeState::INIT) => NodeState::INIT_TO_READY,
             (NodeState::READY, NodeState::ENABLED) => NodeState::ENABLED_TO_READY,
-            // Some drives take an echoed fault byte as a command to enable. This drive does.
+            // Some drives, including this one, treat an echoed fault byte as a command to enable.
             (NodeState::ENABLED | NodeState::FAULT, NodeState::READY) => NodeState::READY_TO_ENABLED,
             // The error byte stays 0.
             (NodeState::FAULT_REACTION, state) if state != NodeState::START => {
                 self.pending = NodeState::START;
                 NodeState::FAULT
             }
-            // Other requests stay pending until a transition erases them.
+            // Other requests stay pending until a transition clears them.
             _ => return,
         };
         self.enter(next, config);
@@ -83,7 +84,7 @@ impl States {
         self.age = 0;
     }
 
-    /// Continues a transition. At its end, a pending request is erased. Returns true if the errors are acknowledged.
+    /// Continues a transition. Its end clears a pending request. Returns `true` if the errors are acknowledged.
     pub fn proceed(&mut self, config: &DriveConfig) -> bool {
         self.rest = self.rest.saturating_sub(1);
         let start_time = if self.aligned { config.enable_ms } else { config.first_enable_ms };

@@ -1,4 +1,4 @@
-//! Errors of fault files, with their texts.
+//! Errors of fault files and their texts.
 use core::fmt;
 
 use jtc_dynamics::JOINTS;
@@ -9,32 +9,32 @@ use crate::faults::FaultKind;
 /// Reasons why a fault file cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FaultFileError {
-    /// The file is not valid TOML of this form; the text is that of the reader, with the position.
+    /// The file is not valid TOML of this form. The text comes from the TOML reader and contains the position.
     Syntax(String),
     /// The file has no `format = 2`.
     Format {
         /// Format of the file.
         found: Option<f64>,
     },
-    /// The key `node`, which formats before 2 had.
+    /// The file uses the key `node`, which existed before format 2.
     Node {
         /// Number of the fault in the file, from 1.
         fault: usize,
         /// Value in the file.
         node: f64,
     },
-    /// Neither or both of `joint` and `gripper`.
+    /// A fault has neither or both of `joint` and `gripper`.
     Device {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Kind.
+        /// Kind of the fault.
         kind: String,
     },
-    /// The file of a hand cannot be used; the text is the reason.
+    /// The file of a hand cannot be used.
     Hand {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Error.
+        /// Reason.
         text: String,
     },
     /// Unknown kind of fault.
@@ -48,18 +48,18 @@ pub enum FaultFileError {
     Missing {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Kind.
+        /// Kind of the fault.
         kind: String,
-        /// The key.
+        /// Missing key.
         key: &'static str,
     },
-    /// Key that has no meaning here.
+    /// The key has no meaning for this kind of fault.
     Superfluous {
         /// Number of the fault in the file, from 1.
         fault: usize,
-        /// Kind.
+        /// Kind of the fault.
         kind: String,
-        /// The key.
+        /// The superfluous key.
         key: &'static str,
     },
     /// A value outside its range.
@@ -70,7 +70,7 @@ pub enum FaultFileError {
         key: &'static str,
         /// Value in the file.
         value: f64,
-        /// Smallest and largest allowed value.
+        /// Smallest and largest permitted value.
         allowed: (f64, f64),
     },
     /// The value must be a whole number.
@@ -82,7 +82,7 @@ pub enum FaultFileError {
         /// Value in the file.
         value: f64,
     },
-    /// Not three numbers.
+    /// The value is not a list of three numbers.
     NotThree {
         /// Number of the fault in the file, from 1.
         fault: usize,
@@ -112,7 +112,7 @@ pub enum FaultFileError {
         /// State in the file.
         state: String,
     },
-    /// Not exactly one of `at_s`, `in_state`, `at_point`.
+    /// The fault does not have exactly one of `at_s`, `in_state` and `at_point`.
     Trigger {
         /// Number of the fault in the file, from 1.
         fault: usize,

@@ -1,5 +1,5 @@
-//! Inputs and outputs of the controller's board in a millisecond. For programs that run another board, or the controller in another
-//! program, together with the board of the simulation.
+//! Inputs and outputs of the controller's board in a millisecond. For programs that run another board, or the
+//! controller in another program, in parallel with the simulated board.
 use jtc_bus::Frame;
 use jtc_core::{BusState, Outputs};
 
@@ -10,21 +10,21 @@ use crate::board::{Board, Pins};
 pub struct Exchange {
     /// Bytes from the host that arrived before the tick.
     pub host: Vec<u8>,
-    /// `true` if the tick came. Without it the board only took the bytes from the host and produced no output.
+    /// `true` if a tick was executed. Otherwise the board only received the bytes from the host and produced no output.
     pub ticked: bool,
-    /// Frames of the joint bus that the tick received.
+    /// Joint bus frames that the tick received.
     pub bus: Vec<Frame>,
-    /// State of the bus.
+    /// State of the joint bus.
     pub bus_state: BusState,
-    /// Level of the safety input: true = no error.
+    /// Level of the safety input; `true` means no error.
     pub safety_input: bool,
-    /// The serial transmitter was idle.
+    /// `true` if the serial transmitter was idle.
     pub status_free: bool,
     /// Frame that the board sent on the joint bus.
     pub sent: Option<Frame>,
     /// Bytes that the board sent to the host.
     pub to_host: Vec<u8>,
-    /// Level of the safety output: true = no error.
+    /// Level of the safety output; `true` means no error.
     pub safety_output: bool,
 }
 
@@ -58,7 +58,8 @@ impl Exchange {
 }
 
 impl Board {
-    /// Returns the bytes that the last tick, with these outputs, sends to the host: a status, an answer to an extension request, or none.
+    /// Returns the bytes that the last tick, which had these outputs, sends to the host: a status, an answer to an
+    /// extension request, or none.
     pub fn bytes_to_host(&self, outputs: &Outputs) -> Vec<u8> {
         let status: &[u8] = if outputs.status { self.status_frame() } else { &[] };
         let answer = if outputs.answer_line.is_some() { self.answer_frame() } else { &[] };

@@ -1,4 +1,5 @@
-//! Answers every frame with its own payload under the next identifier: `cargo run --example echo -- URL`.
+//! Answers every frame with a frame that has the same payload and the next identifier: `cargo run --example echo --
+//! URL`.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! A simulated SLCAN adapter at a pseudo-terminal, for hosts of any make: `cargo run --example slcan_adapter`. On its bus every
-//! frame is answered with its own payload under the next identifier.
+//! A simulated SLCAN adapter on a pseudo-terminal, for any host program: `cargo run --example slcan_adapter`. It
+//! answers every frame on its bus with a frame that has the same payload and the next identifier.
 
 #[cfg(unix)]
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
     });
-    // `line` is held so that the terminal stays when a host disconnects.
+    // `line` is kept open so that the terminal continues to exist after a host disconnects.
     println!("ready: {}", line.name().unwrap_or_default());
     let mut adapter = SlcanAdapter::new();
     loop {

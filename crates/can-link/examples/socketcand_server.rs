@@ -1,8 +1,9 @@
-//! A socketcand server with three buses, for clients of any make: `cargo run --example socketcand_server -- 127.0.0.1:29536`.
+//! A socketcand server with three buses, for any client program: `cargo run --example socketcand_server --
+//! 127.0.0.1:29536`.
 //!
-//! - `can0`: every frame is answered with its own payload under the next identifier;
-//! - `can1`: only the clients;
-//! - `busy`: a frame with a running number, 7F0, all the time.
+//! - `can0`: every frame is answered with a frame that has the same payload and the next identifier;
+//! - `can1`: connects only the clients;
+//! - `busy`: continuously sends frames with the identifier 7F0 and a running number.
 
 use std::time::Duration;
 

@@ -1,27 +1,29 @@
-//! The trait of all buses.
+//! The trait that all buses implement.
 
 use std::time::Duration;
 
 use crate::{CanError, CanFrame, ControllerState};
 
-/// A member of a CAN bus.
+/// A member on a CAN bus.
 ///
-/// Implementations deliver frames of every other member in the order of the bus, and none of their own.
+/// Implementations deliver the frames of all other members in the order of the bus, and none of their own frames.
 pub trait CanBus {
-    /// Sends a frame. Waits while the transmit queue is full; this is an error only if the queue stays full for seconds, for
-    /// example because no other member acknowledges.
+    /// Sends a frame. Waits while the transmit queue is full. Returns an error only if the queue stays full for
+    /// seconds, for example because no other member acknowledges.
     fn send(&mut self, frame: &CanFrame) -> Result<(), CanError>;
 
-    /// Returns the next frame of another member, or `None` if none came within `timeout`. Zero does not wait.
+    /// Returns the next frame of another member, or `None` if none arrived within `timeout`. With a timeout of zero it
+    /// does not wait.
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError>;
 
-    /// Returns the state of this member's controller, as far as it is known from the frames received so far.
+    /// Returns the state of this member's CAN controller, as far as the frames received so far show it.
     fn state(&mut self) -> ControllerState {
         ControllerState::default()
     }
 
-    /// Returns how often this member's controller has been bus-off, as far as it is known from the frames received so far. The
-    /// controller may be active again, but frames sent in between are lost. Does not ask the adapter; 0 if the adapter does not report it.
+    /// Returns how many times this member's CAN controller has been bus-off, as far as the frames received so far show
+    /// it. The controller may be active again, but frames sent in between are lost. Does not query the adapter; returns
+    /// 0 if the adapter does not report it.
     fn times_bus_off(&self) -> u64 {
         0
     }

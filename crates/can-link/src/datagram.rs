@@ -1,4 +1,4 @@
-//! A frame as one datagram of python-can's `udp_multicast`: a MessagePack map.
+//! A frame as one datagram in the format of python-can's `udp_multicast`: a MessagePack map.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CanFrame, Id};
 
-/// Longest datagram that python-can takes, bytes.
+/// Longest datagram that python-can accepts, bytes.
 pub(crate) const MAX_DATAGRAM: usize = 4096;
 
-/// The map as sent. python-can refuses maps with other keys.
+/// Map that is sent. python-can refuses maps with other keys.
 #[derive(Serialize)]
 struct Sent<'a> {
     timestamp: f64,
@@ -47,7 +47,7 @@ struct Received {
     _timestamp: Option<IgnoredAny>,
 }
 
-/// Returns the datagram of a frame, stamped with the time of day.
+/// Returns the datagram of a frame, with the current time as its timestamp.
 pub(crate) fn encode(frame: &CanFrame) -> Vec<u8> {
     #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -85,7 +85,7 @@ pub(crate) fn decode(datagram: &[u8]) -> Option<CanFrame> {
         return None;
     }
     if map.is_fd {
-        // python-can sends any length up to 64. On a wire the length would be the next one that CAN FD has.
+        // python-can sends any length up to 64. On a real bus the length would be rounded up to a length of CAN FD.
         return Some(CanFrame::fd_padded(id, data).ok()?.with_brs(map.bitrate_switch));
     }
     CanFrame::classic(id, data).ok().filter(|_| !map.bitrate_switch)

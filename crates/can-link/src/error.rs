@@ -9,18 +9,18 @@ use crate::url::UrlError;
 /// Reasons why a bus could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The URL is not valid.
+    /// The URL is invalid.
     #[error(transparent)]
     Url(#[from] UrlError),
-    /// A URL of a kind that this system cannot open.
+    /// This system cannot open buses of this kind.
     #[error("`{url}`: {kind} buses are those of the Linux kernel; this system has {}", crate::url::OPENABLE)]
     Unsupported {
         /// The URL.
         url: String,
-        /// Scheme.
+        /// Scheme of the URL.
         kind: &'static str,
     },
-    /// A rate that the adapter's protocol does not have.
+    /// The adapter's protocol does not support the rate.
     #[error("{url}: no {what} of {rate} bit/s; possible are {possible}")]
     Rate {
         /// The bus.
@@ -35,7 +35,7 @@ pub enum OpenError {
     /// The bus cannot be reached.
     #[error(transparent)]
     Attach(#[from] AttachError),
-    /// The bus was reached, but failed while it was set up.
+    /// The bus was reached, but its set-up failed.
     #[error(transparent)]
     SetUp(#[from] CanError),
 }
@@ -58,7 +58,7 @@ pub enum AttachError {
         /// The system's error.
         source: io::Error,
     },
-    /// No connection to a server.
+    /// The connection to a server failed.
     #[error("{url}: cannot connect: {source}; is the server running there, and is that its port?")]
     Connect {
         /// The bus.
@@ -116,7 +116,7 @@ pub enum CanError {
     /// The network interface has disappeared.
     #[error(transparent)]
     Interface(#[from] InterfaceError),
-    /// A frame that this bus cannot carry.
+    /// This kind of bus cannot transmit the frame.
     #[error("{url}: cannot carry {frame}: {why}")]
     NotCarried {
         /// The bus.
@@ -144,7 +144,7 @@ pub enum AnswerError {
         /// Answer.
         answer: String,
     },
-    /// The other side speaks another protocol, or does not answer.
+    /// The other side uses another protocol, or does not answer.
     #[error("{url}: no answer to {step} within {seconds} s; {hint}")]
     NoAnswer {
         /// The bus.

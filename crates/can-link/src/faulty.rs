@@ -1,4 +1,4 @@
-//! A bus with faults: loss, corruption, delay, duplication and reordering, from a seed.
+//! A bus with simulated faults, derived from a seed: loss, corruption, delay, duplication and reordering.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
-/// Faults of the frames in one direction. Probabilities are shares of 1 per frame.
+/// Faults of the frames in one direction. Probabilities are per frame, from 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultConfig {
@@ -16,9 +16,9 @@ pub struct FaultConfig {
     pub corruption: f64,
     /// Probability that a frame arrives twice.
     pub duplication: f64,
-    /// Probability that a frame is held back while others overtake it.
+    /// Probability that a frame is delayed so that later frames overtake it.
     pub reordering: f64,
-    /// Time for which such a frame is held back, s.
+    /// Time by which such a frame is delayed, s.
     pub reordering_hold_s: f64,
     /// Shortest delay of every frame, s; the order is kept.
     pub delay_min_s: f64,
@@ -30,7 +30,7 @@ pub struct FaultConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSchedule {
-    /// Seed: equal seeds give equal faults for equal frames.
+    /// Seed. The same seed and frames give the same faults.
     pub seed: u64,
     /// Faults of frames that the member sends.
     pub send: FaultConfig,
@@ -41,15 +41,15 @@ pub struct FaultSchedule {
 /// Counters of the faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FaultStats {
-    /// Frames that arrived.
+    /// Number of frames that arrived.
     pub frames: u64,
-    /// Lost frames.
+    /// Number of lost frames.
     pub lost: u64,
-    /// Corrupted frames.
+    /// Number of corrupted frames.
     pub corrupted: u64,
-    /// Duplicated frames.
+    /// Number of duplicated frames.
     pub doubled: u64,
-    /// Frames held back.
+    /// Number of frames delayed by reordering.
     pub reordered: u64,
 }
 
@@ -57,14 +57,14 @@ pub struct FaultStats {
 pub(crate) struct Line {
     faults: FaultConfig,
     random: fastrand::Rng,
-    /// Sorted by the time when they are due; equal times in order of arrival.
+    /// Sorted by the time at which they are due. Frames with equal times are in the order of their arrival.
     under_way: Vec<(Duration, CanFrame)>,
-    /// Frames that are not held back do not overtake each other.
+    /// Due time of the last frame. Frames that are not reordered do not overtake each other.
     last_due: Duration,
     stats: FaultStats,
 }
 
-/// Converts a setting in seconds; an invalid one means no delay.
+/// Converts a setting in seconds; an invalid value means no delay.
 fn seconds(value: f64) -> Duration {
     Duration::try_from_secs_f64(value).unwrap_or_default()
 }
@@ -75,8 +75,8 @@ impl Line {
         Self { faults, random, under_way: Vec::new(), last_due: Duration::ZERO, stats: FaultStats::default() }
     }
 
-    /// Adds a frame. Always draws the same number of random values in the same order, so that one setting does not change the faults of the
-    /// others.
+    /// Adds a frame. Always draws the same number of random values in the same order, so that changing one setting does
+    /// not change the faults from the other settings.
     pub(crate) fn put(&mut self, now: Duration, mut frame: CanFrame) {
         let FaultConfig { loss, corruption, duplication, reordering, .. } = self.faults;
         let [lose, corrupt, double, hold] =
@@ -135,7 +135,7 @@ impl Line {
     }
 }
 
-/// A bus whose frames from and to this member suffer faults.
+/// A bus with simulated faults of the frames to and from this member.
 ///
 /// ```
 /// use can_link::{FaultConfig, Faulty, FaultSchedule, VirtualBus};
@@ -143,7 +143,7 @@ impl Line {
 /// let bus = Faulty::new(VirtualBus::join("lossy"), schedule);
 /// ```
 ///
-/// Frames in transit to other members leave while this member sends or receives.
+/// Frames in transit to other members are delivered while this member sends or receives.
 pub struct Faulty<B> {
     bus: B,
     out: Line,
@@ -158,7 +158,8 @@ impl<B: CanBus> Faulty<B> {
         Self::with_clock(bus, schedule, move || start.elapsed())
     }
 
-    /// Creates the bus with delays by the caller's clock, which must not run backwards. Virtual time makes the delays repeatable.
+    /// Creates the bus with delays measured by the caller's clock, which must not run backwards. With virtual time the
+    /// delays are repeatable.
     pub fn with_clock(
         bus: B,
         schedule: FaultSchedule,
@@ -175,7 +176,7 @@ impl<B: CanBus> Faulty<B> {
         self.received.stats
     }
 
-    /// Returns the bus without faults; frames in transit are lost.
+    /// Returns the underlying bus; frames in transit are lost.
     pub fn into_inner(self) -> B {
         self.bus
     }
@@ -197,12 +198,12 @@ impl<B: CanBus> CanBus for Faulty<B> {
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let start = (self.clock)();
-        // Waiting is counted as well as measured, because a clock of virtual time may stand still during the wait.
+        // The wait is counted as well as measured, because a virtual clock may not advance during the wait.
         let mut waited = Duration::ZERO;
         loop {
             let now = (self.clock)();
             self.send_due(now)?;
-            // All frames that have arrived are put in order before the first is returned.
+            // All frames that have arrived are sorted before the first is returned.
             while let Some(frame) = self.bus.receive(Duration::ZERO)? {
                 self.received.put(now, frame);
             }
@@ -242,7 +243,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// A bench with a clock that only the test advances, in ms.
+    /// A test bench whose clock, in ms, only the test advances.
     struct Bench {
         faulty: Faulty<VirtualBus>,
         peer: VirtualBus,

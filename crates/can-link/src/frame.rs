@@ -1,8 +1,8 @@
-//! A CAN frame of any kind, always valid.
+//! A CAN frame of any kind. It is always valid.
 
 use std::fmt;
 
-/// An identifier of 11 or 29 bits.
+/// An 11-bit or 29-bit identifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Id {
     value: u32,
@@ -10,7 +10,7 @@ pub struct Id {
 }
 
 impl Id {
-    /// 11 bits.
+    /// Creates an 11-bit identifier.
     pub const fn standard(value: u32) -> Result<Self, InvalidFrame> {
         if value > 0x7FF {
             return Err(InvalidFrame::StandardId { value });
@@ -18,7 +18,7 @@ impl Id {
         Ok(Self { value, extended: false })
     }
 
-    /// 29 bits.
+    /// Creates a 29-bit identifier.
     pub const fn extended(value: u32) -> Result<Self, InvalidFrame> {
         if value > 0x1FFF_FFFF {
             return Err(InvalidFrame::ExtendedId { value });
@@ -26,12 +26,12 @@ impl Id {
         Ok(Self { value, extended: true })
     }
 
-    /// The number.
+    /// Returns the numeric value.
     pub const fn value(self) -> u32 {
         self.value
     }
 
-    /// 29 bits.
+    /// Returns `true` if the identifier has 29 bits.
     pub const fn is_extended(self) -> bool {
         self.extended
     }
@@ -50,18 +50,18 @@ enum Kind {
     Fd { brs: bool },
 }
 
-/// A classic, remote or CAN FD frame. The length is always valid for the kind of frame, so that every frame can be sent.
+/// A classic, remote or CAN FD frame. Its length is always valid for its kind, so every frame can be sent.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanFrame {
     id: Id,
     kind: Kind,
     len: u8,
-    /// Zero beyond `len`, so that equal frames have equal bytes.
+    /// Bytes beyond `len` are zero, so that equal frames have equal bytes.
     data: [u8; Self::MAX_LEN],
 }
 
 impl CanFrame {
-    /// Most bytes of a CAN FD frame.
+    /// Largest number of bytes in a CAN FD frame.
     pub const MAX_LEN: usize = 64;
 
     /// Creates a classic frame of at most 8 bytes.
@@ -94,7 +94,7 @@ impl CanFrame {
         Ok(Self { len: len as u8, ..Self::made(id, Kind::Remote, &[]) })
     }
 
-    /// Returns a CAN FD frame with or without bit rate switch; other frames stay as they are.
+    /// Sets or clears the bit rate switch of a CAN FD frame; other frames stay unchanged.
     pub fn with_brs(mut self, brs: bool) -> Self {
         if let Kind::Fd { .. } = self.kind {
             self.kind = Kind::Fd { brs };
@@ -102,7 +102,7 @@ impl CanFrame {
         self
     }
 
-    /// Returns the shortest CAN FD length that holds `len` bytes, or `None` above 64.
+    /// Returns the shortest CAN FD length of at least `len` bytes, or `None` above 64.
     pub const fn fd_len(len: usize) -> Option<usize> {
         match len {
             0..=8 => Some(len),
@@ -120,37 +120,37 @@ impl CanFrame {
         Self { id, kind, len: bytes.len() as u8, data }
     }
 
-    /// Returns the identifier with its width.
+    /// Returns the identifier.
     pub const fn id(&self) -> Id {
         self.id
     }
 
-    /// Returns true if the identifier has 29 bits.
+    /// Returns `true` if the identifier has 29 bits.
     pub const fn is_extended(&self) -> bool {
         self.id.extended
     }
 
-    /// Returns true for a CAN FD frame.
+    /// Returns `true` for a CAN FD frame.
     pub const fn is_fd(&self) -> bool {
         matches!(self.kind, Kind::Fd { .. })
     }
 
-    /// Returns true if the data phase has its own bit rate.
+    /// Returns `true` if the frame has the bit rate switch set.
     pub const fn is_brs(&self) -> bool {
         matches!(self.kind, Kind::Fd { brs: true })
     }
 
-    /// Returns true for a remote frame, which has no payload.
+    /// Returns `true` for a remote frame, which has no payload.
     pub const fn is_remote(&self) -> bool {
         matches!(self.kind, Kind::Remote)
     }
 
-    /// Returns the number of bytes of the payload, or those that a remote frame requests.
+    /// Returns the number of payload bytes; for a remote frame, the number of bytes it requests.
     pub const fn len(&self) -> usize {
         self.len as usize
     }
 
-    /// Returns true if the length is 0.
+    /// Returns `true` if the length is 0.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -166,7 +166,7 @@ impl CanFrame {
     }
 }
 
-/// Prints a frame as `candump` does: `123 # 11 22`, CAN FD with `##`, remote frames with `# R2`.
+/// Prints a frame in the format of `candump`: `123 # 11 22`, CAN FD with `##`, remote frames with `# R2`.
 impl fmt::Display for CanFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} {}", self.id, if self.is_fd() { "##" } else { "#" })?;
@@ -183,40 +183,40 @@ impl fmt::Debug for CanFrame {
     }
 }
 
-/// Reasons why a frame is not valid.
+/// Reasons why a frame is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidFrame {
-    /// More than 11 bits.
+    /// An 11-bit identifier with a larger value.
     #[error("identifier 0x{value:X} has more than 11 bits (0x7FF); is it an extended one?")]
     StandardId {
         /// The number.
         value: u32,
     },
-    /// More than 29 bits.
+    /// A 29-bit identifier with a larger value.
     #[error("identifier 0x{value:X} has more than 29 bits (0x1FFFFFFF)")]
     ExtendedId {
         /// The number.
         value: u32,
     },
-    /// More than 8 bytes.
+    /// A classic frame with more than 8 bytes.
     #[error("frame {id}: {len} bytes, but a classic frame has at most 8; use CAN FD")]
     ClassicLength {
         /// Identifier.
         id: Id,
-        /// Bytes.
+        /// Number of bytes.
         len: usize,
     },
-    /// Not a length of CAN FD.
+    /// A length that CAN FD does not have.
     #[error("frame {id}: {len} bytes, but a CAN FD frame has 0..8, 12, 16, 20, 24, 32, 48 or 64")]
     FdLength {
         /// Identifier.
         id: Id,
-        /// Bytes.
+        /// Number of bytes.
         len: usize,
     },
 }
 
-/// Any frame, for tests.
+/// Strategy for arbitrary frames in tests.
 #[cfg(test)]
 pub(crate) fn any_frame() -> impl proptest::strategy::Strategy<Value = CanFrame> {
     use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! CAN over UDP multicast, as python-can's `udp_multicast` interface speaks it.
+//! CAN over UDP multicast, compatible with python-can's `udp_multicast` interface.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -9,7 +9,7 @@ use socket2::{Domain, Protocol, Socket, Type};
 use crate::datagram::{MAX_DATAGRAM, decode, encode};
 use crate::{AttachError, CanBus, CanError, CanFrame, CanUrl};
 
-/// Bytes that may wait in the system for this member: some 4,000 frames.
+/// Bytes that the system may buffer for this member, about 4,000 frames.
 const RECEIVE_BUFFER: usize = 2 << 20;
 
 /// Longest wait for space in the system's queue when sending.
@@ -17,24 +17,24 @@ const SEND_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// A member of a multicast group.
 ///
-/// UDP loses frames when a member is too slow; this suits simulators and tools on one host.
+/// UDP loses frames if a member is too slow. Suitable for simulators and tools on one computer.
 pub struct MulticastBus {
     url: String,
-    /// Listens at the group's port, which all members share.
+    /// Socket that listens at the group's port, which all members share.
     listener: UdpSocket,
-    /// Sends from a port of its own, so that its datagrams can be distinguished from those of others.
+    /// Socket that sends from its own port, so that the datagrams of this member can be distinguished from others.
     sender: UdpSocket,
     own: SocketAddr,
-    /// Timeout of the listener: `None` does not wait.
+    /// Timeout of the listener; with `None` it does not wait.
     timeout: Option<Duration>,
     ignored: u64,
 }
 
 impl MulticastBus {
-    /// Joins a group. With `ttl` 0 frames stay on this host; 1 lets them into the local network.
+    /// Joins a group. With `ttl` 0 frames stay on this computer; with 1 they can reach the local network.
     pub fn join(group: IpAddr, port: u16, ttl: u8) -> Result<Self, AttachError> {
         let failed = |(step, source)| AttachError::Join { group, port, step, source };
-        // A host without a network has no default interface, but may still communicate with itself by IPv4.
+        // A computer without a network has no default interface, but can still communicate with itself by IPv4.
         let (listener, sender) = open_sockets(group, port, ttl, Ipv4Addr::UNSPECIFIED)
             .or_else(|first| open_sockets(group, port, ttl, Ipv4Addr::LOCALHOST).map_err(|_| first))
             .map_err(failed)?;
@@ -43,7 +43,7 @@ impl MulticastBus {
         Ok(Self { url, listener, sender, own, timeout: None, ignored: 0 })
     }
 
-    /// Returns the number of datagrams so far that were not frames.
+    /// Returns the number of datagrams received so far that did not contain a frame.
     pub fn ignored(&self) -> u64 {
         self.ignored
     }
@@ -53,7 +53,7 @@ impl MulticastBus {
         move |source| CanError::Io { url, step, source }
     }
 
-    /// Sets the timeout of the listener if it changes, which is rare.
+    /// Sets the timeout of the listener only if it changes, which is rare.
     fn set_timeout(&mut self, timeout: Option<Duration>) -> io::Result<()> {
         if timeout == self.timeout {
             return Ok(());
@@ -68,11 +68,12 @@ impl MulticastBus {
         Ok(())
     }
 
-    /// Receives the next datagram of another sender.
+    /// Receives the next datagram from another sender.
     fn next(&mut self, buffer: &mut [u8]) -> io::Result<Option<usize>> {
         loop {
             match self.listener.recv_from(buffer) {
-                // The scope of an IPv6 address is not always reported.
+                // The system does not always report the scope of an IPv6 address, so only address and port are
+                // compared.
                 Ok((_, from)) if (from.ip(), from.port()) == (self.own.ip(), self.own.port()) => {}
                 Ok((len, _)) => return Ok(Some(len)),
                 Err(error) if is_no_data(&error) => return Ok(None),
@@ -93,13 +94,14 @@ fn step<T>(what: &'static str, result: io::Result<T>) -> Step<T> {
     result.map_err(|error| (what, error))
 }
 
-/// Opens the listener and the sender. IPv4 groups use the given interface, IPv6 groups the default one.
+/// Opens the listener and the sender. IPv4 groups use the given interface, IPv6 groups the default interface.
 fn open_sockets(group: IpAddr, port: u16, ttl: u8, interface: Ipv4Addr) -> Step<(UdpSocket, UdpSocket)> {
     let listener = step("opening a socket", udp(group))?;
     step("sharing the port", share_port(&listener))?;
-    // A larger buffer is better but not needed.
+    // A larger buffer is better but not necessary.
     let _ = listener.set_recv_buffer_size(RECEIVE_BUFFER);
-    // Bound to the group, the listener receives nothing of other groups; Windows only binds to own addresses.
+    // If bound to the group, the listener receives no datagrams of other groups. Windows can only bind to its own
+    // addresses.
     let address = if cfg!(windows) { unspecified(group) } else { group };
     step("binding the port", listener.bind(&SocketAddr::new(address, port).into()))?;
 
@@ -171,7 +173,8 @@ impl CanBus for MulticastBus {
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
         let mut buffer = [0; MAX_DATAGRAM];
         let deadline = Instant::now().checked_add(timeout);
-        // For a datagram that has already arrived, the settings of the socket need not change.
+        // The first attempt does not wait, so that the socket settings stay unchanged if a datagram has already
+        // arrived.
         let mut wait = None;
         loop {
             self.set_timeout(wait).map_err(self.failed("setting the timeout"))?;
@@ -192,9 +195,9 @@ impl CanBus for MulticastBus {
     }
 }
 
-/// Returns true if the queue of the interface or of the socket is full, which is temporary.
+/// Returns `true` if the queue of the interface or of the socket is full, which is temporary.
 fn is_queue_full(error: &io::Error) -> bool {
-    // ENOBUFS has no kind of its own; 105 is Linux, 55 the BSDs and macOS, 10055 Windows.
+    // Rust has no error kind for ENOBUFS. Its number is 105 on Linux, 55 on the BSDs and macOS, 10055 on Windows.
     let code = if cfg!(windows) {
         10055
     } else if cfg!(target_os = "linux") {
@@ -211,7 +214,7 @@ mod tests {
     use super::*;
     use crate::Id;
 
-    /// Receives a frame with a timeout that only a broken transport reaches.
+    /// Receives a frame. The timeout is so long that only a broken transport reaches it.
     fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }
@@ -247,7 +250,7 @@ mod tests {
         assert_eq!(b.receive(Duration::from_millis(2)).unwrap(), None);
     }
 
-    // Each test has its own ports, which differ from run to run, so that parallel runs do not meet.
+    // Each test has its own ports, which differ from run to run, so that parallel runs do not use the same ports.
     fn port(number: u16) -> u16 {
         20_000 + (std::process::id() % 10_000) as u16 * 4 + number
     }

@@ -1,15 +1,15 @@
-//! Opens a bus of any kind from its URL: the one place that knows all transports.
+//! Opens a bus of any kind from its URL. Only this module knows all transports.
 
 #[cfg(target_os = "linux")]
 use crate::AttachError;
 use crate::{CanBus, CanUrl, MulticastBus, OpenError, SlcanBus, SlcanOptions, SocketcandBus, VirtualBus};
 
-/// Opens the bus of a URL such as `multicast:239.74.163.2:43113` or `virtual:bench`.
+/// Opens the bus with a URL such as `multicast:239.74.163.2:43113` or `virtual:bench`.
 pub fn open(url: &str) -> Result<Box<dyn CanBus + Send>, OpenError> {
     open_url(&url.parse()?)
 }
 
-/// Opens the bus of a parsed URL.
+/// Opens the bus with a parsed URL.
 pub fn open_url(url: &CanUrl) -> Result<Box<dyn CanBus + Send>, OpenError> {
     match url {
         CanUrl::Virtual { name } => Ok(Box::new(VirtualBus::join(name))),

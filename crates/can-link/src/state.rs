@@ -10,16 +10,16 @@ pub enum ErrorState {
     Unknown,
     /// Error active: no error counter has reached 96.
     Active,
-    /// An error counter has reached 96.
+    /// An error counter has reached 96, but none is above 127.
     Warning,
-    /// Error passive: an error counter is above 127; the controller no longer destroys frames of others.
+    /// Error passive: an error counter is above 127. The controller no longer destroys frames of other members.
     Passive,
-    /// The transmit error counter was above 255: the controller has left the bus.
+    /// Bus-off: the transmit error counter was above 255, and the controller has left the bus.
     BusOff,
 }
 
 impl ErrorState {
-    /// Returns the state that belongs to these error counters.
+    /// Returns the error state for these error counters.
     pub const fn of_counters(tec: u16, rec: u16) -> Self {
         let worst = if tec > rec { tec } else { rec };
         match (tec, worst) {
@@ -46,7 +46,7 @@ impl fmt::Display for ErrorState {
 /// Error state and error counters of a CAN controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ControllerState {
-    /// State by the counters.
+    /// Error state.
     pub errors: ErrorState,
     /// Transmit error counter, if the adapter reports it.
     pub tec: Option<u16>,
@@ -60,13 +60,13 @@ impl ControllerState {
         Self { errors, tec: None, rec: None }
     }
 
-    /// Creates the state of these counters.
+    /// Creates the state for these counters.
     pub const fn of_counters(tec: u16, rec: u16) -> Self {
         Self { errors: ErrorState::of_counters(tec, rec), tec: Some(tec), rec: Some(rec) }
     }
 }
 
-/// `error passive (TEC 136, REC 0)`.
+/// Prints the state as in `error passive (TEC 136, REC 0)`.
 impl fmt::Display for ControllerState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.tec, self.rec) {

@@ -1,4 +1,4 @@
-//! CAN URLs, which name a bus in one word of a command line.
+//! CAN URLs, which identify a bus in one word of a command line.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -6,53 +6,54 @@ use std::str::FromStr;
 
 use crate::{SOCKETCAND_PORT, SlcanOptions};
 
-/// URL forms that every system opens, for error messages.
+/// URL forms that can be opened on every system, for error messages.
 pub(crate) const OPENABLE: &str =
     "slcan:DEVICE@RATE, socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME";
 
 /// Default port of python-can's `udp_multicast`.
 const MULTICAST_PORT: u16 = 43113;
 
-/// A parsed CAN URL. `Display` gives the URL again.
+/// A parsed CAN URL. `Display` prints the URL again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CanUrl {
-    /// `socketcan:can0`.
+    /// `socketcan:can0`: an interface of the Linux kernel.
     SocketCan {
         /// Network interface.
         interface: String,
     },
-    /// `slcan:/dev/ttyACM0@1000000`; `?data=N` sets the bit rate of CAN FD's data phase, `?baud=N` that of the line.
+    /// `slcan:/dev/ttyACM0@1000000`; `?data=N` sets the bit rate of the CAN FD data phase, `?baud=N` the rate of the
+    /// serial line.
     Slcan {
         /// Serial port, or `tcp:HOST:PORT`.
         device: String,
-        /// Bit rate of the bus after the `@`, bit/s; `None` leaves the adapter's own.
+        /// Bit rate of the bus after the `@`, bit/s; with `None` the adapter's own setting stays.
         rate: Option<u32>,
-        /// Bit rate of the data phase, bit/s; none leaves the adapter's own.
+        /// Bit rate of the data phase, bit/s; with `None` the adapter's own setting stays.
         data_rate: Option<u32>,
         /// Rate of the serial line, bit/s.
         baud: u32,
     },
-    /// `socketcand:HOST:PORT/can0`; the port may be left out.
+    /// `socketcand:HOST:PORT/can0`; the port may be omitted.
     Socketcand {
-        /// Name or address; an IPv6 address without its brackets.
+        /// Name or address of the server; an IPv6 address without brackets.
         host: String,
         /// TCP port.
         port: u16,
-        /// The server's bus.
+        /// Bus of the server.
         channel: String,
     },
-    /// `multicast:ADDR:PORT`, IPv6 addresses in brackets; `?ttl=N` lets frames leave this host.
+    /// `multicast:ADDR:PORT`, with IPv6 addresses in brackets; `?ttl=N` permits frames to leave this computer.
     Multicast {
         /// Multicast group.
         group: IpAddr,
         /// UDP port.
         port: u16,
-        /// Maximum number of routers on the path, plus one; 0 stays on this host.
+        /// Maximum number of routers on the path, plus one; with 0, frames stay on this computer.
         ttl: u8,
     },
-    /// `virtual:NAME`.
+    /// `virtual:NAME`: a bus inside this process.
     Virtual {
-        /// Name of the bus in this process.
+        /// Name of the bus.
         name: String,
     },
 }
@@ -73,7 +74,7 @@ impl CanUrl {
 /// Reasons why a text is not a valid CAN URL.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum UrlError {
-    /// No scheme, or an unknown one.
+    /// The text has no scheme, or an unknown one.
     #[error(
         "`{url}` is no CAN URL; there are socketcan:can0, slcan:/dev/ttyACM0@1000000, \
          socketcand:HOST:PORT/can0, multicast:ADDR:PORT and virtual:NAME"
@@ -82,12 +83,12 @@ pub enum UrlError {
         /// The text.
         url: String,
     },
-    /// A part is missing or not valid.
+    /// A part is missing or invalid.
     #[error("`{url}`: {what}; the form is {form}")]
     Part {
         /// The text.
         url: String,
-        /// Error.
+        /// Description of the error.
         what: &'static str,
         /// Required form.
         form: &'static str,

@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use crate::{CanBus, CanError, CanFrame, ControllerState, ErrorState};
 
-/// Maximum number of frames that wait for a member.
+/// Maximum number of frames waiting for a member.
 const QUEUE: usize = 4096;
 
 /// Default time for which a sender waits for a member whose queue is full.
 const TIMEOUT: Duration = Duration::from_millis(100);
 
-/// Bus without a name, joined through its handle.
+/// A bus without a name, joined through this handle.
 ///
 /// ```
 /// use std::time::Duration;
@@ -31,7 +31,7 @@ pub struct VirtualHub {
 struct Shared {
     timeout: Duration,
     state: Mutex<State>,
-    /// Notified if an entry was put into or taken from a queue.
+    /// Notified when an entry was put into or taken out of a queue.
     changed: Condvar,
 }
 
@@ -47,24 +47,25 @@ struct State {
     members: BTreeMap<u64, Member>,
 }
 
-/// Entries that wait for a member, in the order of arrival.
+/// An entry that waits for a member. Entries are in the order of arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Received {
     /// A frame of another member.
     Frame(CanFrame),
-    /// State of its own controller.
+    /// Error state of the member's own controller.
     State(ErrorState),
 }
 
 struct Member {
     waiting: VecDeque<Received>,
-    /// Maximum number of frames that wait.
+    /// Maximum number of waiting frames.
     limit: usize,
-    /// No sender waits for the member, because a sender waited in vain and the member has taken no entry since, or because it is a guest.
+    /// `true` if no sender waits for the member: it is a guest, or a sender waited in vain and the member has taken no
+    /// entry since then.
     stalled: bool,
-    /// No sender ever waits for the member.
+    /// `true` if no sender ever waits for the member.
     guest: bool,
-    /// The member receives nothing at present.
+    /// `true` if the member receives nothing at present.
     deaf: bool,
     missed: u64,
 }
@@ -89,7 +90,7 @@ impl Member {
         }
     }
 
-    /// States are few and are never missed.
+    /// Adds a state to the queue. There are few states, so they are never dropped.
     fn becomes(&mut self, state: ErrorState) {
         if !self.deaf {
             self.waiting.push_back(Received::State(state));
@@ -114,18 +115,20 @@ impl VirtualHub {
         Self::default()
     }
 
-    /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames is full. A member
-    /// that takes nothing for that long misses frames from then on until it takes one: a slow member must not stop the bus for the others.
+    /// Creates a bus on which a sender waits up to `timeout` (default: 100 ms) for a member whose queue of 4096 frames
+    /// is full. If the member takes no frame for that time, it misses frames until it takes one, so that a slow member
+    /// does not stop the bus for the others.
     pub fn with_timeout(timeout: Duration) -> Self {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// Adds a member; it receives frames that are sent from now on.
+    /// Adds a member. It receives all frames that are sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
 
-    /// Adds a member for which no sender ever waits. The member misses frames beyond `limit`, and is deaf at first.
+    /// Adds a member for which no sender ever waits. The member misses frames if more than `limit` are waiting, and
+    /// receives nothing until it is enabled.
     pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
         self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
     }
@@ -139,7 +142,7 @@ impl VirtualHub {
         VirtualBus { membership: Arc::new(membership) }
     }
 
-    /// Gives a frame to one member, without waiting for it.
+    /// Delivers a frame to one member without waiting for it.
     pub(crate) fn deliver_to(&self, frame: &CanFrame, number: u64) {
         if let Some(member) = self.shared.state().members.get_mut(&number) {
             member.deliver(frame);
@@ -147,7 +150,7 @@ impl VirtualHub {
         self.shared.changed.notify_all();
     }
 
-    /// Reports to one member the state of its own controller, between the frames before and after.
+    /// Reports to one member the state of its own controller, in order with the frames.
     pub(crate) fn report_state(&self, state: ErrorState, number: u64) {
         if let Some(member) = self.shared.state().members.get_mut(&number) {
             member.becomes(state);
@@ -155,7 +158,7 @@ impl VirtualHub {
         self.shared.changed.notify_all();
     }
 
-    /// Puts a frame on the bus for all members but one, without waiting for any.
+    /// Puts a frame on the bus for all members except one, without waiting for any of them.
     pub(crate) fn deliver(&self, frame: &CanFrame, except: Option<u64>) {
         let mut state = self.shared.state();
         for (number, member) in &mut state.members {
@@ -168,7 +171,7 @@ impl VirtualHub {
     }
 }
 
-/// Named buses that have members.
+/// All named buses that have members.
 static NAMED: Mutex<BTreeMap<String, Weak<Shared>>> = Mutex::new(BTreeMap::new());
 
 /// A member of a bus inside this process.
@@ -176,14 +179,14 @@ pub struct VirtualBus {
     membership: Arc<Membership>,
 }
 
-/// The member leaves the bus with the last handle.
+/// Membership of a member; the member leaves the bus when its last handle is dropped.
 struct Membership {
     shared: Arc<Shared>,
     number: u64,
 }
 
 impl VirtualBus {
-    /// Joins the bus of a name, which exists as long as it has members.
+    /// Joins the bus with this name, which exists as long as it has members.
     pub fn join(name: &str) -> Self {
         let mut named = NAMED.lock().unwrap_or_else(PoisonError::into_inner);
         named.retain(|_, bus| bus.strong_count() > 0);
@@ -192,7 +195,7 @@ impl VirtualBus {
         VirtualHub { shared }.join()
     }
 
-    /// Returns the number of frames that this member missed because it did not take them.
+    /// Returns the number of frames that this member missed because it did not take them in time.
     pub fn missed(&self) -> u64 {
         self.shared().state().members.get(&self.number()).map_or(0, |member| member.missed)
     }
@@ -206,12 +209,12 @@ impl VirtualBus {
         self.membership.number
     }
 
-    /// Returns a handle of this member for another thread.
+    /// Returns a second handle of this member, for another thread.
     pub(crate) fn second_handle(&self) -> Self {
         Self { membership: Arc::clone(&self.membership) }
     }
 
-    /// Stops or starts receiving; waiting frames are dropped when it stops.
+    /// Stops or starts receiving. When it stops, waiting frames are dropped.
     pub(crate) fn set_deaf(&self, deaf: bool) {
         if let Some(member) = self.shared().state().members.get_mut(&self.number()) {
             member.deaf = deaf;
@@ -221,13 +224,14 @@ impl VirtualBus {
         }
     }
 
-    /// Leaves the bus with all handles.
+    /// Leaves the bus, for all handles of the member.
     pub(crate) fn leave(&self) {
         self.shared().state().members.remove(&self.number());
         self.shared().changed.notify_all();
     }
 
-    /// Waits for frames and states and moves at most `most` of them to `received`; false when it has left the bus.
+    /// Waits for frames and states, and moves at most `most` of them to `received`. Returns `false` if the member has
+    /// left the bus.
     pub(crate) fn take_some(&self, most: usize, timeout: Duration, received: &mut Vec<Received>) -> bool {
         let mut state = self.shared().state();
         let deadline = Instant::now() + timeout;
@@ -254,7 +258,8 @@ impl CanBus for VirtualBus {
         let shared = self.shared();
         let give_up = Instant::now().checked_add(shared.timeout);
         let mut state = shared.state();
-        // Waits for the slowest member before any member gets the frame, so that all members see the same order.
+        // Waits for the slowest member before any member gets the frame, so that all members receive frames in the same
+        // order.
         loop {
             let blocks = |(number, member): (&u64, &Member)| {
                 *number != self.number() && member.full() && !member.stalled && !member.deaf
@@ -276,7 +281,7 @@ impl CanBus for VirtualBus {
     }
 
     fn receive(&mut self, timeout: Duration) -> Result<Option<CanFrame>, CanError> {
-        // A timeout beyond the clock's range counts as no timeout.
+        // A timeout that the clock cannot represent is treated as no timeout.
         let deadline = Instant::now().checked_add(timeout);
         let shared = self.shared();
         let mut state = shared.state();
@@ -300,7 +305,7 @@ impl CanBus for VirtualBus {
         }
     }
 
-    /// A bus inside a process has no errors.
+    /// A bus inside a process has no transmission errors.
     fn state(&mut self) -> ControllerState {
         ControllerState::of_counters(0, 0)
     }

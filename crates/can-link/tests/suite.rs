@@ -1,3 +1,3 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! The tests of the crate in one program, so that only one program is linked. Each file here is a module of it.
 mod buses;
 mod fuzz_regressions;

@@ -1,4 +1,4 @@
-//! The adapter's side, for tests and simulators.
+//! The adapter's side of the protocol, for tests and simulators.
 
 use std::io::{self, Read, Write};
 
@@ -6,12 +6,12 @@ use super::line::{BELL, Lines, Piece, flags, parse_frame, push_frame};
 use super::options::{BIT_RATES, DATA_RATES};
 use crate::{CanBus, CanError, CanFrame, ControllerState};
 
-/// Bytes that wait for a host that does not read; beyond that frames are lost, as in a small adapter.
+/// Largest number of bytes that wait for a host that does not read. Further frames are lost, as in a small adapter.
 const OUTPUT: usize = 256 * 1024;
-/// Frames of the bus taken in one turn.
+/// Largest number of frames taken from the bus in one turn.
 const MOST: usize = 64;
 
-/// A simulated SLCAN adapter without a port and a thread: it takes bytes and returns bytes.
+/// A simulated SLCAN adapter without a port and without a thread: it accepts bytes and returns bytes.
 ///
 /// ```
 /// use can_link::SlcanAdapter;
@@ -36,17 +36,17 @@ pub struct SlcanAdapter {
 }
 
 impl SlcanAdapter {
-    /// Creates a closed adapter without a rate.
+    /// Creates a closed adapter whose bit rate is not set.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Takes bytes from the host. `send` gets the host's frames and returns true if the bus has taken them. If not, the adapter refuses the
-    /// frame with a bell, as an adapter whose queue is full.
+    /// Processes bytes from the host. `send` is called with the host's frames and returns `true` if the bus has
+    /// accepted a frame. Otherwise the adapter refuses the frame with a bell, as an adapter with a full queue does.
     pub fn input(&mut self, mut bytes: &[u8], mut send: impl FnMut(&CanFrame) -> bool) {
         let mut lines = self.lines.take().unwrap_or_else(Lines::new);
         while let Some(piece) = lines.next(&mut bytes) {
-            // Only the adapter sends a bell.
+            // Only the adapter sends a bell, so a bell from the host is ignored.
             if let Piece::Line(line) = piece {
                 self.execute(line, &mut send);
             }
@@ -76,12 +76,12 @@ impl SlcanAdapter {
         self.state = state;
     }
 
-    /// Takes the bytes for the host.
+    /// Returns the bytes for the host, and removes them from the adapter.
     pub fn take_output(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.output)
     }
 
-    /// Returns true if the host has opened its channel.
+    /// Returns `true` if the host has opened the adapter's channel.
     pub fn is_open(&self) -> bool {
         self.open
     }
@@ -91,13 +91,13 @@ impl SlcanAdapter {
         (self.rate, self.data_rate)
     }
 
-    /// Returns the number of frames of the bus that were lost because the host did not read.
+    /// Returns the number of frames from the bus that were lost because the host did not read.
     pub fn lost(&self) -> u64 {
         self.lost
     }
 
-    /// Exchanges once between a host and a bus: carries out the host's commands and reports the frames of the bus. The port's reads and
-    /// writes must not wait for long.
+    /// Runs one exchange between a host and a bus: executes the host's commands and reports the frames of the bus. The
+    /// port's reads and writes must not wait for long.
     pub fn turn(
         &mut self,
         port: &mut (impl Read + Write),
@@ -131,7 +131,7 @@ impl SlcanAdapter {
 
     fn execute(&mut self, line: &str, send: &mut impl FnMut(&CanFrame) -> bool) {
         let Some((command, rest)) = line.split_at_checked(1) else {
-            // An empty line, as hosts send them to clear earlier input.
+            // An empty line, which hosts send to clear earlier input.
             return self.reply("\r");
         };
         let digit = rest.parse::<usize>().ok().filter(|_| rest.len() == 1);
@@ -187,15 +187,15 @@ impl SlcanAdapter {
 /// Reasons why a turn of an adapter failed.
 #[derive(Debug, thiserror::Error)]
 pub enum AdapterError {
-    /// The host's side.
+    /// Reading from or writing to the host failed.
     #[error("the serial line failed: {0}")]
     Port(#[from] io::Error),
-    /// The bus.
+    /// The bus failed.
     #[error(transparent)]
     Bus(CanError),
 }
 
-/// Converts a read or write without data to 0; it is not an error.
+/// Converts a read or write that found no data or no space to 0, because it is not an error.
 fn waited(result: io::Result<usize>) -> io::Result<usize> {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     result.or_else(|error| match error.kind() {

@@ -1,4 +1,4 @@
-//! The host's side: an adapter at a serial port as a bus.
+//! The host's side of the protocol: an adapter on a serial port as a bus.
 
 use std::collections::VecDeque;
 use std::io;
@@ -10,21 +10,21 @@ use super::port::Port;
 
 use crate::{AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, OpenError};
 
-/// Longest time for an adapter to answer its first question; it may still be starting.
+/// Longest wait for the answer to the first version request; the adapter may still be starting.
 const VERSION_TIMEOUT: Duration = Duration::from_secs(1);
-/// Number of these questions.
+/// Number of version requests.
 const VERSION_QUESTIONS: u32 = 3;
-/// Longest time for other answers of an adapter.
+/// Longest wait for other answers of an adapter.
 const ANSWER: Duration = Duration::from_millis(500);
-/// Time after which data of an earlier user have arrived.
+/// Time after which all data for an earlier user have arrived.
 const QUIET: Duration = Duration::from_millis(30);
-/// Longest time for which an adapter may refuse a frame because its queue is full, or keep its answer.
+/// Longest time for which an adapter may refuse a frame because its queue is full, or delay its answer.
 const SEND_TIMEOUT: Duration = Duration::from_secs(2);
-/// Pause before a refused frame is tried again.
+/// Pause before a refused frame is sent again.
 const RETRY: Duration = Duration::from_millis(1);
-/// Slices of waiting in which both directions get their turn.
+/// Length of the slices in which a wait handles both directions.
 const SLICE: Duration = Duration::from_millis(20);
-/// Received frames that are kept during a wait for an answer.
+/// Largest number of received frames that are stored while waiting for an answer.
 const RECEIVE_QUEUE: usize = 100_000;
 
 /// An adapter's answer to a command.
@@ -38,32 +38,33 @@ enum Answer {
 struct Outstanding {
     line: String,
     since: Instant,
-    /// Time at which it was last written.
+    /// Time at which the frame was last written.
     written: Instant,
-    /// `true` if the adapter has refused the frame since.
+    /// `true` if the adapter has refused the frame since then.
     refused: bool,
 }
 
 /// Bus of an SLCAN adapter.
 ///
-/// An adapter that confirms frames gets the next frame after the confirmation. A refused frame is sent again, because the queue of the
-/// adapter is full. To adapters that never answer, frames are written as fast as the line takes them.
+/// If the adapter confirms frames, each frame is sent after the confirmation of the previous one. A refused frame is
+/// sent again, because the adapter's queue was full. If the adapter never answers, frames are written as fast as the
+/// line accepts them.
 pub struct SlcanBus {
     url: String,
     port: Port,
     lines: Lines,
     receive_queue: VecDeque<CanFrame>,
-    /// The adapter answers commands.
+    /// `true` if the adapter answers commands.
     answers: bool,
-    /// Confirmations of frames have come.
+    /// `true` if the adapter has confirmed a frame.
     confirms: bool,
     last_answer: Option<Answer>,
     outstanding: Option<Outstanding>,
     state: ControllerState,
-    /// The adapter answers `F`; unknown until it was asked.
+    /// `true` if the adapter supports the command `F`; `None` before it was asked.
     has_flags: Option<bool>,
     got_flags: bool,
-    /// A line was received that is of no other known kind, such as the version.
+    /// `true` if a line was received that is of no other known kind, such as the version.
     got_text: bool,
     closed: bool,
 }
@@ -128,7 +129,7 @@ impl SlcanBus {
 
     /// Closes a channel that an earlier user left open, and checks that an adapter answers.
     fn check_presence(&mut self) -> Result<(), CanError> {
-        // The first end of line ends earlier input.
+        // The first carriage return ends earlier input.
         self.write(b"\rC\r")?;
         let end = Instant::now() + ANSWER;
         while self.take_in(QUIET)? && Instant::now() < end {}
@@ -139,12 +140,12 @@ impl SlcanBus {
             let end = Instant::now() + VERSION_TIMEOUT;
             while Instant::now() < end {
                 somebody |= self.take_in(SLICE)?;
-                // The version is a text: earlier answers belong to earlier lines.
+                // The version is a text, so it cannot be an answer to an earlier line.
                 if self.got_text {
                     return Ok(());
                 }
             }
-            // The adapter does not know the question, but is present.
+            // The adapter does not know the request, but it is present.
             if somebody {
                 return Ok(());
             }
@@ -155,7 +156,7 @@ impl SlcanBus {
             .into())
     }
 
-    /// Sends a command. If the adapter never answers, the command counts as carried out.
+    /// Sends a command. If the adapter never answers, the command is assumed to be executed.
     fn set(&mut self, step: &'static str, line: &str) -> Result<(), CanError> {
         self.last_answer = None;
         self.write(line.as_bytes())?;
@@ -185,7 +186,7 @@ impl SlcanBus {
         }
     }
 
-    /// Reads bytes that come within `timeout`; returns `true` if any came.
+    /// Reads bytes that arrive within `timeout`; returns `true` if there were any.
     fn take_in(&mut self, timeout: Duration) -> Result<bool, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -209,7 +210,7 @@ impl SlcanBus {
                         self.state = state;
                     } else if let Some(state) = parse_flags(line) {
                         self.got_flags = true;
-                        // Counters of a state that the adapter reported by itself stay as long as they fit.
+                        // The counters that the adapter reported are kept as long as they agree with the state.
                         if self.state.errors != state.errors {
                             self.state = state;
                         }
@@ -244,7 +245,7 @@ impl SlcanBus {
                 Ok(0) if Instant::now() >= give_up => {
                     return Err(self.broken("sending", io::ErrorKind::TimedOut.into()));
                 }
-                // The adapter may be waiting for this host to read.
+                // The adapter may be waiting until this host reads.
                 Ok(0) if self.receive_queue.len() < RECEIVE_QUEUE => {
                     self.take_in(SLICE)?;
                 }
@@ -259,7 +260,8 @@ impl SlcanBus {
         Ok(())
     }
 
-    /// Handles the unconfirmed frame: writes a refused one again. Returns `true` if no frame is unconfirmed.
+    /// Handles the unconfirmed frame, and writes it again if it was refused. Returns `true` if there is no unconfirmed
+    /// frame.
     fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
         let Some(frame) = &mut self.outstanding else { return Ok(true) };
         let late = now.saturating_duration_since(frame.since) >= SEND_TIMEOUT;
@@ -341,7 +343,7 @@ impl CanBus for SlcanBus {
         }
     }
 
-    /// Asks the adapter if it supports the command `F`.
+    /// Asks the adapter for its state with the command `F`, if the adapter supports it.
     fn state(&mut self) -> ControllerState {
         if self.has_flags == Some(false) || !self.answers || self.wait_for_confirmation().is_err() {
             return self.state;
@@ -350,7 +352,7 @@ impl CanBus for SlcanBus {
         if self.write(b"F\r").is_ok() {
             let end = Instant::now() + ANSWER;
             self.last_answer = None;
-            // A bell means that the adapter refuses.
+            // A bell means that the adapter refuses the command.
             while !self.got_flags && self.last_answer.is_none() && Instant::now() < end {
                 if self.take_in(SLICE).is_err() {
                     break;
@@ -365,7 +367,7 @@ impl CanBus for SlcanBus {
 impl Drop for SlcanBus {
     fn drop(&mut self) {
         if !self.closed {
-            // The last frame must leave the adapter before its channel is closed.
+            // The adapter must send the last frame before its channel is closed.
             let _ = self.wait_for_confirmation();
             let _ = self.write(b"C\r");
         }

@@ -1,31 +1,31 @@
-//! The lines of the protocol: found in a stream of bytes, understood and written.
+//! Lines of the protocol: splitting, parsing and writing.
 
 use std::fmt::Write;
 
 use crate::{CanFrame, ControllerState, ErrorState, Id};
 
-/// Longest line that is kept; the longest frame, 29 bits with 64 bytes and a time stamp, has 142.
+/// Longest line that is stored. The longest frame (29-bit identifier, 64 bytes, time stamp) has 142 characters.
 const LONGEST: usize = 256;
-/// Ends a line.
+/// Character that ends a line.
 pub(crate) const CR: u8 = b'\r';
-/// Means "refused"; not part of a line.
+/// Character that means "refused". It is not part of a line.
 pub(crate) const BELL: u8 = 7;
-/// Digits of a time stamp that some adapters append.
+/// Number of digits of the time stamp that some adapters append.
 const TIME_STAMP: usize = 4;
 
-/// A line, or the bell.
+/// A line or a bell.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Piece<'a> {
     Line(&'a str),
     Bell,
 }
 
-/// Finds lines in a stream that may be cut anywhere, in bounded memory.
+/// Splits a stream into lines, with bounded memory. The stream may be cut at any position.
 pub(crate) struct Lines {
     line: Vec<u8>,
-    /// The line in `line` was returned.
+    /// `true` if the line in `line` was returned.
     complete: bool,
-    /// The remainder of the line is skipped.
+    /// `true` if the rest of the line is skipped.
     too_long: bool,
 }
 
@@ -34,7 +34,7 @@ impl Lines {
         Self { line: Vec::with_capacity(LONGEST), complete: false, too_long: false }
     }
 
-    /// Returns the next line and removes its bytes from `bytes`.
+    /// Returns the next line, and removes its bytes from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<Piece<'a>> {
         if self.complete {
             self.complete = false;
@@ -51,14 +51,14 @@ impl Lines {
                 CR if self.too_long || !self.line.is_ascii() => {
                     self.line.clear();
                     self.too_long = false;
-                    // The line must not be taken for the empty line that means "accepted".
+                    // The line must not be confused with the empty line, which means "accepted".
                     return Some(Piece::Line("?"));
                 }
                 CR => {
                     self.complete = true;
                     return str::from_utf8(&self.line).ok().map(Piece::Line);
                 }
-                // Some adapters end lines with CR and LF.
+                // Some adapters end lines with CR LF.
                 b'\n' => {}
                 _ if self.line.len() == LONGEST => self.too_long = true,
                 _ => self.line.push(byte),
@@ -68,10 +68,10 @@ impl Lines {
     }
 }
 
-/// Lengths of CAN FD by their codes.
+/// CAN FD lengths by their codes.
 const LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
-/// Returns the frame of a line without its end; `None` if the line is not a frame.
+/// Returns the frame in a line (without line end); `None` if the line is not a frame.
 pub(crate) fn parse_frame(line: &str) -> Option<CanFrame> {
     let kind = line.chars().next()?;
     let (digits, make): (usize, fn(u32) -> _) = match kind {
@@ -99,7 +99,7 @@ pub(crate) fn parse_frame(line: &str) -> Option<CanFrame> {
     }
 }
 
-/// Appends the line of a frame with its end.
+/// Appends the line of a frame, including the line end.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
     let kind = match (frame.is_remote(), frame.is_fd(), frame.is_brs()) {
         (true, ..) => 'r',
@@ -108,7 +108,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
         (_, true, true) => 'b',
     };
     let kind = if frame.is_extended() { kind.to_ascii_uppercase() } else { kind };
-    // Every frame's length is one of these.
+    // Every frame has one of these lengths.
     let code = LENGTHS.iter().position(|len| *len == frame.len()).unwrap_or(0);
     let written = write!(text, "{kind}{}{code:X}", frame.id())
         .and_then(|()| frame.data().iter().try_for_each(|byte| write!(text, "{byte:02X}")))
@@ -116,7 +116,7 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame) {
     written.expect("a String takes everything");
 }
 
-/// Bits of the flags that `F` requests.
+/// Flag bits in the answer to `F`.
 const WARNING: u8 = 1 << 2;
 const PASSIVE: u8 = 1 << 5;
 
@@ -132,7 +132,7 @@ pub(crate) fn parse_flags(line: &str) -> Option<ControllerState> {
     Some(ControllerState::without_counters(errors))
 }
 
-/// Returns the flags of the answer to `F`. The protocol has no flag for bus-off, which is reported as error passive.
+/// Returns the flags for the answer to `F`. The protocol has no flag for bus-off, which is reported as error passive.
 pub(crate) fn flags(state: ControllerState) -> u8 {
     match state.errors {
         ErrorState::Unknown | ErrorState::Active => 0,
@@ -141,8 +141,8 @@ pub(crate) fn flags(state: ControllerState) -> u8 {
     }
 }
 
-/// Parses a change of state that newer adapters report without a request, in the form that Linux understands: `s`, a letter, and the
-/// receive and the transmit error counter with three decimal digits each.
+/// Parses a state change that newer adapters report without a request, in the form that Linux accepts: `s`, a letter,
+/// then the receive and the transmit error counter with three decimal digits each.
 pub(crate) fn parse_state(line: &str) -> Option<ControllerState> {
     let rest = line.strip_prefix('s').filter(|rest| rest.len() == 7 && rest.is_ascii())?;
     let errors = match rest.chars().next()? {
@@ -171,7 +171,7 @@ mod tests {
         parse_frame(line).map(|frame| format!("{frame:?}"))
     }
 
-    /// Forms of the manual and of CANable 2's description.
+    /// Examples from the manual and from the description of CANable 2.
     #[test]
     fn lines_are_frames() {
         for (line, expected) in [

@@ -1,4 +1,4 @@
-//! CAN over a serial line in the ASCII protocol of LAWICEL's adapters (SLCAN), with the CAN FD lines of CANable 2: the
+//! CAN over a serial line with the ASCII protocol of LAWICEL's adapters (SLCAN) and the CAN FD lines of CANable 2: the
 //! [host's side](SlcanBus) and the [adapter's side](SlcanAdapter).
 
 mod adapter;

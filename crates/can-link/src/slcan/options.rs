@@ -1,6 +1,7 @@
 //! Options of an adapter, and the rates that have codes in the protocol.
 
-/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is LAWICEL's; some firmware of CANable adapters interprets it as 750,000.
+/// Bit rates of the codes `S0` to `S8`, bit/s. Code 7 is as LAWICEL defines it; some CANable firmware interprets it as
+/// 750,000.
 pub(crate) const BIT_RATES: [u32; 9] =
     [10_000, 20_000, 50_000, 100_000, 125_000, 250_000, 500_000, 800_000, 1_000_000];
 
@@ -11,11 +12,11 @@ pub(crate) const DATA_RATES: [(u32, u8); 4] =
 /// Options of an adapter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlcanOptions {
-    /// `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
+    /// Device: `/dev/ttyACM0`, `COM7`, or `tcp:HOST:PORT`.
     pub device: String,
-    /// Bit rate of the bus, bit/s; none leaves the adapter's own.
+    /// Bit rate of the bus, bit/s; with `None` the adapter's own setting stays.
     pub rate: Option<u32>,
-    /// Bit rate of the data phase of CAN FD, bit/s; none leaves the adapter's own.
+    /// Bit rate of the CAN FD data phase, bit/s; with `None` the adapter's own setting stays.
     pub data_rate: Option<u32>,
     /// Rate of the serial line, bit/s; USB adapters ignore it.
     pub baud: u32,

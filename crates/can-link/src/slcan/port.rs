@@ -4,9 +4,9 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// Longest time for a connection over TCP.
+/// Longest time for establishing a TCP connection.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Shortest timeout; a shorter one would not wait at all.
+/// Shortest timeout. With a shorter one a read would not wait at all.
 const SHORTEST: Duration = Duration::from_millis(1);
 
 pub(super) enum Port {
@@ -34,7 +34,7 @@ impl Port {
         Err(last)
     }
 
-    /// Reads bytes that came within `timeout`; `None` if no byte came. The end of a stream is an error.
+    /// Reads bytes that arrive within `timeout`; returns `None` if no byte arrived. The end of the stream is an error.
     pub(super) fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<Option<usize>> {
         let timeout = timeout.max(SHORTEST);
         let read = match self {
@@ -55,7 +55,7 @@ impl Port {
         }
     }
 
-    /// Writes bytes; returns how many were taken within `timeout`.
+    /// Writes bytes; returns the number of bytes accepted within `timeout`.
     pub(super) fn write(&mut self, bytes: &[u8], timeout: Duration) -> io::Result<usize> {
         let written = match self {
             Self::Serial(port) => {

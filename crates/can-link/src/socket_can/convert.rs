@@ -1,4 +1,4 @@
-//! Conversion of frames to and from those of the kernel, and of its error frames to a state.
+//! Converts frames to and from the kernel's frames, and the kernel's error frames to a state.
 
 use socketcan::errors::ControllerProblems;
 use socketcan::id::FdFlags;
@@ -55,7 +55,7 @@ fn id(raw: &impl EmbeddedFrame) -> Option<Id> {
     }
 }
 
-/// Returns the state after an error frame: a new state, new counters, both or neither.
+/// Returns the state after an error frame. The frame may contain a new state, new counters, both or neither.
 fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     const PASSIVE: ControllerProblems = ControllerProblems::RX_PASSIVE.union(ControllerProblems::TX_PASSIVE);
     const WARNING: ControllerProblems = ControllerProblems::RX_WARNING.union(ControllerProblems::TX_WARNING);
@@ -79,12 +79,13 @@ fn state(raw: CanErrorFrame, before: ControllerState) -> ControllerState {
     let counters = error.counters();
     match (errors, counters) {
         (None, None) => before,
-        // Old counters do not belong to a new state.
+        // Counters of the previous state are not valid for the new one.
         (Some(errors), None) => ControllerState::without_counters(errors),
         (errors, Some((tec, rec))) => {
             let (tec, rec) = (u16::from(tec), u16::from(rec));
             let of_counters = ErrorState::of_counters(tec, rec);
-            // Eight bits cannot express bus-off: a controller that has left the bus stays in bus-off until it reports another state.
+            // Eight-bit counters cannot express bus-off. A controller in bus-off stays there until it reports another
+            // state.
             let kept = if before.errors == ErrorState::BusOff { before.errors } else { of_counters };
             ControllerState { errors: errors.unwrap_or(kept), tec: Some(tec), rec: Some(rec) }
         }
@@ -96,7 +97,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Class bits of the kernel's `can/error.h`.
+    /// Class bits defined in the kernel's `can/error.h`.
     const CONTROLLER: u32 = 0x4;
     const BUS_OFF: u32 = 0x40;
     const BUS_ERROR: u32 = 0x80;
@@ -131,7 +132,7 @@ mod tests {
         }
         let passive = after(unknown, CONTROLLER | COUNTERS, 0x20, 136, 7);
         assert_eq!(passive, ControllerState::of_counters(136, 7));
-        // Counters alone give the state, too; nothing else changes it.
+        // Counters alone also determine the state. Frames without state and counters change nothing.
         assert_eq!(after(passive, COUNTERS, 0, 100, 0), ControllerState::of_counters(100, 0));
         assert_eq!(after(passive, BUS_ERROR, 0, 0, 0), passive);
         let off = after(passive, BUS_OFF | COUNTERS, 0, 248, 0);
@@ -142,7 +143,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Through the kernel's own structures and back.
+        /// Converts frames to the kernel's structures and back.
         #[test]
         fn every_frame_survives_the_kernels_form(
             value in any::<u32>(), extended in any::<bool>(), kind in 0..4, data in prop::collection::vec(any::<u8>(), 0..=64)
@@ -158,7 +159,7 @@ mod tests {
             .unwrap();
             let raw = to_kernel(&frame);
             prop_assert_eq!(from_kernel(&raw, ControllerState::default()), Received::Frame(frame));
-            // As bytes of `struct can_frame`: identifier with its flags, length, data from byte 8 on.
+            // Bytes of `struct can_frame`: identifier with its flags, length, and data from byte 8 on.
             let word = frame.id().value() | u32::from(extended) << 31 | u32::from(frame.is_remote()) << 30;
             let (written, len, bytes) = match &raw {
                 CanAnyFrame::Normal(raw) => { let raw = raw.as_ref(); (raw.can_id, raw.can_dlc, raw.data.to_vec()) }

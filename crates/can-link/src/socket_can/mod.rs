@@ -1,4 +1,4 @@
-//! The CAN of the Linux kernel.
+//! CAN interfaces of the Linux kernel.
 
 mod convert;
 mod retry;
@@ -12,7 +12,7 @@ use crate::{CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, Int
 use convert::{Received, from_kernel, to_kernel};
 use retry::retry_while_full;
 
-/// Error numbers of Linux.
+/// Linux error numbers.
 const EINVAL: i32 = 22;
 const ENODEV: i32 = 19;
 const ENXIO: i32 = 6;
@@ -22,7 +22,7 @@ const EAFNOSUPPORT: i32 = 97;
 const EPROTONOSUPPORT: i32 = 93;
 const ENETDOWN: i32 = 100;
 
-/// A network interface of the kernel's CAN, such as `can0` or `vcan0`, classic and CAN FD.
+/// A CAN network interface of the kernel, such as `can0` or `vcan0`, with classic CAN and CAN FD.
 pub struct SocketCanBus {
     url: String,
     interface: String,
@@ -32,17 +32,17 @@ pub struct SocketCanBus {
 }
 
 impl SocketCanBus {
-    /// Opens an interface that is up.
+    /// Opens an interface. The interface must be up.
     pub fn open(interface: &str) -> Result<Self, InterfaceError> {
         let failed = |source: io::Error| InterfaceError {
             url: CanUrl::SocketCan { interface: interface.to_owned() }.to_string(),
             hint: hint(&source, interface),
             source,
         };
-        // Any interface first: a kernel without CAN gives another error than a wrong name.
+        // First opens any interface, because a kernel without CAN gives another error than a wrong name.
         drop(CanFdSocket::open_iface(0).map_err(failed)?);
         let socket = CanFdSocket::open(interface).map_err(failed)?;
-        // The kernel remembers here that the interface is down.
+        // The kernel reports here if the interface is down.
         if let Some(error) = socket.as_raw_socket().take_error().map_err(failed)? {
             return Err(failed(error));
         }
@@ -69,7 +69,7 @@ impl SocketCanBus {
     }
 }
 
-/// The likely cause and the next command.
+/// Returns the likely cause and the command that helps.
 fn hint(error: &io::Error, interface: &str) -> String {
     let up = format!("sudo ip link set {interface} up type can bitrate 1000000");
     match error.raw_os_error() {
@@ -131,8 +131,8 @@ impl CanBus for SocketCanBus {
         }
     }
 
-    /// Returns the state from the error frames that [`receive`](CanBus::receive) has seen. Without an error since the start the kernel
-    /// sends no error frames.
+    /// Returns the state from the error frames that [`receive`](CanBus::receive) has read. The kernel sends no error
+    /// frames until an error has occurred.
     fn state(&mut self) -> ControllerState {
         self.state
     }
@@ -151,7 +151,8 @@ fn is_no_data(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// Runs on any machine: a kernel without CAN and one without this interface both give an error that names the next command.
+    /// Runs on any computer: with a kernel without CAN, and with a kernel without this interface, the error contains
+    /// the command that helps.
     #[test]
     fn what_cannot_be_opened_names_the_cause_and_what_to_do() {
         let error = SocketCanBus::open("nocan17").err().expect("no such interface").to_string();

@@ -3,14 +3,15 @@
 use std::io;
 use std::time::Duration;
 
-/// Error number of the kernel if the queue is full. The kernel does not wait.
+/// The kernel's error number for a full queue. The kernel does not wait for space.
 const ENOBUFS: i32 = 105;
-/// Pause between two attempts: the time of a frame on a fast bus.
+/// Pause between two attempts: the duration of a frame on a fast bus.
 const PAUSE: Duration = Duration::from_micros(200);
-/// Time without space in the queue after which the bus counts as dead.
+/// Time without space in the queue after which the bus is considered dead.
 const TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Writes, and tries again while the queue is full. Returns an error with the likely causes after 10 s without space.
+/// Writes, and repeats the attempt while the queue is full. Returns an error with the likely causes after 10 s without
+/// space.
 pub(super) fn retry_while_full(
     mut write: impl FnMut() -> io::Result<()>,
     mut pause: impl FnMut(Duration),
@@ -41,7 +42,7 @@ fn is_full(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// EAGAIN, the error of a socket that does not wait.
+    /// EAGAIN, the error of a non-blocking socket.
     const EAGAIN: i32 = 11;
 
     fn run(mut answers: Vec<Option<i32>>) -> (io::Result<()>, Duration, usize) {
@@ -50,7 +51,7 @@ mod tests {
         let mut tries = 0;
         let write = || {
             tries += 1;
-            // The last answer is repeated.
+            // The last result in the list is repeated.
             let answer = if answers.len() > 1 { answers.pop().flatten() } else { answers[0] };
             answer.map_or(Ok(()), |number| Err(io::Error::from_raw_os_error(number)))
         };
@@ -64,7 +65,7 @@ mod tests {
         let (result, waited, tries) = run(full);
         assert!(result.is_ok());
         assert_eq!((waited, tries), (PAUSE * 999, 1000));
-        // A signal does not cause a wait.
+        // An interrupt by a signal causes no wait.
         let (result, waited, _) = run(vec![Some(4), None]);
         assert!(result.is_ok() && waited.is_zero());
     }

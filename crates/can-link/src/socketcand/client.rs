@@ -1,4 +1,4 @@
-//! The client.
+//! Client of the socketcand protocol.
 
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
@@ -11,30 +11,30 @@ use crate::{
     AnswerError, AttachError, CanBus, CanError, CanFrame, CanUrl, ControllerState, ErrorState, OpenError,
 };
 
-/// Longest time for the connection and for each answer while opening.
+/// Longest time for the connection, and for each answer while opening.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Longest time for which sending waits for a server that takes no data.
+/// Longest time for which a send waits for a server that accepts no data.
 const SEND_TIMEOUT: Duration = Duration::from_secs(10);
-/// Wait for space to send after which received bytes are read, because the server may be waiting for that.
+/// Time that a send waits for space before it reads received bytes, because the server may be waiting for that.
 const SEND_SLICE: Duration = Duration::from_millis(20);
-/// Longest time at the end for the server to take the last frames.
+/// Longest time at the end for the server to accept the last frames.
 const END_TIMEOUT: Duration = Duration::from_millis(250);
-/// Bytes of one read.
+/// Largest number of bytes per read.
 const READ: usize = 16 * 1024;
-/// Received frames that are kept while sending waits.
+/// Largest number of received frames that are stored while a send waits.
 const RECEIVE_QUEUE: usize = 100_000;
 
-/// Bus of a socketcand server: classic data frames only.
+/// Bus of a socketcand server, for classic data frames only.
 ///
 /// When the connection ends, [`CanBus::send`] and [`CanBus::receive`] return [`CanError::Closed`]; the bus does not reconnect.
 pub struct SocketcandBus {
     url: String,
     stream: TcpStream,
     splitter: Splitter,
-    /// Bytes that came together with an answer while opening.
+    /// Bytes that arrived together with an answer while opening.
     glued: Vec<u8>,
     receive_queue: VecDeque<CanFrame>,
-    /// Timeout of the socket: `None` does not wait.
+    /// Timeout of the socket; with `None` it does not wait.
     timeout: Option<Duration>,
     closed: bool,
     errors: ErrorState,
@@ -43,7 +43,7 @@ pub struct SocketcandBus {
 }
 
 impl SocketcandBus {
-    /// Connects to a server and opens one of its buses. An IPv6 address comes without brackets.
+    /// Connects to a server and opens one of its buses. An IPv6 address is given without brackets.
     pub fn connect(host: &str, port: u16, channel: &str) -> Result<Self, OpenError> {
         let url = CanUrl::Socketcand { host: host.to_owned(), port, channel: channel.to_owned() }.to_string();
         let stream = match connect(host, port) {
@@ -69,13 +69,13 @@ impl SocketcandBus {
         Ok(bus)
     }
 
-    /// Returns the number of messages so far that do not belong to the protocol's raw mode.
+    /// Returns the number of messages received so far that do not belong to the protocol's raw mode.
     pub fn ignored(&self) -> u64 {
         self.ignored + self.splitter.noise()
     }
 
     fn set_up(&mut self) -> io::Result<()> {
-        // Frames are small and must not wait for each other.
+        // Frames are small, and must be sent without waiting for each other.
         self.stream.set_nodelay(true)?;
         self.stream.set_read_timeout(self.timeout)?;
         self.stream.set_write_timeout(Some(SEND_SLICE))
@@ -91,7 +91,7 @@ impl SocketcandBus {
         self.expect(step, &Reply::Ok)
     }
 
-    /// Waits for an answer; keeps the bytes after it.
+    /// Waits for an answer, and stores the bytes after it.
     fn expect(&mut self, step: &'static str, answer: &Reply) -> Result<(), CanError> {
         let end = Instant::now() + TIMEOUT;
         let mut buffer = [0; READ];
@@ -123,13 +123,14 @@ impl SocketcandBus {
         }
     }
 
-    /// Waits up to `wait` (`None`: not at all) for bytes; `None` if no byte came. The end of the stream is an error.
+    /// Waits up to `wait` (with `None`, not at all) for bytes; returns `None` if no byte arrived. The end of the stream
+    /// is an error.
     fn read(&mut self, buffer: &mut [u8; READ], wait: Option<Duration>) -> Result<Option<usize>, CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
         }
         if !self.glued.is_empty() {
-            // At most the bytes of one read.
+            // These are at most the bytes of one read.
             let count = self.glued.len();
             buffer[..count].copy_from_slice(&self.glued);
             self.glued.clear();
@@ -161,7 +162,7 @@ impl SocketcandBus {
         Ok(())
     }
 
-    /// Converts an error. A connection that was cut counts as ended.
+    /// Converts an error. A broken connection is reported as closed.
     fn broken(&mut self, step: &'static str, source: io::Error) -> CanError {
         use io::ErrorKind::{BrokenPipe, ConnectionAborted, ConnectionReset};
         self.closed = true;
@@ -171,7 +172,7 @@ impl SocketcandBus {
         }
     }
 
-    /// Reads the available bytes; returns `true` if any came.
+    /// Reads the available bytes; returns `true` if there were any.
     fn take_in(&mut self, wait: Option<Duration>) -> Result<bool, CanError> {
         let mut buffer = [0; READ];
         let Some(count) = self.read(&mut buffer, wait)? else { return Ok(false) };
@@ -191,7 +192,7 @@ impl SocketcandBus {
         Ok(true)
     }
 
-    /// Writes all bytes; while the server takes no data, reads the bytes that it has sent.
+    /// Writes all bytes. While the server accepts no data, reads the bytes that it has sent.
     fn write(&mut self, mut bytes: &[u8]) -> Result<(), CanError> {
         if self.closed {
             return Err(CanError::Closed { url: self.url.clone() });
@@ -204,7 +205,7 @@ impl SocketcandBus {
                     give_up = Instant::now() + SEND_TIMEOUT;
                 }
                 Err(error) if is_no_data(&error) && Instant::now() < give_up => {
-                    // The socket may be set not to wait at all.
+                    // The socket may be set not to wait.
                     if self.receive_queue.len() >= RECEIVE_QUEUE || !self.take_in(Some(SEND_SLICE))? {
                         std::thread::sleep(Duration::from_micros(200));
                     }
@@ -262,7 +263,7 @@ impl CanBus for SocketcandBus {
         }
     }
 
-    /// Returns the state. The protocol reports only bus-off and the return to the bus.
+    /// Returns the state. The protocol reports only bus-off and the return from it.
     fn state(&mut self) -> ControllerState {
         ControllerState::without_counters(self.errors)
     }
@@ -274,7 +275,8 @@ impl CanBus for SocketcandBus {
 
 impl Drop for SocketcandBus {
     fn drop(&mut self) {
-        // Closing with unread bytes would cut the connection and with it frames that the server has yet to read.
+        // If the socket were closed with unread bytes, the connection would be reset, and the server would lose frames
+        // that it has not read yet.
         let _ = self.stream.shutdown(Shutdown::Write);
         let end = Instant::now() + END_TIMEOUT;
         let mut buffer = [0; READ];

@@ -1,4 +1,4 @@
-//! The server for a host that runs the bus itself, such as a simulator in virtual time.
+//! Server for a host program that runs the bus itself, such as a simulator in virtual time.
 
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -8,7 +8,7 @@ use super::shared::{Channel, ClientAction, ClientId, Route};
 use super::{ServerStats, SocketcandServer};
 use crate::{CanFrame, ErrorState, ListenError, VirtualHub};
 
-/// Most events that wait for the host; beyond that the connections wait.
+/// Largest number of events that wait for the host program. If there are more, the connections wait.
 const WAITING: usize = 1024;
 
 /// Action of a client.
@@ -16,16 +16,16 @@ const WAITING: usize = 1024;
 pub enum ClientEvent {
     /// The client opened the bus.
     Joined,
-    /// The client sends this frame.
+    /// The client sent this frame.
     Frame(CanFrame),
     /// The client has disconnected.
     Left,
 }
 
-/// Event at a [`SocketcandGateway`].
+/// Event of a client at a [`SocketcandGateway`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FromClient {
-    /// Index of the channel in the configured names.
+    /// Index of the channel in the list of names given to `bind`.
     pub channel: usize,
     /// Client.
     pub client: ClientId,
@@ -33,16 +33,17 @@ pub struct FromClient {
     pub event: ClientEvent,
 }
 
-/// A [`SocketcandServer`] whose clients' frames go to the host alone. The host decides when each frame is on the bus, and then
-/// [delivers](Self::deliver) it. Bus order, arbitration and faults are up to the host.
+/// A [`SocketcandServer`] whose clients' frames go only to the host program. The host program decides when each frame
+/// is on the bus, and then [delivers](Self::deliver) it. Bus order, arbitration and faults are simulated by the host
+/// program.
 pub struct SocketcandGateway {
-    // Dropped first: threads that wait for the host then end.
+    // Dropped first, so that threads that wait for the host program end.
     events: Receiver<FromClient>,
     server: SocketcandServer,
 }
 
 impl SocketcandGateway {
-    /// Listens at an address (port 0 takes a free one) and offers buses under the given names.
+    /// Listens at an address (with port 0, at a free port) and offers buses with the given names.
     pub fn bind(address: impl ToSocketAddrs, channels: &[&str]) -> Result<Self, ListenError> {
         let (sender, events) = sync_channel(WAITING);
         let channel = |(channel, name): (usize, &&str)| {
@@ -61,36 +62,36 @@ impl SocketcandGateway {
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
     }
 
-    /// Returns the next event of the clients in order, or `None` if none occurred within `timeout`.
+    /// Returns the next event of the clients, in order, or `None` if there was none within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
-        // The server holds the other end and lives as long as this gateway, so the only possible error is the timeout.
+        // The server holds the other end and lives as long as this gateway, so the only possible error is a timeout.
         self.events.recv_timeout(timeout).ok()
     }
 
-    /// Delivers a frame of the bus to all clients of the channel, except one (its sender). Never waits.
+    /// Delivers a frame of the bus to all clients of the channel except one (its sender). Never waits.
     pub fn deliver(&self, channel: usize, frame: &CanFrame, except: Option<ClientId>) {
         self.server.deliver(channel, frame, except);
     }
 
-    /// Delivers a frame to this client only: for hosts in which each client is a separate member, for example of a
-    /// [`TimedBus`](crate::TimedBus). Never waits.
+    /// Delivers a frame to one client only, for host programs in which each client is a separate member, for example of
+    /// a [`TimedBus`](crate::TimedBus). Never waits.
     pub fn deliver_to(&self, client: ClientId, frame: &CanFrame) {
         self.server.deliver_to(client, frame);
     }
 
-    /// Reports to a client that its own controller has left the bus ([`ErrorState::BusOff`]) or is back ([`ErrorState::Active`]), as an
-    /// error frame between the frames before and after. The protocol's error frames carry no data, so that the protocol cannot express
-    /// other states. These are not reported. Never waits.
+    /// Reports to a client that its own controller is bus-off ([`ErrorState::BusOff`]) or back on the bus
+    /// ([`ErrorState::Active`]), as an error frame in order with the other frames. Other states are not reported,
+    /// because the protocol's error frames have no data that could express them. Never waits.
     pub fn report_state(&self, client: ClientId, state: ErrorState) {
         self.server.report_state(client, state);
     }
 
-    /// Returns the address on which it listens, with the port that was taken.
+    /// Returns the address and port on which the gateway listens.
     pub fn local_addr(&self) -> SocketAddr {
         self.server.local_addr()
     }
 
-    /// Returns the CAN URL of a channel for clients on this host.
+    /// Returns the CAN URL of a channel for clients on this computer.
     pub fn url(&self, channel: &str) -> String {
         self.server.url(channel)
     }

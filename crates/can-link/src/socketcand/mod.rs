@@ -1,7 +1,8 @@
-//! CAN over TCP as the socketcand project defines it and python-can's `socketcand` interface and SavvyCAN speak it:
-//! a [client](SocketcandBus) and a [server](SocketcandServer).
+//! CAN over TCP as the socketcand project defines it; python-can's `socketcand` interface and SavvyCAN also support it.
+//! Contains a [client](SocketcandBus) and a [server](SocketcandServer).
 //!
-//! The protocol carries classic data frames only: it has no form for remote frames, and no generally understood form for CAN FD.
+//! The protocol transmits only classic data frames: it has no format for remote frames, and no generally supported
+//! format for CAN FD.
 
 mod client;
 mod gateway;

@@ -1,4 +1,4 @@
-//! The server, which listens for clients and counts their frames.
+//! Server of the socketcand protocol.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, Shutdown, SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
@@ -11,36 +11,37 @@ use super::session;
 use super::shared::{Channel, Client, ClientId, Inner, Route};
 use crate::{CanFrame, CanUrl, ErrorState, ListenError, VirtualHub};
 
-/// Clients at a time.
+/// Largest number of clients at the same time.
 const MOST_CLIENTS: usize = 64;
-/// Longest time at the end for the clients' threads.
+/// Longest wait at the end for the clients' threads.
 const END_TIMEOUT: Duration = Duration::from_secs(1);
 
 /// Counters of a server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServerStats {
-    /// Clients at present.
+    /// Number of connected clients.
     pub clients: usize,
-    /// Connections taken.
+    /// Number of accepted connections.
     pub accepted: u64,
-    /// Connections ended at once because there were 64 clients.
+    /// Number of connections closed at once because there were 64 clients.
     pub turned_away: u64,
-    /// Frames of clients.
+    /// Number of frames received from clients.
     pub received: u64,
-    /// Frames written to clients, counted for each.
+    /// Number of frames written to clients, counted for each client.
     pub sent: u64,
-    /// Frames that clients missed because they did not read.
+    /// Number of frames that clients missed because they did not read.
     pub missed: u64,
-    /// Frames that the protocol cannot carry (remote, CAN FD), counted for each client.
+    /// Number of frames that the protocol cannot transmit (remote, CAN FD), counted for each client.
     pub not_carried: u64,
-    /// Unknown commands.
+    /// Number of unknown commands.
     pub not_understood: u64,
 }
 
-/// A server of the socketcand protocol, as python-can's `socketcand` interface and SavvyCAN know it.
+/// A server of the socketcand protocol, compatible with python-can's `socketcand` interface and SavvyCAN.
 ///
-/// A client's frames reach all others and do not come back to it. A client that does not read misses frames beyond some
-/// 65,000, and is disconnected after 30 s; such a client never blocks the bus. Dropping the server ends all connections.
+/// A client's frames are sent to all other clients and members, but not back to the client. A client that does not read
+/// misses frames after about 65,000, and is disconnected after 30 s; it never blocks the bus. Dropping the server
+/// closes all connections.
 ///
 /// ```
 /// use std::time::Duration;
@@ -60,8 +61,8 @@ pub struct SocketcandServer {
 }
 
 impl SocketcandServer {
-    /// Listens at an address (port 0 takes a free one) and offers buses of this process under the given names, which have
-    /// no blanks and at most 16 characters.
+    /// Listens at an address (with port 0, at a free port) and offers buses of this process under the given names. A
+    /// name must not contain blanks and has at most 16 characters.
     pub fn bind(address: impl ToSocketAddrs, buses: &[(&str, &VirtualHub)]) -> Result<Self, ListenError> {
         let channel = |(name, hub): &(&str, &VirtualHub)| Channel {
             name: (*name).to_owned(),
@@ -84,12 +85,12 @@ impl SocketcandServer {
         Ok(Self { address, inner, acceptor: Some(acceptor) })
     }
 
-    /// Returns the address on which it listens, with the port that was taken.
+    /// Returns the address and port on which the server listens.
     pub fn local_addr(&self) -> SocketAddr {
         self.address
     }
 
-    /// Returns the CAN URL of a channel for clients on this host.
+    /// Returns the CAN URL of a channel for clients on this computer.
     pub fn url(&self, channel: &str) -> String {
         let (host, port) = (reachable(self.address).ip().to_string(), self.address.port());
         CanUrl::Socketcand { host, port, channel: channel.to_owned() }.to_string()
@@ -144,7 +145,7 @@ impl SocketcandServer {
 impl Drop for SocketcandServer {
     fn drop(&mut self) {
         self.inner.closing.store(true, Ordering::SeqCst);
-        // The acceptor waits in a system call. A connection wakes it.
+        // The accepting thread waits in a system call; a connection wakes it.
         let woken = TcpStream::connect_timeout(&reachable(self.address), END_TIMEOUT).is_ok();
         if let Some(acceptor) = self.acceptor.take().filter(|_| woken) {
             let _ = acceptor.join();
@@ -157,7 +158,7 @@ impl Drop for SocketcandServer {
     }
 }
 
-/// Returns the address under which this host reaches a listener.
+/// Returns the address with which this computer can connect to a listener.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address.ip() {
@@ -181,7 +182,8 @@ fn accept(listener: &TcpListener, inner: &Arc<Inner>) {
                     inner.turned_away.fetch_add(1, Ordering::Relaxed);
                 }
             }
-            // The client has already disconnected, or the system has no space for another connection. Other clients are not affected.
+            // The client has already disconnected, or the system has no resources for another connection. Other clients
+            // are not affected.
             Err(_) => std::thread::sleep(Duration::from_millis(5)),
         }
     }

@@ -1,4 +1,4 @@
-//! Session of a client of the server: a thread that reads and, from raw mode on, another that writes.
+//! Session of a client of the server: a thread that reads and, after raw mode begins, another thread that writes.
 
 use std::io::{self, Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -12,27 +12,28 @@ use super::text::{Request, has_form, push_frame, push_state};
 use crate::virtual_bus::Received;
 use crate::{CanBus, VirtualBus};
 
-/// Time after the answer to `rawmode` in which no frame is sent. python-can compares all bytes of one read with that answer.
+/// Time after the answer to `rawmode` in which no frame is sent, because python-can compares all bytes of one read with
+/// that answer.
 const HELD_BACK: Duration = Duration::from_millis(20);
-/// Frames that wait for a client: some seconds of a full bus.
+/// Largest number of frames that wait for a client: some seconds of a fully loaded bus.
 const WAITING: usize = 65_536;
-/// Bytes that wait in the system for a client; more would only delay its frames.
+/// Largest number of bytes that the system buffers for a client. More would only delay its frames.
 const SEND_BUFFER: usize = 128 * 1024;
-/// Frames in one write.
+/// Largest number of frames in one write.
 const BATCH: usize = 64;
-/// Time after which a client that takes no data counts as disconnected.
+/// Time after which a client that accepts no data is considered disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(30);
 /// Time after which a client without requests and without an open bus is disconnected.
 const OPEN_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// The socket as both threads write to it.
+/// The socket, to which both threads write.
 struct Out {
     stream: Mutex<Output>,
 }
 
 struct Output {
     stream: TcpStream,
-    /// Frames wait until then.
+    /// Frames are not sent before this time.
     frames_from: Instant,
 }
 
@@ -45,7 +46,7 @@ impl Out {
 /// Serves a client until it disconnects.
 pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
     let mut session = Session { inner, client, opened: None, writer: None };
-    // An error of a client's connection ends this client only.
+    // An error of a client's connection ends only this client.
     let _ = session.run(stream);
     session.end();
 }
@@ -53,18 +54,18 @@ pub(super) fn serve(inner: &Arc<Inner>, client: ClientId, stream: TcpStream) {
 struct Session<'a> {
     inner: &'a Arc<Inner>,
     client: ClientId,
-    /// Channel and membership.
+    /// Channel, and membership of its bus.
     opened: Option<(usize, VirtualBus)>,
     writer: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Session<'_> {
     fn run(&mut self, mut stream: TcpStream) -> io::Result<()> {
-        // Each answer must be sent at once, in its own segment.
+        // Each answer must be sent at once in its own segment.
         stream.set_nodelay(true)?;
-        // Detects a client whose computer was switched off.
+        // Detects that a client's computer was switched off.
         socket2::SockRef::from(&stream).set_keepalive(true)?;
-        // This is only a request: the system may have its own limits.
+        // This is only a request; the system may have its own limits.
         let _ = socket2::SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER);
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(OPEN_TIMEOUT))?;
@@ -98,7 +99,7 @@ impl Session<'_> {
         self.inner.not_understood.fetch_add(count, Ordering::Relaxed);
     }
 
-    /// Executes a request. Returns false to end the connection.
+    /// Executes a request. Returns `false` to end the connection.
     fn execute(&mut self, request: Request, out: &Arc<Out>) -> io::Result<bool> {
         match (request, &mut self.opened) {
             (Request::Echo, _) => reply(out, "< echo >")?,
@@ -127,7 +128,7 @@ impl Session<'_> {
                     Route::Host(report) => return Ok(report(self.client, ClientAction::Sent(frame))),
                 }
             }
-            // In raw mode python-can would take the first word of an error text for a number, and fail.
+            // In raw mode, python-can would parse the first word of an error text as a number, and fail.
             _ => {
                 self.not_understood(1);
                 if self.writer.is_none() {
@@ -177,7 +178,7 @@ fn reply(out: &Out, text: &str) -> io::Result<()> {
     out.lock().stream.write_all(text.as_bytes())
 }
 
-/// Writes frames, in its own thread, until the member leaves the bus or the client takes no more.
+/// Writes frames in its own thread until the member leaves the bus or the client accepts no more.
 fn write_frames(
     inner: &Arc<Inner>,
     member: VirtualBus,
@@ -191,7 +192,7 @@ fn write_frames(
             let (carried, not_carried) = write_batch(&received, &mut text);
             count(&inner.not_carried, not_carried);
             if write_text(&out, &text).is_err() {
-                // The reading thread ends when the socket is closed.
+                // Closing the socket ends the reading thread.
                 let _ = out.lock().stream.shutdown(Shutdown::Both);
                 return;
             }
@@ -205,7 +206,8 @@ fn count(counter: &AtomicU64, number: usize) {
     counter.fetch_add(number as u64, Ordering::Relaxed);
 }
 
-/// Writes the lines of the frames and states that have a form; returns the numbers of written and omitted frames.
+/// Writes lines for the frames and states that the protocol supports; returns the numbers of written and omitted
+/// frames.
 fn write_batch(received: &[Received], text: &mut String) -> (usize, usize) {
     text.clear();
     #[expect(clippy::disallowed_methods, reason = "the form has the time of day")]

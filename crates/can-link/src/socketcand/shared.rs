@@ -8,7 +8,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 use crate::{CanFrame, VirtualBus, VirtualHub};
 
-/// Identifies a client of a server; never used twice.
+/// Identifier of a client of a server. A number is never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct ClientId(pub(super) u64);
 
@@ -18,22 +18,22 @@ impl fmt::Display for ClientId {
     }
 }
 
-/// An action of a client, for a host that runs the bus itself.
+/// An action of a client, for a host program that runs the bus itself.
 pub(super) enum ClientAction {
     Joined,
     Sent(CanFrame),
     Left,
 }
 
-/// Route of the frames of a channel's clients.
+/// Destination of the frames from a channel's clients.
 pub(super) enum Route {
-    /// Straight to the other members of the hub.
+    /// Directly to the other members of the hub.
     Hub,
-    /// To the host, which puts them on its bus and delivers them.
+    /// To the host program, which puts them on its bus and delivers them.
     Host(Box<dyn Fn(ClientId, ClientAction) -> bool + Send + Sync>),
 }
 
-/// A bus of the server: clients are guests of the hub.
+/// A bus of the server, in which clients are guests of the hub.
 pub(super) struct Channel {
     pub(super) name: String,
     pub(super) hub: VirtualHub,
@@ -56,10 +56,10 @@ pub(super) struct Inner {
     pub(super) not_understood: AtomicU64,
 }
 
-/// A connection, for threads that end it or deliver frames to it.
+/// A connection, for threads that close it or deliver frames to it.
 pub(super) struct Client {
     pub(super) stream: TcpStream,
-    /// Channel and membership of its hub.
+    /// Channel, and membership of its hub.
     pub(super) opened: Option<(usize, VirtualBus)>,
 }
 
@@ -75,7 +75,7 @@ impl Inner {
         }
     }
 
-    /// Channel and number in its hub.
+    /// Returns the channel of a client, and its member number in the channel's hub.
     pub(super) fn member_number(&self, client: ClientId) -> Option<(usize, u64)> {
         let clients = self.clients();
         let (channel, member) = clients.get(&client)?.opened.as_ref()?;

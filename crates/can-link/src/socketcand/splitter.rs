@@ -1,14 +1,15 @@
-//! Messages of a TCP stream that may be cut anywhere.
+//! Splits a TCP stream, which may be cut at any position, into messages.
 
-/// Longest message that is kept; the longest of the protocol, a CAN FD frame with blanks between its bytes, has 240.
+/// Longest message that is stored. The longest message of the protocol, a CAN FD frame with blanks between its bytes,
+/// has 240 characters.
 pub(crate) const LONGEST: usize = 512;
 
-/// Finds messages in a stream that may be cut anywhere, in bounded memory.
+/// Splits a stream into messages, with bounded memory. The stream may be cut at any position.
 pub(crate) struct Splitter {
     /// Bytes after the last `<`.
     message: Vec<u8>,
     inside: bool,
-    /// The message in `message` was returned.
+    /// `true` if the message in `message` was returned.
     complete: bool,
     noise: u64,
 }
@@ -18,18 +19,18 @@ impl Splitter {
         Self { message: Vec::with_capacity(LONGEST), inside: false, complete: false, noise: 0 }
     }
 
-    /// Returns the number of messages so far that were too long, not ASCII or never ended.
+    /// Returns the number of messages so far that were too long, not ASCII, or without an end.
     pub(crate) fn noise(&self) -> u64 {
         self.noise
     }
 
-    /// Returns the maximum number of bytes that the splitter holds.
+    /// Returns the number of bytes that the splitter has allocated.
     #[cfg(any(test, feature = "fuzzing"))]
     pub(crate) fn capacity(&self) -> usize {
         self.message.capacity()
     }
 
-    /// Returns the text between `<` and `>` of the next message and removes its bytes from `bytes`.
+    /// Returns the text between `<` and `>` of the next message, and removes its bytes from `bytes`.
     pub(crate) fn next<'a>(&'a mut self, bytes: &mut &[u8]) -> Option<&'a str> {
         if self.complete {
             self.complete = false;
@@ -39,7 +40,7 @@ impl Splitter {
             *bytes = rest;
             match byte {
                 b'<' => {
-                    // A message begins within a message, so the end of the first one was lost.
+                    // A message begins inside a message, so the end of the first one was lost.
                     self.noise += u64::from(self.inside);
                     self.inside = true;
                     self.message.clear();

@@ -1,4 +1,4 @@
-//! The texts of the protocol: `< WORD WORD … >`, found in a stream of bytes, understood and written.
+//! Texts of the protocol, `< WORD WORD … >`: parsing and writing.
 
 use std::fmt::Write;
 use std::time::Duration;
@@ -57,7 +57,7 @@ pub(crate) enum Reply<'a> {
     Frame(CanFrame),
     /// An error frame with its class bits (Linux, `can/error.h`).
     ErrorFrame(u32),
-    /// The server refuses something.
+    /// The server refuses a request.
     Refused(&'a str),
     Other,
 }
@@ -86,7 +86,7 @@ fn classic_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFram
     CanFrame::classic(id, &bytes::<8>(words)?).ok()
 }
 
-/// Parses `ID FLAGS TIME DATA`, the part after `fdframe` of servers that know CAN FD.
+/// Parses `ID FLAGS TIME DATA`, the part after `fdframe`, which servers with CAN FD send.
 fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     let id = id(words.next()?)?;
     let flags = words.next().filter(|word| word.len() <= 2 && is_hex(word))?;
@@ -96,7 +96,7 @@ fn fd_frame<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<CanFrame> {
     Some(CanFrame::fd(id, &bytes::<64>(words)?).ok()?.with_brs(flags & 1 != 0))
 }
 
-/// Parses `CLASS TIME`, or `CLASS` alone; anything else is a text for display.
+/// Parses `CLASS TIME` or only `CLASS`; any other text is for display.
 fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     let class = words.next().filter(|word| word.len() <= 8 && is_hex(word))?;
     if let Some(time) = words.next() {
@@ -106,7 +106,7 @@ fn error_class<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<u32> {
     u32::from_str_radix(class, 16).ok()
 }
 
-/// Up to three digits are 11 bits, more are 29.
+/// Parses an identifier: up to three digits mean 11 bits, more digits mean 29 bits.
 fn id(word: &str) -> Option<Id> {
     if !is_hex(word) || word.len() > 8 {
         return None;
@@ -115,7 +115,8 @@ fn id(word: &str) -> Option<Id> {
     if word.len() <= 3 { Id::standard(value).ok() } else { Id::extended(value).ok() }
 }
 
-/// Parses bytes in hex: one word for all, or a word for each. A word for one byte may lack its leading zero.
+/// Parses bytes in hexadecimal: one word with all bytes, or one word per byte. A word with one byte may omit a leading
+/// zero.
 fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<Vec<u8>> {
     let mut found = Vec::new();
     for word in words {
@@ -133,7 +134,7 @@ fn bytes<'a, const MOST: usize>(words: impl Iterator<Item = &'a str>) -> Option<
     Some(found)
 }
 
-/// Returns `true` if the word has only digits: Rust's own conversion would take a sign, too.
+/// Returns `true` if the word has only hexadecimal digits; Rust's own conversion would also accept a sign.
 fn is_hex(word: &str) -> bool {
     !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_hexdigit())
 }
@@ -142,15 +143,15 @@ fn is_time(word: &str) -> bool {
     word.bytes().all(|byte| byte.is_ascii_digit() || byte == b'.') && word.parse::<f64>().is_ok()
 }
 
-/// Returns true if the protocol has a form for the frame. Only classic data frames have one.
+/// Returns `true` if the protocol can transmit the frame, which is only true for classic data frames.
 pub(crate) fn has_form(frame: &CanFrame) -> bool {
     !frame.is_fd() && !frame.is_remote()
 }
 
 /// Appends `< frame … >` with the time since 1970.
 ///
-/// The bytes have no blanks between them, because python-can reads only the first word. Without bytes there are two blanks in a row,
-/// because python-can would not find the empty word otherwise.
+/// The bytes have no blanks between them, because python-can reads only the first word. If there are no bytes, two
+/// blanks follow each other, because python-can would not find the empty word otherwise.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     let (s, us) = (time.as_secs(), time.subsec_micros());
     let written = write!(text, "< frame {} {s}.{us:06} ", frame.id()).and_then(|()| {
@@ -160,8 +161,8 @@ pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     written.expect("a String takes everything");
 }
 
-/// Appends `< error CLASS TIME >` for a controller that has left the bus or is back. Other states would need the data of an error frame,
-/// which the protocol does not carry.
+/// Appends `< error CLASS TIME >` for a controller that has gone bus-off or is back. Other states would need the data
+/// of an error frame, which the protocol does not transmit.
 pub(crate) fn push_state(text: &mut String, state: ErrorState, time: Duration) {
     let class = match state {
         ErrorState::BusOff => CLASS_BUS_OFF,
@@ -197,7 +198,7 @@ mod tests {
         CanFrame::classic(Id::extended(id).unwrap(), data).unwrap()
     }
 
-    /// Requests as python-can 4.6.1 writes them: no leading zeros, two blanks without data.
+    /// Requests as python-can 4.6.1 writes them: without leading zeros, and with two blanks if there is no data.
     #[test]
     fn requests_of_python_can_are_understood() {
         for (text, request) in [
@@ -271,7 +272,8 @@ mod tests {
         assert_eq!(Reply::parse(&text.replace(" 01 ", " 00 ")), Reply::Frame(fd.with_brs(false)));
     }
 
-    /// python-can 4.6.1 needs exactly these forms: an IndexError with one blank, one byte only with blanks between bytes.
+    /// python-can 4.6.1 needs exactly these forms. With a single blank it raises an IndexError, and with blanks between
+    /// the bytes it reads only one byte.
     #[test]
     fn frames_are_written_as_python_can_reads_them() {
         for (frame, line, send) in [
@@ -292,7 +294,8 @@ mod tests {
         }
     }
 
-    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits of the class, then the time.
+    /// Error frames as socketcand writes them and python-can 4.6.1 reads them: three digits for the class, then the
+    /// time.
     #[test]
     fn bus_off_and_the_way_back_are_error_frames() {
         let time = Duration::from_micros(12_000_345);

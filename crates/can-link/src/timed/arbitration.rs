@@ -1,4 +1,4 @@
-//! Arbitration: selects the members that continue to send if several start at once (ISO 11898-1).
+//! Arbitration: if several members start at once, selects those that continue to send (ISO 11898-1).
 
 use super::confinement::Counters;
 use super::event::MemberId;
@@ -13,27 +13,27 @@ pub(super) struct Starter {
     pub(super) counters: Counters,
 }
 
-/// Outcome of the arbitration at the start of a frame.
+/// Result of the arbitration at the start of a frame.
 pub(super) struct Arbitration {
-    /// Members that send the same bits to the end; none when the frame is destroyed.
+    /// Members that send the same bits to the end; empty if the frame is destroyed.
     pub(super) senders: Vec<MemberId>,
-    /// Frame on the wire.
+    /// Frame on the bus.
     pub(super) frame: CanFrame,
-    /// Number of bits from start to CRC; up to the error if the frame is destroyed.
+    /// Number of bits from the start to the CRC; if the frame is destroyed, up to the error.
     pub(super) bits: u32,
-    /// All members that sent the winning identifier, if their frames differ.
+    /// All members that sent the winning identifier, if the rest of their frames differs.
     pub(super) collision: Vec<MemberId>,
-    /// Members of a collision whose send failed.
+    /// Members in a collision that failed to send.
     pub(super) failed: Vec<MemberId>,
 }
 
 impl Arbitration {
-    /// Returns true if the member has sent more than its arbitration.
+    /// Returns `true` if the member has sent bits after the arbitration.
     pub(super) fn involves(&self, member: MemberId) -> bool {
         self.senders.contains(&member) || self.failed.contains(&member)
     }
 
-    /// Arbitrates between the starters. Returns `None` without starters.
+    /// Arbitrates between the starters. Returns `None` if there are none.
     pub(super) fn of(starters: &[Starter]) -> Option<Self> {
         let best = starters.iter().map(|starter| arbitration(&starter.frame)).min()?;
         let mut sending: Vec<(Starter, WireBits)> = starters
@@ -46,11 +46,11 @@ impl Arbitration {
         let all = members(&sending);
         let mut failed = Vec::new();
         while let Some(at) = first_difference(&sending) {
-            // A member that sends a recessive bit and sees a dominant one has a bit error.
+            // A member that sends a recessive bit and reads a dominant one has a bit error.
             let (lost, on): (Vec<_>, Vec<_>) =
                 sending.iter().partition(|(_, wire)| wire.bits().get(at) != Some(&DOMINANT));
             if lost.iter().any(|(starter, _)| !starter.counters.passive()) {
-                // An active error flag destroys the frame for everyone.
+                // An active error flag destroys the frame for all members.
                 failed.extend(members(&sending));
                 let frame = sending.first()?.0.frame;
                 return Some(Self {
@@ -61,7 +61,7 @@ impl Arbitration {
                     failed,
                 });
             }
-            // A passive error flag is recessive: the others do not notice.
+            // A passive error flag is recessive, so the other members do not detect it.
             failed.extend(members(&lost));
             sending = on;
         }

@@ -1,4 +1,4 @@
-//! Fault confinement: a controller's error counters (ISO 11898-1).
+//! Fault confinement: the error counters of a controller (ISO 11898-1).
 
 use crate::{ControllerState, ErrorState};
 
@@ -14,7 +14,7 @@ impl Counters {
         ControllerState::of_counters(self.tec, self.rec)
     }
 
-    /// Returns `true` if its error flags no longer destroy frames.
+    /// Returns `true` if the member is error passive, so that its error flags no longer destroy frames.
     pub(crate) fn passive(self) -> bool {
         self.state().errors >= ErrorState::Passive
     }
@@ -31,8 +31,8 @@ impl Counters {
         self.tec = self.tec.saturating_add(8);
     }
 
-    /// Counts a missing acknowledgement. A passive sender does not count further, so that a member that is alone never leaves the bus
-    /// because of missing acknowledgements.
+    /// Counts a missing acknowledgement. If the sender is passive, the counter stays unchanged, so that a single member
+    /// on a bus never goes bus-off because of missing acknowledgements.
     pub(crate) fn not_acknowledged(&mut self) {
         if !self.passive() {
             self.send_failed();
@@ -48,13 +48,14 @@ impl Counters {
     }
 }
 
-/// Number of sequences of 11 recessive bits for which a member in bus-off must still wait.
+/// Recovery from bus-off: number of sequences of 11 recessive bits for which the member must still wait.
 ///
-/// These sequences come one after the other on an idle bus, and once at the end of each frame: the delimiter of its
-/// acknowledgement or of its error frame, the end, and the intermission. On a busy bus a member is back after 128 frames at the earliest.
+/// On an idle bus these sequences follow each other. On a busy bus there is one at the end of each frame: the delimiter
+/// of its acknowledgement or of its error frame, the end of frame, and the intermission. There a member is back after
+/// 128 frames at the earliest.
 pub(crate) struct Recovery {
     pub left: u32,
-    /// Time since which the wire is recessive, ns; `None` while a frame is on the wire.
+    /// Time since which the bus has been recessive, ns; `None` while a frame is on the bus.
     pub recessive_from: Option<u64>,
 }
 

@@ -1,13 +1,13 @@
-//! The events of a bus in virtual time.
+//! Events of a bus in virtual time.
 
 use crate::{CanFrame, ControllerState};
 
-/// A member of a [`TimedBus`](crate::TimedBus). Only valid for that bus: another bus may panic. The numbers increase and are never used
-/// twice.
+/// Identifier of a member of a [`TimedBus`](crate::TimedBus). It is only valid for that bus; another bus may panic.
+/// Numbers increase and are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 
-/// An event and its time.
+/// An event with its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedEvent {
     /// Virtual time, ns.
@@ -23,49 +23,49 @@ pub enum BusEvent {
     Received {
         /// The receiver.
         member: MemberId,
-        /// The frame.
+        /// The received frame.
         frame: CanFrame,
     },
-    /// A member's frame was on the bus and was acknowledged.
+    /// A member's frame was transmitted and acknowledged.
     Sent {
-        /// Sender.
+        /// The sender.
         member: MemberId,
-        /// The frame.
+        /// The transmitted frame.
         frame: CanFrame,
     },
-    /// A member's frame is dropped: its sender sends each frame only once, or is bus-off.
+    /// A member's frame is dropped, because its sender sends each frame only once or is bus-off.
     Failed {
-        /// Sender.
+        /// The sender.
         member: MemberId,
-        /// The frame.
+        /// The dropped frame.
         frame: CanFrame,
     },
-    /// A frame has failed. Its senders try again, unless they send each frame only once.
+    /// Transmitting a frame has failed. Its senders try again, unless they send each frame only once.
     Error {
-        /// Error.
+        /// The error.
         error: BusError,
-        /// The frame (of a collision: of its first sender).
+        /// The frame; for a collision, the frame of the first sender.
         frame: CanFrame,
-        /// Senders.
+        /// All senders of the frame.
         senders: Vec<MemberId>,
     },
     /// A member's error state has changed.
     State {
-        /// Member with the new state.
+        /// The member.
         member: MemberId,
         /// The new state.
         state: ControllerState,
     },
 }
 
-/// Errors of a frame.
+/// Reasons why transmitting a frame fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusError {
-    /// Several members sent one identifier with different data at the same time, which CAN forbids.
+    /// Several members sent the same identifier with different data at the same time, which CAN forbids.
     Collision,
-    /// No member acknowledged.
+    /// No member acknowledged the frame.
     NotAcknowledged,
-    /// A bit was disturbed on the wire.
+    /// A bit was disturbed on the bus.
     Disturbed,
 }
 
@@ -75,38 +75,39 @@ pub enum QueueError {
     /// The frame is a CAN FD frame, but the bus is classic.
     #[error("CAN FD frames are none of a bus in virtual time, which is classic")]
     NotClassic,
-    /// The member's controller has left the bus until it recovers.
+    /// The member's controller is bus-off until it recovers.
     #[error("the member is bus-off; its controller must recover first")]
     BusOff,
     /// The member's queue is full.
     #[error("{0} frames of this member wait already; is the bus overloaded, or does nobody acknowledge?")]
     Full(usize),
-    /// The member has left.
+    /// The member has left the bus.
     #[error("the member has left the bus")]
     Left,
 }
 
-/// Counters of a bus since its beginning.
+/// Counters of a bus since it was created.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BusStats {
     /// Virtual time, ns.
     pub now_ns: u64,
-    /// Time for which the bus was busy, intermissions and error frames included, ns.
+    /// Time for which the bus was busy, including intermissions and error frames, ns.
     pub busy_ns: u64,
-    /// Frames that were acknowledged.
+    /// Number of acknowledged frames.
     pub frames: u64,
-    /// Identical frames that several members sent at the same time (counted in `frames` as one).
+    /// Number of identical frames that several members sent at the same time. Such a group is counted in `frames` as
+    /// one frame.
     pub shared: u64,
-    /// Collisions.
+    /// Number of collisions.
     pub collisions: u64,
-    /// Frames that no member acknowledged.
+    /// Number of frames that no member acknowledged.
     pub not_acknowledged: u64,
-    /// Disturbed frames.
+    /// Number of disturbed frames.
     pub disturbed: u64,
 }
 
 impl BusStats {
-    /// Returns the share of the time since `earlier` in which the bus was busy, 0 to 1.
+    /// Returns the share of the time since `earlier` for which the bus was busy, 0 to 1.
     pub fn load_since(&self, earlier: &Self) -> f64 {
         let time = self.now_ns.saturating_sub(earlier.now_ns);
         let busy = self.busy_ns.saturating_sub(earlier.busy_ns);

@@ -17,14 +17,15 @@ pub use event::{BusError, BusEvent, BusStats, MemberId, QueueError, TimedEvent};
 pub use wire::classic_frame_bits;
 use wire::{ERROR_FRAME, INTERMISSION, RECESSIVE_RUN, RECOVERIES, TO_ACKNOWLEDGE};
 
-/// Maximum number of frames of a member that wait.
+/// Largest number of waiting frames per member.
 const QUEUE: usize = 65_536;
 
 /// A classic CAN bus in virtual time.
 ///
-/// Frames take as long as on a wire of this bit rate, with stuffing counted bit by bit. The identifiers of the first frames of all queues
-/// arbitrate as on the wire. Members acknowledge, count errors, become passive and leave the bus as ISO 11898-1 has it; two members that
-/// send one identifier with different data at once collide. Equal calls and equal seeds give equal events.
+/// Frames take as long as on a real bus with this bit rate; stuff bits are counted exactly. The first frames of all
+/// queues take part in arbitration as on a real bus. Members acknowledge frames, count errors, become error passive and
+/// go bus-off according to ISO 11898-1. Two members that send the same identifier with different data at the same time
+/// collide. The same calls with the same seed give the same events.
 ///
 /// ```
 /// use can_link::{CanFrame, BusEvent, Id, TimedBus};
@@ -32,7 +33,7 @@ const QUEUE: usize = 65_536;
 /// let (tool, board) = (bus.join(), bus.join());
 /// bus.queue(tool, CanFrame::classic(Id::standard(0x281)?, &[])?)?;
 /// while let Some(event) = bus.advance_to(1_000_000) {
-///     // It is the time of the event now: what is queued here competes from this moment on.
+///     // The current time is the time of the event. Frames queued here take part in arbitration from now on.
 ///     if let BusEvent::Received { member, frame } = event.what {
 ///         assert_eq!((member, frame.to_string()), (board, "281 #".to_owned()));
 ///     }
@@ -46,7 +47,7 @@ pub struct TimedBus {
     members: Vec<Member>,
     random: fastrand::Rng,
     disturbance: f64,
-    /// Transfer on the wire.
+    /// Frame transfer that is on the bus.
     transfer: Option<Transfer>,
     /// End of the intermission.
     free_from: u64,
@@ -56,17 +57,17 @@ pub struct TimedBus {
 }
 
 struct Member {
-    /// First in, first out.
+    /// Waiting frames, first in, first out.
     queue: VecDeque<CanFrame>,
-    /// Faults on the way to the queue and from the bus.
+    /// Simulated faults: of frames on the way to the queue, and of frames from the bus.
     lines: Option<Box<(Line, Line)>>,
     counters: Counters,
-    /// A passive member lets others start first.
+    /// Earliest time at which the member may start a frame. An error passive member lets others start first.
     may_start: u64,
-    /// Recovery from bus-off.
+    /// Recovery from bus-off, while it lasts.
     recovery: Option<Recovery>,
     one_shot: bool,
-    /// `true` if the frame on the wire has been removed from the queue: it is not sent again.
+    /// `true` if the frame on the bus was already removed from the queue, so that it is not sent again.
     last_try: bool,
     acknowledges: bool,
     left: bool,
@@ -81,7 +82,7 @@ impl Member {
 struct Transfer {
     end: u64,
     arbitration: Arbitration,
-    /// Error of the frame, if not a collision.
+    /// Error of the frame, unless it is a collision.
     error: Option<BusError>,
 }
 
@@ -89,7 +90,7 @@ fn time(ns: u64) -> Duration {
     Duration::from_nanos(ns)
 }
 
-/// Converts to ns; a time after the end of virtual time is never due.
+/// Converts a time to ns; returns `None` for a time that is too large to be represented.
 fn ns(time: Duration) -> Option<u64> {
     u64::try_from(time.as_nanos()).ok()
 }
@@ -98,7 +99,8 @@ fn ns(time: Duration) -> Option<u64> {
 const END_OF_TIME: u64 = u64::MAX / 2;
 
 impl TimedBus {
-    /// Creates a bus without members at time 0. `bitrate` is in bit/s; 0 counts as 1. `seed` is the seed of the disturbances.
+    /// Creates a bus without members at time 0. `bitrate` is in bit/s; 0 is treated as 1. `seed` determines the
+    /// disturbances.
     pub fn new(bitrate: u32, seed: u64) -> Self {
         Self {
             bitrate: bitrate.max(1),
@@ -114,13 +116,15 @@ impl TimedBus {
         }
     }
 
-    /// Sets if controllers begin to recover as soon as they are bus-off, like `restart-ms` of Linux and the automatic recovery of many
-    /// controllers. Frames queued in between wait. Otherwise [`recover`](Self::recover) begins the recovery.
+    /// Sets if controllers begin to recover as soon as they are bus-off, like `restart-ms` in Linux and the automatic
+    /// recovery of many controllers. Frames queued meanwhile wait. Without this setting, [`recover`](Self::recover)
+    /// begins the recovery.
     pub fn set_recovers_by_itself(&mut self, recovers: bool) {
         self.recovers_by_itself = recovers;
     }
 
-    /// Adds a member. The member acknowledges, receives frames that end from now on, and tries again if sending fails.
+    /// Adds a member. It acknowledges frames, receives all frames that end from now on, and repeats a frame if sending
+    /// fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -136,7 +140,7 @@ impl TimedBus {
         MemberId(self.members.len() - 1)
     }
 
-    /// Removes the member for good, with its queued frames; a frame that it is sending is cut off.
+    /// Removes the member permanently, with its queued frames. A frame that it is sending is cut off.
     pub fn leave(&mut self, member: MemberId) {
         let member = &mut self.members[member.0];
         member.queue.clear();
@@ -145,8 +149,8 @@ impl TimedBus {
         member.left = true;
     }
 
-    /// Clears the queued frames of the member and its error counters, as a reset does. The member is on the bus again. A frame on
-    /// the wire ends unchanged, but is not sent again.
+    /// Clears the member's queued frames and error counters, as a reset does. The member is on the bus again. A frame
+    /// that is on the bus ends normally, but is not sent again.
     pub fn clear(&mut self, member: MemberId) {
         let sends = self.transfer.as_ref().is_some_and(|transfer| transfer.arbitration.involves(member));
         let number = member;
@@ -156,7 +160,7 @@ impl TimedBus {
         self.restart(number);
     }
 
-    /// Resets the counters of a member as after power-up.
+    /// Resets a member's counters to their values after power-up.
     fn restart(&mut self, number: MemberId) {
         let member = &mut self.members[number.0];
         member.recovery = None;
@@ -167,7 +171,7 @@ impl TimedBus {
         }
     }
 
-    /// Sets if a member drops a frame after one failure instead of trying again.
+    /// Sets if a member drops a frame after one failure instead of repeating it.
     pub fn set_one_shot(&mut self, member: MemberId, one_shot: bool) {
         self.members[member.0].one_shot = one_shot;
     }
@@ -177,7 +181,8 @@ impl TimedBus {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Sets the faults between a member and the bus, like those of a gateway. The bus itself does not notice them.
+    /// Sets simulated faults between a member and the bus, such as those of a gateway. They do not affect the bus
+    /// itself.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -185,13 +190,13 @@ impl TimedBus {
         self.members[member.0].lines = Some(Box::new((send, receive)));
     }
 
-    /// Returns the counters of these faults for frames sent and received by the member.
+    /// Returns the counters of these faults, for frames that the member sent and for frames that it received.
     pub fn fault_stats(&self, member: MemberId) -> (FaultStats, FaultStats) {
         let lines = self.members[member.0].lines.as_deref();
         lines.map_or_else(Default::default, |(send, receive)| (send.stats(), receive.stats()))
     }
 
-    /// Sets the share of the frames in which a bit is disturbed on the wire, 0 to 1. An error frame destroys these frames.
+    /// Sets the share of frames in which a bit is disturbed on the bus, 0 to 1. An error frame destroys such a frame.
     pub fn set_disturbance(&mut self, share: f64) {
         self.disturbance = share;
     }
@@ -220,7 +225,7 @@ impl TimedBus {
         Ok(())
     }
 
-    /// Returns the number of frames of the member that wait, including the one on the wire.
+    /// Returns the number of the member's waiting frames, including a frame that is on the bus.
     pub fn pending(&self, member: MemberId) -> usize {
         self.members[member.0].queue.len()
     }
@@ -230,8 +235,8 @@ impl TimedBus {
         self.members[member.0].counters.state()
     }
 
-    /// Starts the recovery of a member that is bus-off. The member is back when it has seen 11 recessive bits 128 times (ISO 11898-1),
-    /// which takes 1408 bit times on an idle bus.
+    /// Starts the recovery of a member that is bus-off. The member is back after it has seen 11 recessive bits 128
+    /// times (ISO 11898-1), which takes 1408 bit times on an idle bus.
     pub fn recover(&mut self, member: MemberId) {
         let recessive_from = self.transfer.is_none().then_some(self.now);
         let member = &mut self.members[member.0];
@@ -250,7 +255,7 @@ impl TimedBus {
         BusStats { now_ns: self.now, ..self.stats }
     }
 
-    /// Returns the time of the next action if no further call is made, ns; the action may have no event.
+    /// Returns the time of the bus's next action if no further call is made, ns. The action may cause no event.
     pub fn next_ns(&self) -> Option<u64> {
         if !self.events.is_empty() {
             return Some(self.now);
@@ -267,8 +272,9 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Advances to the next event, or to `at_ns` if none comes before. Call it until it returns `None`. While it returns events, the
-    /// present time is the time of the event, and frames that are queued then compete from that time on.
+    /// Advances to the next event, or to `at_ns` if there is none before. Must be called until it returns `None`. After
+    /// it returns an event, the current time is the time of the event, and frames that are queued then take part in
+    /// arbitration from that time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {
@@ -292,7 +298,7 @@ impl TimedBus {
         (u64::from(bits) * 1_000_000_000).div_ceil(u64::from(self.bitrate))
     }
 
-    /// Returns the time at which the bus and a member with a frame are ready.
+    /// Returns the time at which the bus is free and a member with a frame may start.
     fn next_start(&self) -> Option<u64> {
         let ready = |member: &Member| member.on_bus() && !member.queue.is_empty();
         let start = |member: &Member| member.may_start.max(self.free_from);
@@ -327,13 +333,13 @@ impl TimedBus {
                 self.events.push_back(BusEvent::Received { member: MemberId(number), frame });
             }
         }
-        // Events of this time come first: members that react to them take part in the next arbitration.
+        // Events of this time are returned first, so that members that react to them take part in the next arbitration.
         if self.events.is_empty() && self.transfer.is_none() {
             self.start();
         }
     }
 
-    /// A frame has ended: the first of 11 recessive bits was the delimiter before its end.
+    /// Called when a frame has ended. The first of the 11 recessive bits was the delimiter before the end of frame.
     fn wire_is_recessive(&mut self) {
         let from = self.free_from.saturating_sub(self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -341,7 +347,7 @@ impl TimedBus {
         }
     }
 
-    /// A frame begins: fewer than 11 recessive bits before it do not count.
+    /// Called when a frame begins. A sequence of fewer than 11 recessive bits before it is not counted.
     fn wire_is_taken(&mut self) {
         let (now, sequence) = (self.now, self.bits_ns(RECESSIVE_RUN));
         for recovery in self.members.iter_mut().filter_map(|member| member.recovery.as_mut()) {
@@ -359,7 +365,7 @@ impl TimedBus {
         };
         let starters: Vec<_> = self.members.iter().enumerate().filter_map(ready).collect();
         let Some(arbitration) = Arbitration::of(&starters) else { return };
-        // Drawn for every frame: the fault of one frame does not change the faults of others.
+        // Drawn for every frame, so that the fault of one frame does not change the faults of others.
         let (luck, place) = (self.random.f64(), self.random.f64());
         let (bits, error) = if arbitration.senders.is_empty() {
             (arbitration.bits + ERROR_FRAME, None)
@@ -377,7 +383,7 @@ impl TimedBus {
         self.wire_is_taken();
     }
 
-    /// Senders do not acknowledge.
+    /// Returns `true` if a member other than the senders acknowledges the frame.
     fn acknowledged(&self, senders: &[MemberId]) -> bool {
         let acknowledges = |(number, member): (usize, &Member)| {
             member.on_bus() && member.acknowledges && !senders.contains(&MemberId(number))

@@ -1,4 +1,4 @@
-//! End of a frame on the wire, and its effect on the counters.
+//! End of a frame on the bus, and its effect on the counters.
 
 use super::confinement::Counters;
 use super::wire::SUSPENDED;
@@ -18,7 +18,7 @@ impl TimedBus {
         let frame = arbitration.frame;
         let mut senders = arbitration.senders;
         let destroyed = senders.is_empty();
-        // A sender that left has cut its frame off.
+        // A sender that has left the bus has cut its frame off.
         senders.retain(|member| !self.members[member.0].left);
         if senders.is_empty() && !destroyed && error.is_none() {
             error = Some(BusError::Disturbed);
@@ -54,7 +54,7 @@ impl TimedBus {
             if senders.contains(&number) || !self.members[number.0].on_bus() {
                 continue;
             }
-            // A member that dropped out of a collision continues as a listener, as on the wire.
+            // A member that lost a collision receives the frame, as on a real bus.
             self.count(number, Counters::received);
             match &mut self.members[number.0].lines {
                 Some(lines) => lines.1.put(now, frame),
@@ -96,7 +96,7 @@ impl TimedBus {
         }
     }
 
-    /// Changes a member's counters. A new error state causes an event.
+    /// Changes a member's counters. If its error state changes, adds an event.
     fn count(&mut self, number: MemberId, how: fn(&mut Counters)) {
         let member = &mut self.members[number.0];
         if !member.on_bus() {

@@ -1,4 +1,4 @@
-//! Classic frames as bits on the wire (ISO 11898-1): arbitration, stuffing, length.
+//! Classic frames as bits on the bus (ISO 11898-1): arbitration, stuffing, length.
 
 use crate::CanFrame;
 
@@ -6,22 +6,23 @@ use crate::CanFrame;
 pub(crate) const DOMINANT: bool = false;
 const RECESSIVE: bool = true;
 
-/// Delimiter of the CRC, acknowledge slot, its delimiter, and end of frame.
+/// Bits after the CRC: its delimiter, acknowledge slot, acknowledge delimiter, and end of frame.
 const TAIL: u32 = 1 + 1 + 1 + 7;
-/// Bits up to the end of the acknowledge slot that follow the CRC.
+/// Number of bits from the end of the CRC to the end of the acknowledge slot.
 pub(crate) const TO_ACKNOWLEDGE: u32 = 2;
-/// Between frames.
+/// Number of bits between frames.
 pub(crate) const INTERMISSION: u32 = 3;
-/// An error flag, the echo of the others, and the delimiter: the longest error frame.
+/// Longest error frame: an error flag, the echo of the others, and the delimiter.
 pub(crate) const ERROR_FRAME: u32 = 6 + 6 + 8;
-/// Wait of an error passive member after the intermission that follows its own frame.
+/// Bits that an error passive member waits after the intermission that follows its own frame.
 pub(crate) const SUSPENDED: u32 = 8;
-/// Recessive bits in a row that a controller in its recovery from bus-off counts as one sequence, and the number of
-/// sequences that it needs.
+/// Number of consecutive recessive bits that a bus-off controller counts as one sequence, and the number of sequences
+/// that it needs to recover.
 pub(crate) const RECESSIVE_RUN: u32 = 11;
 pub(crate) const RECOVERIES: u32 = 128;
 
-/// Most bits from the start of a frame to the end of its CRC, stuffing included (29-bit identifier, 8 bytes: 118 and 29).
+/// Largest number of bits from the start of a frame to the end of its CRC, including stuff bits (29-bit identifier, 8
+/// bytes: 118 and 29).
 const MOST: usize = 147;
 
 /// The bits from start of frame to CRC, with stuff bits.
@@ -43,7 +44,7 @@ impl WireBits {
         let value = frame.id().value();
         if frame.is_extended() {
             writer.put(value >> 18, 11);
-            // Substitute remote request and identifier extension.
+            // Substitute remote request bit and identifier extension bit.
             writer.put(0b11, 2);
             writer.put(value & 0x3_FFFF, 18);
             writer.put(u32::from(frame.is_remote()), 1);
@@ -70,7 +71,7 @@ impl WireBits {
 struct Writer {
     out: WireBits,
     crc: u16,
-    /// Equal bits in a row so far.
+    /// Number of equal bits in a row so far.
     same: u32,
     last: bool,
 }
@@ -100,10 +101,10 @@ fn crc15(crc: u16, bit: bool) -> u16 {
     (crc << 1 ^ if out { 0x4599 } else { 0 }) & 0x7FFF
 }
 
-/// Returns the arbitration key. The frame with the lowest key wins; equal keys do not arbitrate.
+/// Returns the arbitration key. The frame with the lowest key wins; frames with equal keys are not arbitrated.
 ///
-/// The key begins with the base identifier. Then comes the remote bit of an 11-bit frame, at the position of the recessive substitute bit
-/// of a 29-bit frame.
+/// The key begins with the base identifier. The next bit is the remote bit of an 11-bit frame, or the recessive
+/// substitute bit of a 29-bit frame, which has the same position.
 pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     let (value, remote) = (frame.id().value(), u32::from(frame.is_remote()));
     if frame.is_extended() {
@@ -113,9 +114,10 @@ pub(crate) fn arbitration(frame: &CanFrame) -> u32 {
     }
 }
 
-/// Returns the exact length of a classic frame on the wire, stuffing and the three bits of intermission included, or `None` for CAN FD.
+/// Returns the exact length of a classic frame on the bus in bits, including stuff bits and the three bits of
+/// intermission, or `None` for CAN FD.
 ///
-/// A bus is full if the lengths of the frames of one second add up to the bit rate.
+/// A bus is fully loaded if the frame lengths of one second add up to the bit rate.
 pub fn classic_frame_bits(frame: &CanFrame) -> Option<u32> {
     WireBits::of(frame).map(|bits| bits.bits().len() as u32 + TAIL + INTERMISSION)
 }
@@ -131,7 +133,7 @@ mod tests {
             (0..0x800_u32).prop_map(|id| Id::standard(id).unwrap()),
             (0..0x2000_0000_u32).prop_map(|id| Id::extended(id).unwrap()),
         ];
-        // Runs of equal bits, which need stuffing, are more likely than in random bytes.
+        // Runs of equal bits, which need stuffing, are made more likely than in random bytes.
         let byte = prop_oneof![any::<u8>(), Just(0), Just(0xFF), Just(0x0F), Just(0xF0)];
         (id, prop::collection::vec(byte, 0..=8), any::<bool>()).prop_map(|(id, data, remote)| match remote {
             true => CanFrame::remote(id, data.len()).unwrap(),
@@ -146,7 +148,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// Checked against an independent CRC and by reading the fields at the places that the standard defines.
+        /// Checks against an independent CRC, and reads the fields at the positions that the standard defines.
         #[test]
         fn fields_stand_where_the_standard_has_them(frame in any_classic()) {
             let wire = WireBits::of(&frame).unwrap();
@@ -155,7 +157,7 @@ mod tests {
                 run = if pair[0] == pair[1] { run + 1 } else { 0 };
                 prop_assert!(run < 5, "never six alike");
             }
-            // The stuff bit of the last run may come after the CRC.
+            // The stuff bit of the last run may be after the CRC.
             let mut logical = destuff(wire.bits());
             let crc = logical.split_off(logical.len() - 15);
             // Leading zeros do not change a CRC that starts at 0.
@@ -180,10 +182,10 @@ mod tests {
             prop_assert_eq!(&data[..], frame.data());
         }
 
-        /// The wire decides bit by bit; the keys must order frames alike.
+        /// The bus decides bit by bit; the keys must give the same order of frames.
         #[test]
         fn keys_order_frames_as_the_wire_does(a in any_classic(), b in any_classic(), near in any::<bool>()) {
-            // Equal base identifiers are the interesting case.
+            // Equal base identifiers are the critical case.
             let b = if near { with_base_of(&a, &b) } else { b };
             let (wa, wb) = (WireBits::of(&a).unwrap(), WireBits::of(&b).unwrap());
             let first = wa.bits().iter().zip(wb.bits()).find(|(a, b)| a != b);
@@ -213,7 +215,7 @@ mod tests {
         }
     }
 
-    /// Removes stuff bits as a receiver does: drops the bit after five equal ones.
+    /// Removes stuff bits like a receiver: drops the bit after five equal ones.
     fn destuff(bits: &[bool]) -> Vec<bool> {
         let (mut found, mut run, mut last, mut skip) = (Vec::new(), 0, None, false);
         for bit in bits {
@@ -227,7 +229,8 @@ mod tests {
         found
     }
 
-    /// The bounds of the literature: 111 and 131 bits with 8 bytes before stuffing, 135 and 160 at worst, intermission included.
+    /// Bounds from the literature: 111 and 131 bits with 8 bytes before stuffing, 135 and 160 at most, including
+    /// intermission.
     #[test]
     fn lengths_lie_between_the_known_bounds() {
         let bits = |frame| classic_frame_bits(&frame).unwrap();

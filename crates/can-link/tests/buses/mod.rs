@@ -1,4 +1,5 @@
-//! Every kind of bus as its users see it: adapters, servers and clients on real lines, and the bus in virtual time.
+//! Tests of every kind of bus from the user's side: adapters, servers and clients on real lines, and the bus in virtual
+//! time.
 
 mod slcan;
 mod socketcand;
@@ -34,7 +35,8 @@ fn take(bus: &mut impl CanBus) -> CanFrame {
     }
 }
 
-/// Waits until other threads have done something, with shorter pauses than `patience::until`: some tests wait thousands of times.
+/// Waits until other threads have finished something. Its pauses are shorter than those of `patience::until`, because
+/// some tests wait thousands of times.
 #[track_caller]
 fn until(mut done: impl FnMut() -> bool) {
     let mut patience = Patience::begin();
@@ -43,14 +45,14 @@ fn until(mut done: impl FnMut() -> bool) {
     }
 }
 
-/// A server of the socketcand protocol and its bus.
+/// Creates a server of the socketcand protocol and its bus.
 fn socketcand_bench() -> (SocketcandServer, VirtualHub) {
     let hub = VirtualHub::new();
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     (server, hub)
 }
 
-/// Returns the events of a bus in virtual time up to a time.
+/// Returns the events of a bus in virtual time up to this time.
 fn run(bus: &mut TimedBus, until_ns: u64) -> Vec<TimedEvent> {
     std::iter::from_fn(|| bus.advance_to(until_ns)).collect()
 }

@@ -1,4 +1,5 @@
-//! The host's side of SLCAN against adapters: our own at a pseudo-terminal and over TCP, and simulated ones of other makers.
+//! Tests of the host's side of SLCAN with adapters: our own on a pseudo-terminal and over TCP, and simulated ones of
+//! other manufacturers.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -15,7 +16,7 @@ use test_kit::patience::LONGEST;
 
 use super::{frame, take, until};
 
-/// An adapter between a port and a bus, in a thread of its own.
+/// An adapter between a port and a bus, in its own thread.
 struct Running {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<SlcanAdapter>>,
@@ -31,7 +32,7 @@ impl Running {
             let mut latest = None;
             while adapter.turn(&mut port, &mut bus).is_ok() {
                 if asked.load(Ordering::Relaxed) {
-                    // Bytes written before the request to stop may still be in the terminal.
+                    // Bytes written before the stop request may still be in the terminal.
                     let latest = *latest.get_or_insert_with(|| Instant::now() + Duration::from_secs(2));
                     if !adapter.is_open() || Instant::now() >= latest {
                         break;
@@ -49,7 +50,7 @@ impl Running {
     }
 }
 
-/// Checks all kinds of frames in both directions, and the state. Returns the adapter.
+/// Checks all kinds of frames in both directions, and the state; returns the adapter.
 fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
     let mut bus = open(url).unwrap();
     let mut frames = Vec::new();
@@ -69,7 +70,7 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
         node.send(frame).unwrap();
         assert_eq!(take(&mut bus), *frame);
     }
-    // Bursts in both directions at once: neither side waits for ever for the other, no frame is lost or out of order.
+    // Bursts in both directions at once: no side waits forever for the other, and no frame is lost or out of order.
     let count = 3000;
     std::thread::scope(|scope| {
         let node = &mut node;
@@ -88,7 +89,7 @@ fn check(url: &str, adapter: Running, mut node: VirtualBus) -> SlcanAdapter {
     }
     assert_eq!(bus.receive(Duration::ZERO).unwrap(), None);
     assert_eq!(bus.state().errors, ErrorState::Warning);
-    // The last frame is received although no sender waits for it.
+    // The last frame arrives although no call waits for it.
     bus.send(&frame(3, &[])).unwrap();
     drop(bus);
     assert_eq!(take(&mut node), frame(3, &[]));
@@ -101,7 +102,7 @@ fn all_frames_go_both_ways_over_a_pseudo_terminal() {
     use serialport::{SerialPort, TTYPort};
     let (mut port, line) = TTYPort::pair().unwrap();
     port.set_timeout(Duration::from_millis(1)).unwrap();
-    // `line` is held so that the terminal stays.
+    // `line` is kept open so that the terminal continues to exist.
     let hub = VirtualHub::new();
     let adapter = Running::start(port, hub.join());
     let device = line.name().unwrap();
@@ -109,7 +110,7 @@ fn all_frames_go_both_ways_over_a_pseudo_terminal() {
     assert_eq!((adapter.rates(), adapter.is_open()), ((Some(1_000_000), Some(5_000_000)), false));
 }
 
-/// Starts a thread that acts as an adapter over TCP; `play` gets the connection.
+/// Starts a thread that acts as an adapter over TCP; `play` is called with the connection.
 fn served<R: Send + 'static>(play: impl FnOnce(TcpStream) -> R + Send + 'static) -> (String, JoinHandle<R>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let device = format!("tcp:{}", listener.local_addr().unwrap());
@@ -156,7 +157,7 @@ fn options(device: &str, rate: Option<u32>, data_rate: Option<u32>) -> SlcanOpti
     SlcanOptions { device: device.to_owned(), rate, data_rate, baud: SlcanOptions::BAUD }
 }
 
-/// Reads lines until the end of the stream; `answer` returns the answer to each.
+/// Reads lines until the end of the stream; `answer` returns the answer to each line.
 fn play(mut stream: TcpStream, mut answer: impl FnMut(&str) -> String) -> Vec<String> {
     let mut lines = Vec::new();
     let mut line = String::new();
@@ -174,7 +175,7 @@ fn play(mut stream: TcpStream, mut answer: impl FnMut(&str) -> String) -> Vec<St
     lines
 }
 
-/// Some firmware answers only the question for its version.
+/// Some firmware answers only the version request.
 #[test]
 fn an_adapter_that_never_answers_is_written_to_all_the_same() {
     let (device, adapter) = served(|stream| {
@@ -193,7 +194,8 @@ fn an_adapter_that_never_answers_is_written_to_all_the_same() {
     assert_eq!(lines[first + 2..], [frames, vec!["C".to_owned()]].concat());
 }
 
-/// The host waits for a full transmit queue: the bell means "again", never "lost" or "out of order".
+/// The host waits while the adapter's transmit queue is full. A bell means that the frame must be sent again, so no
+/// frame is lost or out of order.
 #[test]
 fn refused_frames_are_sent_again_in_order() {
     let (device, adapter) = served(|stream| {
@@ -207,7 +209,7 @@ fn refused_frames_are_sent_again_in_order() {
             [b't', ..] => {
                 refused = 0;
                 taken.push(line.to_owned());
-                // A frame of the bus arrives before the confirmation.
+                // A frame from the bus arrives before the confirmation.
                 "t7000\rz\r".to_owned()
             }
             [b'V'] => "V1013\r".to_owned(),
@@ -222,7 +224,7 @@ fn refused_frames_are_sent_again_in_order() {
     for _ in 0..50 {
         assert_eq!(take(&mut bus), frame(0x700, &[]));
     }
-    // The last frame is sent, too, although no call waits for it.
+    // The last frame is sent although no call waits for it.
     bus.send(&frame(0x100, &[50])).unwrap();
     drop(bus);
     let expected: Vec<_> = (0..=50).map(|number| format!("t1001{number:02X}")).collect();
@@ -324,7 +326,7 @@ fn a_port_without_an_adapter_and_one_that_goes_are_distinguished() {
     adapter.join().unwrap();
 }
 
-/// The adapter's side by the manual: its answers in each state.
+/// The adapter's side according to the manual: its answers in each state.
 #[test]
 fn the_adapter_answers_by_the_manual() {
     let mut adapter = SlcanAdapter::new();

@@ -1,4 +1,4 @@
-//! The socketcand protocol on the wire, as a client sees it that knows only the protocol.
+//! The socketcand protocol on the connection, tested with a client that knows only the protocol.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use test_kit::patience::LONGEST;
 
 use super::{frame, numbered, socketcand_bench, take, until};
 
-/// A client as simple as python-can's.
+/// A client as simple as the one in python-can.
 struct Raw(TcpStream);
 
 impl Raw {
@@ -44,7 +44,7 @@ impl Raw {
         raw
     }
 
-    /// Reads until `end` has come.
+    /// Reads until the text contains `end`.
     fn read_until(&mut self, end: &str) -> String {
         let mut text = String::new();
         while !text.contains(end) {
@@ -56,7 +56,7 @@ impl Raw {
     }
 }
 
-/// Stops a thread even when a test fails.
+/// Stops a thread, even if a test fails.
 struct Guard<'a>(&'a AtomicBool);
 
 impl Drop for Guard<'_> {
@@ -72,7 +72,7 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         let _guard = Guard(&stop);
-        // The bus is never quiet.
+        // Frames are sent on the bus all the time.
         scope.spawn(|| {
             for number in 0.. {
                 node.send(&numbered(number)).unwrap();
@@ -85,15 +85,16 @@ fn answers_come_alone_and_no_frame_is_glued_to_them() {
         let alone = (0..50).any(|_| {
             let mut client = Raw::connect(&server);
             assert_eq!(client.read(), "< hi >");
-            // Before raw mode the client receives no frames.
+            // The client receives no frames before raw mode.
             assert_eq!(client.ask("< open can0 >"), "< ok >");
             client.write("< rawmode >");
             client.0.peek(&mut [0]).unwrap();
-            // Long enough for frames that are not held back. On a busy computer this is sometimes long enough for those that are, too.
+            // Long enough for frames that are not held back to arrive. On a busy computer it is sometimes also long
+            // enough for frames that are held back.
             std::thread::sleep(Duration::from_millis(3));
             let first = client.read();
             assert!(first.starts_with("< ok >"), "{first}");
-            // The frames that were held back arrive without a gap.
+            // The frames that were held back arrive without a gap in their numbers.
             let text = client.read_until(" >< frame 100 ");
             let text = text + &client.read_until(" >< frame 100 ");
             let numbers: Vec<_> = text.split(" >").filter_map(|line| line.get(line.len() - 8..)).collect();
@@ -186,13 +187,13 @@ fn clients_hear_each_other_and_not_themselves_in_the_order_of_the_bus() {
 
 #[test]
 fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
-    // If a sender waited for this member, it would wait for ever.
+    // If a sender waited for this member, it would wait forever.
     let hub = VirtualHub::with_timeout(Duration::MAX);
     let server = SocketcandServer::bind("127.0.0.1:0", &[("can0", &hub)]).unwrap();
     let mut node = hub.join();
     let mut sleeper = Raw::raw_mode(&server);
     let mut listener = open(&server.url("can0")).unwrap();
-    // More frames than fit into its queue and into the buffers of any system.
+    // More frames than its queue and the buffers of any system can hold.
     let count = 100_000;
     let (done, waited) = std::sync::mpsc::channel();
     std::thread::spawn(move || {
@@ -211,7 +212,8 @@ fn a_client_that_reads_nothing_stalls_nobody_and_its_misses_are_counted() {
     });
     let mut node = waited.recv_timeout(LONGEST).expect("the sleeper holds up the bus");
     assert!(server.stats().missed > 0, "{:?}", server.stats());
-    // The sleeper is still a client: it finds the oldest frames that waited. When its queue has space again, it receives new frames.
+    // The client that slept is still connected, and reads the oldest waiting frames. When its queue has space again, it
+    // receives new frames.
     assert!(sleeper.read_until(">").contains(" 00000000 >"));
     until(|| {
         sleeper.read();
@@ -247,7 +249,7 @@ fn what_has_no_form_is_counted_and_what_is_not_understood_does_no_harm() {
     until(|| server.stats().not_carried == 2);
     let stats = server.stats();
     assert!(stats.not_understood >= 9 && stats.received == 0, "{stats:?}");
-    // Back in the mode without frames.
+    // In the previous mode the client receives no frames.
     assert_eq!(client.ask("< bcmmode >"), "< ok >");
     node.send(&numbered(8)).unwrap();
     assert_eq!(client.ask("< echo >"), "< echo >");
@@ -266,7 +268,7 @@ fn an_unknown_bus_is_refused_with_what_there_is() {
     assert!(error.contains("opening the bus") && error.contains("there is can0"), "{error}");
 }
 
-/// Frames that a client sent before it ended are delivered, even when it did not read what was sent to it.
+/// Frames that a client sent before it disconnected are delivered, even if it did not read its own received frames.
 #[test]
 fn the_last_frames_of_a_client_are_delivered() {
     let (server, hub) = socketcand_bench();
@@ -289,10 +291,10 @@ fn ten_thousand_visitors_leave_nothing_behind() {
     let texts: [&[u8]; 5] = [b"", b"< open can0 >", b"< open can0 >< rawmode >", b"<", &[0xFF; 3000]];
     for number in 0..10_000 {
         let mut stream = TcpStream::connect(server.local_addr()).unwrap();
-        // The server may have ended the connection already.
+        // The server may already have closed the connection.
         let _ = stream.write_all(texts[number % texts.len()]);
         if number % 16 == 15 {
-            // At most as many connections at a time as the server accepts.
+            // Limits the number of connections to what the server accepts.
             until(|| server.stats().accepted > number as u64 && server.stats().clients < 32);
         }
     }
@@ -311,7 +313,7 @@ fn more_clients_than_there_is_room_for_are_turned_away() {
         Ok(count) => assert_eq!(count, 0),
         Err(error) => assert_eq!(error.kind(), ErrorKind::ConnectionReset),
     }
-    // The count comes after the end of the connection.
+    // The counter changes after the connection is closed.
     until(|| server.stats().turned_away == 1);
     drop(clients);
     until(|| server.stats().clients == 0);

@@ -1,4 +1,4 @@
-//! The client of the socketcand protocol: its refusals, and its reports about servers that disconnect or do not speak the protocol.
+//! The socketcand client: frames it refuses, and its errors if a server disconnects or does not use the protocol.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpListener};
@@ -39,7 +39,7 @@ fn the_client_refuses_what_the_protocol_cannot_carry() {
     }
 }
 
-/// Bad servers: each must end in an error, none in a panic or a hang.
+/// Invalid servers: each must lead to an error, not to a panic or a hang.
 #[test]
 fn servers_that_are_none_end_in_words() {
     let end_with = |texts: &'static [&'static str]| {
@@ -78,7 +78,8 @@ fn servers_that_are_none_end_in_words() {
     assert!(
         matches!(&refused, Err(OpenError::SetUp(CanError::Answer(AnswerError::Refused { answer, .. }))) if answer == "could not open bus")
     );
-    // All lines in one piece: with and without blanks between bytes, of the old and the new kind, and a cut line at the end.
+    // All messages arrive in one piece: with and without blanks between bytes, in the old and the new format, and with
+    // an incomplete message at the end.
     let (frames, ignored, errors) = end_with(&[
         "< hi >< ok >< ok >< frame 123 1.0 11 22 >< frame 123 1.0 1122 >\n< frame 00000001 2.5  >",
         "< error 040 1.0 >< rtr 123 1.0 >< frame 5 zz 11 >< frame 12",

@@ -1,4 +1,4 @@
-//! Clients of the socketcand protocol on a bus that the host runs itself.
+//! Clients of the socketcand protocol on a bus that the host program runs itself.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -27,7 +27,7 @@ fn a_host_can_run_the_bus_itself() {
     a.send(&numbered(1)).unwrap();
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.channel, event.client, event.event), (0, id_a, ClientEvent::Frame(numbered(1))));
-    // No client has received the frame yet, because the host decides.
+    // No client has received the frame yet, because the host program decides when it is on the bus.
     gateway.deliver(0, &numbered(2), None);
     gateway.deliver(0, &numbered(1), Some(id_a));
     gateway.deliver(0, &numbered(3), None);
@@ -42,7 +42,7 @@ fn a_host_can_run_the_bus_itself() {
     let event = gateway.next(LONGEST).unwrap();
     assert_eq!((event.client, event.event), (id_a, ClientEvent::Left));
     assert_eq!(gateway.next(Duration::ZERO), None);
-    // Full queues towards a host that takes no events do not prevent the end of the gateway.
+    // Full queues towards a host program that takes no events do not block the end of the gateway.
     std::thread::scope(|scope| {
         scope.spawn(move || while b.send(&numbered(4)).is_ok() {});
         until(|| gateway.stats().received > 1000);
@@ -50,7 +50,7 @@ fn a_host_can_run_the_bus_itself() {
     });
 }
 
-/// Each client is a member of a bus in virtual time, which answers as a board would.
+/// Each client is a member of a bus in virtual time, on which the test answers like a board.
 #[test]
 fn clients_are_members_of_a_bus_in_virtual_time() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();
@@ -101,7 +101,8 @@ fn clients_are_members_of_a_bus_in_virtual_time() {
     assert_eq!(stats.frames, u64::from(2 * count));
 }
 
-/// A client receives reports that its own controller is bus-off and that it is back, between the frames before and after; others do not.
+/// A client is informed, in order with its frames, that its own controller is bus-off and that it is back. Other
+/// clients are not informed.
 #[test]
 fn a_client_receives_its_own_bus_off() {
     let mut gateway = SocketcandGateway::bind("127.0.0.1:0", &["can0"]).unwrap();

@@ -1,4 +1,4 @@
-//! The bus in virtual time against ISO 11898-1.
+//! The bus in virtual time, compared with ISO 11898-1.
 
 use can_link::{
     BusError, BusEvent, CanFrame, ErrorState, FaultConfig, FaultSchedule, Id, QueueError, TimedBus,
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use super::{MS, errors, frame, received, run};
 
-/// Bits of a frame on the wire without the intermission.
+/// Returns the number of bits of a frame on the bus, without the intermission.
 fn bits(frame: &CanFrame) -> u64 {
     u64::from(classic_frame_bits(frame).unwrap()) - 3
 }
@@ -50,7 +50,7 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
     let (a, b, listener) = (bus.join(), bus.join(), bus.join());
     let extended = |id| CanFrame::classic(Id::extended(id).unwrap(), &[]).unwrap();
     let remote = CanFrame::remote(Id::standard(0x100).unwrap(), 0).unwrap();
-    // On equal base identifiers: data before remote, 11 bits before 29.
+    // With equal base identifiers, data frames win against remote frames, and 11-bit against 29-bit identifiers.
     bus.queue(a, extended(0x100 << 18)).unwrap();
     bus.queue(b, remote).unwrap();
     let events = run(&mut bus, MS);
@@ -59,7 +59,7 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
     bus.queue(b, frame(0x100, &[])).unwrap();
     let events = run(&mut bus, 2 * MS);
     assert_eq!(received(&events, listener), [frame(0x100, &[]), remote]);
-    // A frame on the wire is not interrupted.
+    // A frame on the bus is not interrupted.
     bus.queue(a, frame(0x700, &[])).unwrap();
     assert_eq!(bus.advance_to(2 * MS + 10_000), None);
     bus.queue(b, frame(0x000, &[])).unwrap();
@@ -70,7 +70,7 @@ fn the_lowest_identifier_goes_first_and_does_not_interrupt() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A slow model of the bus: the lowest of the first frames of all queues, one after the other, without a gap.
+    /// A simple model of the bus: the lowest of the first frames of all queues is sent next, without a gap.
     #[test]
     fn frames_come_in_the_order_of_a_simple_model(ids in prop::collection::vec(prop::collection::vec(0..0x800_u32, 0..12), 2..6)) {
         let mut bus = TimedBus::new(250_000, 0);
@@ -78,7 +78,7 @@ proptest! {
         let mut queues = Vec::new();
         for (sender, ids) in ids.iter().enumerate() {
             let member = bus.join();
-            // Senders use identifiers of their own, as CAN asks for.
+            // Senders use separate identifiers, as CAN requires.
             let own = |id: &u32| frame(id / 8 * 8 + sender as u32, &[*id as u8]);
             let frames: Vec<_> = ids.iter().map(own).collect();
             for frame in &frames {
@@ -104,7 +104,7 @@ proptest! {
         prop_assert!(errors(&events).is_empty());
     }
 
-    /// Whatever is done to it, a bus ends each call, and the same calls give the same events.
+    /// Whatever calls are made, each call ends, and the same calls give the same events.
     #[test]
     fn any_calls_are_repeatable_and_end(calls in prop::collection::vec((0..9_u8, 0..5_usize, 0..40_u32, any::<u64>()), 1..120), seed in any::<u64>()) {
         let all = || {
@@ -135,8 +135,8 @@ proptest! {
     }
 }
 
-/// D-05: two nodes that send one identifier with different data at once are found. Both try again, as controllers do,
-/// until one is error passive and no longer destroys the other's frame.
+/// D-05: if two nodes send the same identifier with different data at once, a collision is reported. Both repeat their
+/// frames, as controllers do, until one is error passive and no longer destroys the other's frame.
 #[test]
 fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -149,7 +149,8 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     assert_eq!([a, b].map(|member| bus.state(member).tec), [Some(8), Some(8)]);
     assert_eq!(bus.state(listener).rec, Some(1));
     let events = run(&mut bus, 20 * MS);
-    // 16 failures make both passive at once. In the 17th collision the node with the dominant bit succeeds.
+    // 16 failures make both nodes passive at the same time. In the 17th collision the node with the dominant bit
+    // succeeds.
     assert_eq!(bus.stats().collisions, 17);
     assert_eq!(received(&events, listener), [one, other]);
     assert_eq!(received(&events, b), [one], "the member that dropped out receives it");
@@ -164,7 +165,7 @@ fn d_05_a_collision_is_reported_and_costs_both_their_counters() {
     assert_eq!(states, [ErrorState::Warning, ErrorState::Passive, ErrorState::Warning]);
 }
 
-/// D-05: a node that gives up instead of trying again leaves the bus to the other.
+/// D-05: a node that drops its frame instead of repeating it leaves the bus to the other.
 #[test]
 fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -180,7 +181,7 @@ fn d_05_who_sends_once_only_gives_up_after_a_collision() {
     assert_eq!(bus.pending(b), 0);
 }
 
-/// D-05: a node that collides again and again finally leaves the bus.
+/// D-05: a node that collides again and again finally goes bus-off.
 #[test]
 fn d_05_endless_collisions_end_in_bus_off() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -205,7 +206,7 @@ fn d_05_endless_collisions_end_in_bus_off() {
     assert_eq!(bus.queue(b, frame(1, &[])), Err(QueueError::BusOff));
 }
 
-/// D-07: frames with identical bits are one frame on the wire.
+/// D-07: frames with identical bits are one frame on the bus.
 #[test]
 fn d_07_frames_alike_bit_for_bit_look_like_one() {
     let mut bus = TimedBus::new(1_000_000, 0);
@@ -220,7 +221,7 @@ fn d_07_frames_alike_bit_for_bit_look_like_one() {
     assert_eq!((bus.pending(a), bus.pending(b)), (0, 0));
 }
 
-/// D-03 and the load of 11: a bus at 1 Mbit/s carries exactly as many bits as its rate says.
+/// D-03 and the load of 11 members: a bus at 1 Mbit/s transmits exactly as many bits as its rate.
 #[test]
 fn the_load_is_the_share_of_bits() {
     for bitrate in [1_000_000, 500_000, 250_000, 125_000] {

@@ -1,5 +1,5 @@
 #![no_main]
-// The agent has a web server and more, which a fuzzer need not build: this is all that reads the bytes.
+// Includes only the modules that read the bytes, so that the fuzzer need not build the agent with its web server.
 #[path = "../../crates/jtc-agent/src/modbus/fuzzing.rs"]
 mod fuzzing;
 #[expect(dead_code, reason = "an agent has more to refuse")]

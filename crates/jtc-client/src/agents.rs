@@ -1,28 +1,28 @@
-//! Agents of this user on this computer, so that a command finds the agent that owns its port.
+//! Lists the agents of this user on this computer, so that a command can find the agent that owns its port.
 //!
-//! Each agent has a file in a folder that no other user can write to, and holds a lock on it. A killed agent leaves the
-//! file without the lock: any program may listen at its address by then.
+//! Each agent has a file in a folder to which no other user can write, and holds a lock on the file. A killed agent
+//! leaves an unlocked file, and another program may then listen at its address.
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use jtc_host::port::runtime;
 
-/// Agent of this computer.
+/// An agent on this computer.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Registered {
-    /// Its address, `http://HOST:PORT` or `https://HOST:PORT`.
+    /// Address of the agent, `http://HOST:PORT` or `https://HOST:PORT`.
     pub url: String,
-    /// The port that it owns.
+    /// Port that the agent owns.
     pub port: String,
-    /// Path of its tokens.
+    /// Path of the file with the agent's tokens.
     pub token_file: PathBuf,
-    /// Its certificate, if it uses TLS.
+    /// Certificate of the agent, if it uses TLS.
     #[serde(default)]
     pub certificate: Option<PathBuf>,
 }
 
-/// File of an agent, locked while the agent runs; removed with it.
+/// File of an agent. It is locked while the agent runs, and removed at its end.
 #[derive(Debug)]
 pub struct Registration {
     path: PathBuf,
@@ -31,21 +31,21 @@ pub struct Registration {
 
 impl Drop for Registration {
     fn drop(&mut self) {
-        // Readers skip a file without its lock.
+        // Readers ignore an unlocked file, even if it cannot be removed.
         let _ = fs::remove_file(&self.path);
     }
 }
 
-/// Writes the file of an agent. `None`: every folder is writable for other users.
+/// Writes the file of an agent. Returns `None` if other users can write to every possible folder.
 ///
 /// # Errors
 ///
-/// The file cannot be written.
+/// Returns an error if the file cannot be written.
 pub fn register(agent: &Registered) -> io::Result<Option<Registration>> {
     let Some(folder) = runtime::create()? else { return Ok(None) };
     let path = folder.join(format!("{}.json", std::process::id()));
     let mut file = File::create(&path)?;
-    // Before any content is written: an agent without a lock does not count.
+    // Locked before any content is written, because readers ignore an agent without a lock.
     file.try_lock().map_err(io::Error::other)?;
     file.write_all(serde_json::to_string(agent)?.as_bytes())?;
     Ok(Some(Registration { path, _lock: file }))
@@ -57,7 +57,7 @@ pub fn registered() -> Vec<Registered> {
     files.flatten().filter_map(|file| alive(&file.path())).collect()
 }
 
-/// Returns the agent of this file, if it holds the lock; a killed agent does not.
+/// Returns the agent of this file if the file is locked; the file of a killed agent is not.
 fn alive(path: &Path) -> Option<Registered> {
     let mut file = File::open(path).ok()?;
     if !matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)) {
@@ -68,7 +68,7 @@ fn alive(path: &Path) -> Option<Registered> {
     serde_json::from_str(&text).ok()
 }
 
-/// Returns `true` if the two names belong to one port.
+/// Returns `true` if the two names belong to the same port.
 pub fn is_same_port(one: &str, other: &str) -> bool {
     let real = |path: &str| fs::canonicalize(path).unwrap_or_else(|_| PathBuf::from(path));
     real(one) == real(other)

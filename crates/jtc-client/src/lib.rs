@@ -18,32 +18,32 @@ use tungstenite::http::header::AUTHORIZATION;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Connector, Message, WebSocket, client_tls_with_config};
 
-/// Longest time for a connection and its first message.
+/// Longest time for connecting and receiving the first message.
 const CONNECTING: Duration = Duration::from_secs(5);
 /// Longest time for which an agent may leave a message unread.
 const STALL: Duration = Duration::from_secs(5);
-/// Characters that must be escaped in a value in an address: all but the unreserved characters (RFC 3986, 2.3).
+/// Characters that must be escaped in a value in a URL: all except the unreserved characters (RFC 3986, 2.3).
 const RESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
 
 /// Identity and options of a client.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// Name shown to users; empty: its address.
+    /// Name that users see; if it is empty, they see the address of the client.
     pub name: String,
-    /// Token; `None`: only the access without a token.
+    /// Token; with `None` the client has only the access that needs no token.
     pub token: Option<String>,
-    /// Policy for its motion after a disconnect: `continue`, which is also the default, `pause` or `stop`.
+    /// Policy for its motion after it disconnects: `continue` (the default), `pause` or `stop`.
     pub policy: Option<&'static str>,
-    /// Certificates, as PEM, for the trust in an agent at `https://`; `None`: those of the system.
+    /// File with trusted certificates (PEM) for agents at `https://`; with `None`, the certificates of the system.
     pub certificates: Option<PathBuf>,
 }
 
-/// The first message of an agent.
+/// The agent's first message.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Deserialize)]
 pub struct Hello {
     /// Name of the port that the agent owns.
     pub port: String,
-    /// Rate of its line, Bd, if it has one.
+    /// Rate of the serial line, Bd, if it has one.
     pub baud: Option<u32>,
     /// `true` if the arm is simulated.
     pub simulated: bool,
@@ -58,25 +58,25 @@ enum Notice {
     },
     Halted {
         number: u64,
-        /// An older agent does not count them.
+        /// Missing if the agent is older and does not count Stops of other clients.
         of_others: Option<Halts>,
     },
     #[serde(other)]
     Other,
 }
 
-/// Line of an agent, as a port.
+/// Connection to an agent, used as a port.
 pub struct AgentPort {
     socket: WebSocket<MaybeTlsStream<TcpStream>>,
     url: String,
     hello: Hello,
     start: Instant,
-    /// Bytes that were received and not read yet.
+    /// Bytes that were received but not read yet.
     received: Vec<u8>,
     denied: Option<String>,
-    /// Number of the last Stop or Pause that this client knows of, if there was one.
+    /// Number of the last Stop or Pause that this client knows, if there was one.
     halted: Option<u64>,
-    /// Stops and Pauses of other clients.
+    /// Numbers of Stops and Pauses of other clients.
     halts: Halts,
 }
 
@@ -85,7 +85,8 @@ impl AgentPort {
     ///
     /// # Errors
     ///
-    /// [`PortError::NoAgent`] if no agent answers there, [`PortError::NotLetIn`] if the agent refuses this client.
+    /// [`PortError::NoAgent`] if no agent answers at this address, [`PortError::NotLetIn`] if the agent refuses this
+    /// client.
     pub fn open(url: &str, options: &Options) -> Result<Self, PortError> {
         let no_agent = |what: String| PortError::NoAgent { url: url.to_owned(), what };
         let (secure, rest) = match (url.strip_prefix("https://"), url.strip_prefix("http://")) {
@@ -164,7 +165,7 @@ impl AgentPort {
         &self.hello
     }
 
-    /// Receives one message, if one arrives within the timeout; `false` otherwise.
+    /// Receives one message if one arrives within the timeout; otherwise returns `false`.
     fn receive(&mut self, timeout: Duration) -> Result<bool, PortError> {
         let set = tls::socket(self.socket.get_mut()).and_then(|stream| {
             if timeout.is_zero() {
@@ -181,7 +182,7 @@ impl AgentPort {
                 Ok(Notice::Denied { why }) => self.denied = Some(why),
                 Ok(Notice::Halted { number, of_others }) => {
                     self.halted = Some(number);
-                    // Without a count, one more is enough: it voids earlier requests.
+                    // If the agent sends no numbers, adding one is enough: it makes earlier requests invalid.
                     let one_more = Halts { all: self.halts.all + 1, stops: self.halts.stops + 1 };
                     self.halts = of_others.unwrap_or(one_more);
                 }
@@ -219,7 +220,7 @@ fn has_port(authority: &str) -> bool {
     authority.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok())
 }
 
-/// Connects to the first of the host's addresses that accepts.
+/// Connects to the first address of the host that accepts the connection.
 fn connect(authority: &str) -> io::Result<TcpStream> {
     let mut last = io::Error::new(io::ErrorKind::NotFound, "this name has no address");
     for address in authority.to_socket_addrs()? {
@@ -240,11 +241,11 @@ impl Port for AgentPort {
                 return Ok(0);
             }
         }
-        // Also reads the messages that arrived meanwhile: a caller that requests new data must not get old data.
+        // Also reads messages that arrived meanwhile, because a caller that requests new data must not get old data.
         while self.received.len() < buffer.len() {
             match self.receive(Duration::ZERO) {
                 Ok(true) => {}
-                // The end is reported after all earlier messages are read.
+                // The end of the connection is reported after all earlier messages are read.
                 Ok(false) | Err(_) => break,
             }
         }

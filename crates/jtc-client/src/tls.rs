@@ -10,11 +10,11 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Creates a connector that trusts the certificates of this file, or those of the system.
+/// Creates a connector that trusts the certificates in this file, or those of the system if there is no file.
 ///
 /// # Errors
 ///
-/// The file contains no certificate, or the system has none.
+/// Returns an error if the file contains no certificate, or the system has none.
 pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
     let mut roots = RootCertStore::empty();
     let certificates: Vec<CertificateDer<'static>> = match file {
@@ -24,7 +24,7 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
         }
         None => rustls_native_certs::load_native_certs().certs,
     };
-    // A system has many certificates, and some may be invalid.
+    // The system has many certificates, some of which may be invalid.
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());
@@ -44,7 +44,7 @@ pub fn socket(stream: &mut MaybeTlsStream<TcpStream>) -> io::Result<&mut TcpStre
     match stream {
         MaybeTlsStream::Rustls(stream) => Ok(&mut stream.sock),
         MaybeTlsStream::Plain(stream) => Ok(stream),
-        // No other kind of stream is created here.
+        // This crate creates no other kind of stream.
         _ => Err(io::ErrorKind::Unsupported.into()),
     }
 }

@@ -1,4 +1,4 @@
-//! Sessions through an agent: all functions of a serial port, with several clients at a time.
+//! Sessions through an agent have all functions of a serial port, with several clients at the same time.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -13,13 +13,13 @@ use jtc_wire::{ControllerState, TrajectoryState};
 use test_kit::patience::{LONGEST, Patience, until};
 use test_kit::written::text_with;
 
-/// Gives the controller its parameters and waits until it holds the arm.
+/// Sends the default parameters to the controller and waits until it holds the arm.
 fn hold(session: &mut Session<AgentPort>) {
     session.use_defaults().expect("it takes them");
     session.wait_ready(LONGEST).expect("it holds the arm");
 }
 
-/// A checked motion of some seconds from the zero pose.
+/// Returns a checked motion of some seconds from the zero pose.
 fn motion(percent: f64) -> CheckedTrajectory {
     let arm = Arm::avena();
     let to = [0.4, -0.3, 0.3, 0.4, -0.3, 0.4];
@@ -44,7 +44,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     let denied = bob.gripper(true).expect_err("anna commands");
     assert!(matches!(&denied, LinkError::Denied { reason, .. } if reason.contains("anna")), "{denied}");
     assert_eq!(denied.kind(), ErrorKind::Refused);
-    // A Stop needs no lease, and on this computer no token.
+    // A Stop needs no lease and, on this computer, no token.
     let mut passer_by = served.session("a passer-by", None);
     passer_by.stop().expect("it is taken");
     let outcome = anna.follow(|_| Flow::Continue).expect("it comes to an end");
@@ -52,7 +52,7 @@ fn one_runs_a_motion_while_another_looks_is_denied_and_stops_it() {
     let refused = passer_by.teach(true).expect_err("a viewer");
     assert!(refused.to_string().contains("to look and to stop"), "{refused}");
 
-    // After anna has disconnected, bob holds the lease at once.
+    // When anna has disconnected, bob gets the lease at once.
     drop(anna);
     until("the end of her lease", || served.line.with(|line, _| line.lease().is_none()));
     bob.gripper(true).expect("nobody else commands");
@@ -85,13 +85,13 @@ fn a_stop_in_the_middle_of_an_upload_is_taken_and_the_upload_says_who_it_was() {
     );
 }
 
-/// A client that was stopped without knowing it cannot move the arm with earlier requests, even if they arrive late.
+/// A client that does not know about a Stop cannot move the arm with requests from before it, even if they arrive late.
 #[test]
 fn what_a_client_was_asked_for_before_a_stop_moves_nothing_until_somebody_asks_anew() {
     let served = Served::start(921_600);
     let mut anna = served.operator("anna");
     hold(&mut anna);
-    // The controller may refuse the jog, the agent does not.
+    // The controller may refuse the jog, but the agent does not.
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),
         _ => Ok(()),
@@ -141,7 +141,7 @@ fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     let (mut anna, mut bob) = (served.operator("anna"), served.operator("bob"));
     anna.gripper(false).expect("nobody else commands");
     assert!(matches!(bob.gripper(false), Err(LinkError::Denied { .. })));
-    // She does not read her messages.
+    // anna does not read her messages.
     let mut patience = Patience::begin();
     while served.line.with(|line, _| line.lease().is_some()) {
         patience.pause("the end of her lease");
@@ -150,7 +150,7 @@ fn one_that_hangs_commands_no_more_and_has_to_come_again() {
     bob.gripper(false).expect("nobody commands");
     drop(bob);
     until("the end of his lease", || served.line.with(|line, _| line.lease().is_none()));
-    // Her information about the arm is outdated.
+    // Her information about the arm is outdated, so the agent has disconnected her.
     let gone = anna.gripper(false).expect_err("she was put out");
     assert!(matches!(gone, LinkError::Port(PortError::AgentGone { .. })), "{gone}");
 }
@@ -169,8 +169,8 @@ fn a_status_that_is_asked_for_is_no_old_one_however_long_nobody_read() {
     assert_eq!(status.state, ControllerState::HoldPos);
 }
 
-/// A queued request was made before a Stop, even if its turn comes later: a client knows the number of other clients'
-/// Stops.
+/// A queued request from before a Stop is still treated as earlier, even if it is executed later, because a client
+/// knows the number of other clients' Stops.
 #[test]
 fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requested_after_them() {
     let served = Served::start(921_600);
@@ -183,7 +183,7 @@ fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requeste
         anna.port().halts()
     };
     assert_eq!(known(&mut anna), Halts::default());
-    // Its own Stops do not count as Stops of others.
+    // A client's own Stop is not counted as a Stop of another client.
     let _ = anna.stop();
     assert_eq!(known(&mut anna), Halts::default());
     assert_eq!(served.get("POST /api/stop").0, 200);
@@ -191,7 +191,7 @@ fn a_client_counts_the_stops_and_pauses_of_others_and_asks_for_what_was_requeste
     let _ = anna.stop();
     assert_eq!(served.get("POST /api/pause").0, 200);
     assert_eq!(known(&mut anna), Halts { all: 2, stops: 1 });
-    // Longer than the hold-off for a new request.
+    // Waits longer than the hold-off for a new request.
     std::thread::sleep(Duration::from_millis(3_500));
     let sent = |anna: &mut Session<AgentPort>| match anna.jog(&[0.0; 6]) {
         Err(Error::Link(LinkError::Denied { reason, .. })) => Err(reason),

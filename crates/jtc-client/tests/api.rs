@@ -1,4 +1,4 @@
-//! HTTP interface for programs: lease, trajectories, runs, events that can be resumed.
+//! HTTP interface for programs: lease, trajectories, runs, and events that can be read again after a disconnect.
 use crate::common;
 
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use jtc_host::{Arm, plan};
 use serde_json::{Value, json};
 use test_kit::patience::until;
 
-/// A motion from the zero pose and back, at this speed, as a file.
+/// Returns a motion from the zero pose and back at this speed, as the text of a file.
 fn there_and_back(percent: f64) -> String {
     let (arm, to) = (Arm::avena(), [0.3, -0.2, 0.2, 0.3, -0.2, 0.3]);
     let way = |from: &[f64; 6], to: &[f64; 6]| {
@@ -40,7 +40,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     assert_eq!(check["passed"], true, "{check}");
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7 }));
     let (number, _) = event(&served, 0, "executing");
-    // Another command at the same time is refused; the refusal names the running job.
+    // Another command at the same time is refused; the error contains the running job.
     let (status, busy) = anna.ask("POST /api/gripper", Some(json!({ "on": true })));
     assert!(
         status == 409
@@ -49,7 +49,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     );
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(anna.ask("POST /api/pause", None).0, 200);
-    // Paused, and resumed by the same client: at once, when the arm rests.
+    // The same client can pause the run and resume it as soon as the arm is at rest.
     let paused = |event: &Value| event["trajectory"] == "Pause";
     let (mut number, mut state) = event(&served, number, "state");
     while !paused(&state) {
@@ -64,7 +64,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
         errors.len() == 6
             && errors.iter().all(|joint| joint["max_error_mrad"].as_f64().is_some_and(|e| e < 20.0))
     );
-    // All events by numbers, for repeated requests too.
+    // Events can be read by their numbers, also repeatedly.
     let (_, all) = served.api(&format!("GET /api/events?after=0&job={job}"), None, None);
     let kinds: Vec<&str> = all["events"]
         .as_array()
@@ -90,7 +90,7 @@ fn somebody_else_stops_a_run_and_it_stays_so() {
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 1, "repeat": 3 }));
     let (number, _) = event(&served, 0, "executing");
     std::thread::sleep(Duration::from_millis(300));
-    // Without a token, and without a lease.
+    // A Pause works without a token and without a lease.
     assert_eq!(served.get("POST /api/pause").0, 200);
     let (_, halt) = event(&served, number, "halt");
     assert_eq!(halt["command"], "pause");
@@ -105,7 +105,7 @@ fn somebody_else_stops_a_run_and_it_stays_so() {
     assert!(!moves(&served));
 }
 
-/// An arm that is stopped at rest, because a user expects a motion, does not move.
+/// If an arm is stopped at rest while a motion is expected, it does not move.
 #[test]
 fn a_run_that_was_stopped_before_it_moves_does_not_begin() {
     let served = Served::start(57_600);
@@ -132,7 +132,7 @@ fn a_program_that_goes_leaves_its_motion_to_its_policy() {
         [("continue", "finished", None), ("stop", "stopped", None), ("pause", "running", Some("Pause"))]
     {
         let anna = Program::new(&served, "anna", 1.0, policy);
-        // After the previous client's Stop or Pause; a jog that is requested again and again stays refused.
+        // Refused after the previous client's Stop or Pause. A jog that is requested repeatedly stays refused.
         let halted =
             || anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": ([0.0; 6]) }))).1["code"] == "denied";
         while halted() {
@@ -170,7 +170,7 @@ fn the_lease_is_asked_for_given_and_lapses() {
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], true);
-    // The lease expires, and another client gets it then.
+    // When the lease has expired, another client gets it.
     std::thread::sleep(Duration::from_millis(1300));
     let carl = Program::new(&served, "carl", 30.0, "continue");
     assert_eq!(bob.ask("PUT /api/lease", None).1["held"], false);
@@ -192,7 +192,7 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
     {
         assert_eq!(as_viewer(request, None).0, 200, "{request}");
     }
-    // A wrong key is refused, and so is a key without the operator's token.
+    // A request with a wrong key is refused, and so is one with the key but without the operator's token.
     let anna = Program::new(&served, "anna", 30.0, "continue");
     for (token, key) in [(&served.tokens.operator, "x"), (&served.tokens.viewer, anna.key.as_str())] {
         let (status, error) = served.api_as(Some(token), "POST /api/clear", Some(key), None);
@@ -204,14 +204,14 @@ fn who_may_look_changes_nothing_and_what_is_wrong_is_named() {
         status == 422 && error["message"].as_str().is_some_and(|m| m.contains("line")),
         "{status} {error}"
     );
-    // Error of a trajectory: joint, point, value and limit, as numbers.
+    // The error of a trajectory contains joint, point, value and limit as numbers.
     let far = "t,q1,q2,q3,q4,q5,q6\n0,0,9,0,0,0,0\n1,0,9,0,0,0,0\n";
     assert_eq!(
         served.api("PUT /api/trajectories/2", None, Some(json!({ "name": "far", "text": far }))).0,
         200
     );
     anna.recover();
-    // A check and planning find the same error.
+    // A check and a plan find the same error.
     for (request, body, code) in [
         ("POST /api/runs", json!({ "trajectory": 2 }), "check"),
         ("POST /api/moves", json!({ "to_rad": [0.0, 9.0, 0.0, 0.0, 0.0, 0.0] }), "plan"),
@@ -250,11 +250,11 @@ fn behind_somebody_elses_stop_nothing_is_begun_for_three_seconds() {
         let (status, denied) = anna.ask(request, Some(body));
         assert_eq!((status, denied["code"].as_str()), (409, Some("denied")), "{request}: {denied}");
     }
-    // The hold-off also applies after a reconnect, and repeated requests other than jogs do not extend it.
+    // The hold-off also applies after a reconnect. Repeated requests extend it only if they are jogs.
     assert_eq!(anna.ask("DELETE /api/lease", None).0, 204);
     let anna = Program::new(&served, "anna", 30.0, "continue");
     let asked = Instant::now();
-    // Repeated requests while a key is held down extend the hold-off.
+    // Repeated jog requests, as from a key that is held down, extend the hold-off.
     while asked.elapsed() < Duration::from_secs(5) {
         assert_eq!(anna.ask("POST /api/jog", Some(json!({ "rates_rad_s": zeros }))).0, 409);
         std::thread::sleep(Duration::from_millis(50));
@@ -300,7 +300,7 @@ fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() 
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
     event(&served, last, "executing");
     assert_eq!(over(&served, job, || {})["stage"], "stopped", "by its lease's own policy");
-    // The recovery ends another client's motion.
+    // Another client's motion is running; the recovery ends it.
     std::thread::sleep(Duration::from_secs(3));
     let bob = Program::new(&served, "bob", 30.0, "continue");
     let job = bob.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));
@@ -324,7 +324,7 @@ fn a_program_that_is_begun_again_and_again_keeps_nobody_out() {
         if n == 0 {
             assert_eq!((status, grant["held"].as_bool()), (200, Some(false)), "{grant}");
         } else {
-            // The first client still waits.
+            // The first client is still waiting.
             assert_eq!((status, grant["code"].as_str()), (409, Some("denied")), "{grant}");
             assert!(
                 grant["message"]

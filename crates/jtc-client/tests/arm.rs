@@ -1,4 +1,4 @@
-//! The arm of a controller as a whole by HTTP: read, given, stored, and refused completely.
+//! A whole arm of a controller by HTTP: read, uploaded, stored, and refused as a whole.
 use crate::common;
 
 use common::Served;
@@ -15,7 +15,7 @@ fn arm(served: &Served) -> (Arm, Value) {
     (Arm::parse(found["text"].as_str().expect("a text")).expect("an arm file"), found)
 }
 
-/// The delivered arm with this replacement.
+/// Returns the delivered arm file with this replacement.
 fn other(from: &str, to: &str) -> String {
     assert!(AVENA_TOML.contains(from), "{from}");
     AVENA_TOML.replacen(from, to, 1)
@@ -60,7 +60,7 @@ fn an_arm_is_read_given_and_stored_and_what_is_none_changes_nothing() {
     assert!(done["given"]["stored_number"].is_null());
     assert_eq!(event(&served, 0, "given").1["job"], job);
 
-    // The arm is held now: differences are refused under torque, and are not applied.
+    // The controller holds the arm now. Under torque, differences are refused and not applied.
     anna.recover();
     let job = anna.begin("PUT /api/arm", json!({ "text": AVENA_TOML }));
     let failed = anna.over(job);

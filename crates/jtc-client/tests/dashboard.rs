@@ -1,4 +1,4 @@
-//! Data for the dashboard: the arm as numbers, trajectories to draw, commands, meanings of codes, reports.
+//! Data for the dashboard: the arm as numbers, trajectories as points, commands, explanations of codes, reports.
 use crate::common;
 
 use std::sync::Arc;
@@ -16,7 +16,7 @@ use test_kit::patience::{Patience, until};
 
 const ZERO: [f64; 6] = [0.0; 6];
 
-/// From the zero pose to another one at half of the limits, as a file.
+/// Returns a motion from the zero pose to another pose at half of the limits, as the text of a file.
 fn there() -> String {
     let way = plan::joint_move(&[0.0; 6], &[0.4, -0.2, 0.3, 0.0, 0.2, 0.1], &Arm::avena().config(), 50.0);
     way.expect("it is within the limits").to_exact_csv()
@@ -36,7 +36,7 @@ fn numbers<const N: usize>(value: &Value) -> [f64; N] {
     serde_json::from_value::<Vec<f64>>(value.clone()).expect("numbers").try_into().expect("so many")
 }
 
-/// Port that counts the bytes to the controller.
+/// A port that counts the bytes to the controller.
 struct Counted(LivePort, Arc<AtomicU64>);
 
 impl Port for Counted {
@@ -58,7 +58,7 @@ impl Port for Counted {
     }
 }
 
-/// Returns the arm of the controller after it was read.
+/// Returns the controller's arm after the agent has read it.
 fn model(served: &Served) -> Value {
     let mut patience = Patience::begin();
     loop {
@@ -194,8 +194,8 @@ fn codes_are_explained_by_name_number_and_words() {
     );
 }
 
-/// A run that fails midway: its errors have pages, the commanded values are shown, and its report begins with the first
-/// failure.
+/// If a run fails midway, its errors have explanation pages, the commanded values are shown, and its report begins with
+/// the first failure.
 #[test]
 fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_goes_well() {
     let arm = Arm::avena();
@@ -274,10 +274,10 @@ fn a_run_that_fails_has_pages_for_its_errors_and_a_report_and_so_has_one_that_go
         "{}",
         good.len()
     );
-    // The path ends before the arm has settled, and the arm is held at the end of the path until then.
+    // The path ends before the arm has settled. Until then the controller holds the arm at the end of the path.
     until("nothing is commanded", || controller()["commanded_rad"].is_null());
 
-    // A stopped motion has a report, too; earlier reports are kept.
+    // A stopped motion also has a report, and earlier reports are kept.
     let job = anna.begin("POST /api/moves", json!({ "to_rad": ZERO, "speed_percent": 20 }));
     event(&served, event(&served, 0, "executing").0, "finished");
     until("Operate", || controller()["state"] == "Operate");

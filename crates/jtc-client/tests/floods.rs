@@ -1,4 +1,4 @@
-//! Clients that take all connections: in a separate program, because they take many.
+//! Clients that use up all connections. A separate program, because they use many.
 #[allow(dead_code, reason = "the suite uses more")]
 mod common;
 

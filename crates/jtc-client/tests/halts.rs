@@ -1,4 +1,4 @@
-//! Effects of a Stop on earlier requests, also if parts of them arrive late.
+//! A Stop cancels earlier requests, even if parts of them arrive late.
 use crate::common;
 
 use std::io::{Read as _, Write as _};
@@ -18,7 +18,7 @@ fn positions(served: &Served) -> Vec<f64> {
     joints.iter().map(|joint| joint["position_rad"].as_f64().expect("it is measured")).collect()
 }
 
-/// The head of a request, without its body.
+/// Sends the head of a request without its body.
 fn begin(served: &Served, request: &str, key: &str, body: &str) -> TcpStream {
     let mut stream = TcpStream::connect(served.address).expect("it listens");
     let head = format!(
@@ -42,7 +42,7 @@ fn a_request_that_began_before_a_stop_moves_nothing_however_late_its_body_comes(
     let mut late = begin(&served, "POST /api/moves", &anna.key, &body);
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(served.get("POST /api/stop").0, 200);
-    // After the three seconds of the hold-off.
+    // Waits until the hold-off of three seconds has passed.
     std::thread::sleep(Duration::from_millis(3_300));
     late.write_all(body.as_bytes()).expect("it reads");
     let mut answer = String::new();
@@ -51,7 +51,7 @@ fn a_request_that_began_before_a_stop_moves_nothing_however_late_its_body_comes(
     std::thread::sleep(Duration::from_millis(500));
     let after = positions(&served);
     assert!(before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-3), "{before:?} {after:?}");
-    // A new request of the same motion succeeds.
+    // A new request for the same motion succeeds.
     let job = anna.begin("POST /api/moves", serde_json::from_str(&body).expect("JSON"));
     assert_eq!(anna.over(job)["stage"], "finished");
 }
@@ -68,7 +68,7 @@ fn halts_that_no_agent_has_counted_are_refused_with_what_it_has() {
 
 #[test]
 fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
-    // Slow enough for a Stop in between.
+    // The line is slow enough for a Stop during the upload.
     let served = Served::start(115_200);
     let text =
         AVENA_TOML.replacen("name = \"avena\"", "name = \"other\"", 1) + "\n[settings]\nstop_ms = 400\n";
@@ -79,7 +79,8 @@ fn a_stop_ends_an_arm_that_is_being_given_and_what_is_in_use_of_it_is_named() {
     assert_eq!(served.get("POST /api/stop").0, 200);
     let done = anna.over(job["number"].as_u64().expect("a number"));
     assert_eq!((&done["stage"], &done["error"]["code"]), (&json!("stopped"), &json!("stopped")), "{done}");
-    // The frames were on the line before the Stop, and parameters that the controller has are not reverted.
+    // The first frames were on the line before the Stop. The agent does not revert parameters that the controller has
+    // accepted.
     let (message, given) = (done["error"]["message"].as_str().expect("words"), &done["given"]);
     assert!(message.contains("in use already: one setting"), "{done}");
     assert_eq!(message.contains("its name"), given["named"] == true, "{done}");
@@ -96,7 +97,7 @@ fn a_plan_that_nobody_waits_for_any_more_takes_no_number() {
         served.api("POST /api/plans", None, Some(body))
     };
     assert_eq!(keep("mine", two).0, 200);
-    // Many corners take seconds.
+    // A path with many corners takes seconds to plan.
     let mut many = String::from("q1,q2,q3,q4,q5,q6\n");
     for i in 0..400 {
         many += &format!(

@@ -1,4 +1,4 @@
-//! Jogging over a slow connection: late requests move no joint.
+//! Jogging over a slow connection: requests that arrive late move no joint.
 use crate::common;
 
 use std::time::Duration;
@@ -8,21 +8,21 @@ use common::program::Program;
 use serde_json::{Value, json};
 use test_kit::patience::{Patience, until};
 
-/// Waits until the arm is held and can be jogged: joints that have just taken their load cannot be jogged yet.
+/// Waits until the arm is held and can be jogged. While the joints take up their load, they cannot be jogged.
 fn ready(anna: &Program<'_>) {
     anna.recover();
     let still = json!({ "rates_rad_s": vec![0.0; 6] });
     until("an arm that can be jogged", || anna.ask("POST /api/jog", Some(still.clone())).0 == 204);
 }
 
-/// Returns the current time and position, as shown to a user.
+/// Returns the current time and position that a user would see.
 fn seen(served: &Served) -> (u64, f64) {
     let (_, status) = served.api("GET /api/status", None, None);
     let position = status["controller"]["joints"][5]["position_rad"].as_f64().expect("it is measured");
     (status["at_ms"].as_u64().expect("a time"), position)
 }
 
-/// Requests a jog of the last joint with the status time of that moment.
+/// Requests a jog of the last joint. The request contains the status time that the user saw.
 fn jog(anna: &Program<'_>, as_of_ms: u64, rate: f64) -> (u16, Value) {
     let body = json!({ "rates_rad_s": [0.0, 0.0, 0.0, 0.0, 0.0, rate] });
     anna.ask(&format!("POST /api/jog?as_of_ms={as_of_ms}"), Some(body))
@@ -57,12 +57,12 @@ fn a_jog_moves_by_what_was_seen_just_now_and_not_by_what_was_seen_before() {
         assert_eq!(status, 204, "{error}");
         patience.pause(format_args!("a jog away from {before}: {position}"));
     }
-    // The end of a jog is accepted at any delay, also with a time that no agent has sent.
+    // A request to end a jog is accepted with any delay, and even with a time that no agent has sent.
     for as_of_ms in [old_ms, u64::MAX] {
         let (status, error) = jog(&anna, as_of_ms, 0.0);
         assert_eq!(status, 204, "{error}");
     }
-    // Without a time the agent does not know how old the request's status was.
+    // Without a time, the agent does not know how old the status was for which the jog was requested.
     let body = json!({ "rates_rad_s": vec![0.0; 6] });
     assert_eq!(anna.ask("POST /api/jog?as_of_ms=-1", Some(body.clone())).0, 400);
     assert_eq!(anna.ask("POST /api/jog", Some(body)).0, 204);
@@ -80,7 +80,7 @@ fn a_status_that_no_agent_has_shown_yet_is_none() {
     assert!((seen(&served).1 - before).abs() < 1e-3);
 }
 
-/// Late messages are reported as late, even if they arrive steadily.
+/// Late messages can be recognised as late, even if they arrive steadily.
 #[test]
 fn each_status_of_a_stream_has_the_time_when_it_was_made() {
     let served = Served::start(921_600);

@@ -1,11 +1,11 @@
-//! A run uses the trajectory that was viewed, and a stored trajectory is replaced only on request.
+//! A run executes the trajectory that the user saw. A stored trajectory is replaced only on request.
 use crate::common;
 
 use common::Served;
 use common::program::Program;
 use serde_json::{Value, json};
 
-/// A short motion of the base by `far_rad`.
+/// Returns a short motion of the base by `far_rad`.
 fn sway(far_rad: f64) -> String {
     let rows = (0..=200).map(|i| {
         let t = f64::from(i) * 0.01;
@@ -39,7 +39,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, kept) = put(&served, "7", "small", 0.1);
     assert_eq!(status, 200, "{kept}");
     let seen = digest(&kept);
-    // All views show the same digest.
+    // All responses contain the same digest.
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), seen);
     assert_eq!(digest(&get(&served, "/api/trajectories/7/points?most=2")), seen);
     let check = get(&served, "/api/trajectories/7/check");
@@ -61,7 +61,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, job) = run(&digest(&other));
     assert_eq!(status, 202, "{job}");
     assert_eq!(anna.over(job["number"].as_u64().expect("a number"))["stage"], "finished");
-    // Equal points have the same digest under any name; a run without a digest uses the stored trajectory.
+    // The same points have the same digest under any name. A run without a digest executes the stored trajectory.
     assert_eq!(digest(&put(&served, "7", "small again", 0.1).1), seen);
     let (status, job) =
         anna.ask("POST /api/runs", Some(json!({ "trajectory": 7, "approach": true, "digest": seen })));
@@ -71,7 +71,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     assert_eq!(anna.over(job)["stage"], "finished");
 }
 
-/// J-55: an invalid trajectory moves no joint, even if an approach would lead to its first point.
+/// J-55: an invalid trajectory moves no joint, even if its first point could be approached.
 #[test]
 fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
     let served = Served::start(921_600);
@@ -84,7 +84,7 @@ fn j55_no_approach_leads_to_a_trajectory_that_the_check_refuses() {
         get(&served, "/api/status")["controller"]["joints"][1]["position_rad"].as_f64().expect("a position")
     };
     let before = place();
-    // 2 rad/s in the middle, which the check accepts.
+    // The trajectory reaches 2 rad/s in the middle, which storing it permits.
     assert_eq!(put(&served, "7", "too fast", 2.6).0, 200);
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 7, "approach": true }));
     let ended = anna.over(job);
@@ -116,7 +116,7 @@ fn what_is_new_replaces_nothing() {
     assert_eq!((status, error["code"].as_str()), (409, Some("taken")), "{error}");
     assert_eq!(digest(&get(&served, "/api/trajectories")[0]), digest(&kept));
     assert_eq!(put(&served, "7?new=perhaps", "yours", 0.2).0, 400);
-    // An empty slot is filled, and a used one is replaced on request.
+    // An empty slot is filled; a used slot is replaced only on request.
     let (status, planned) = plan(8, true);
     assert_eq!(status, 200, "{planned}");
     assert_eq!(digest(&planned["kept"]), digest(&get(&served, "/api/trajectories/8/points")));

@@ -15,7 +15,7 @@ use tungstenite::Message;
 
 const VIEWERS: usize = 50;
 
-/// Memory of this process, kB.
+/// Returns the memory use of this process, kB.
 fn memory() -> usize {
     let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = text.lines().find_map(|line| line.strip_prefix("VmRSS:"));
@@ -48,7 +48,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
             })
         })
         .collect();
-    // These clients request all data and read none.
+    // These clients request all data but read none.
     let deaf: Vec<_> = ["stream", "line", "foxglove"]
         .iter()
         .flat_map(|path| (0..4).map(move |_| *path))
@@ -66,7 +66,7 @@ fn fifty_look_one_commands_and_those_who_never_read_are_put_out_without_a_trace(
     let begun = Instant::now();
     let outcome = anna.follow(|_| {
         if begun.elapsed() > Duration::from_secs(3) {
-            // A Stop of any client, under full load.
+            // Any client sends a Stop under full load.
             let _ = served.get("POST /api/stop");
         }
         Flow::Continue

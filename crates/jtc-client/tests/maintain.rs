@@ -1,5 +1,5 @@
-//! Recovery of a controller by HTTP: clearing and resetting nodes, its own arm, a given arm, and the findings of a
-//! doctor.
+//! Recovery of a controller by HTTP: clearing and resetting nodes, using its own arm or an uploaded arm, and the
+//! results of the doctor.
 use crate::common;
 
 use std::time::Duration;
@@ -64,7 +64,7 @@ fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
     until(&served, |controller| controller["state"] != "HoldPos");
     assert_eq!(logged(&served, "reset joint 3").len(), 2, "what was refused is written down, too");
     anna.recover();
-    // During teaching no joint is reset, even with the permission to fall; the gripper may be reset.
+    // During teaching no joint can be reset, even with permission to let the arm fall. The gripper can be reset.
     assert_eq!(anna.ask("POST /api/teach", Some(json!({ "on": true }))).0, 204);
     let (status, error) = anna.ask("POST /api/reset", Some(json!({ "joints": [3], "arm_may_fall": true })));
     assert_eq!((status, error["code"].as_str()), (409, Some("powered")), "{error}");
@@ -72,7 +72,7 @@ fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
     assert_eq!(anna.ask("POST /api/reset", Some(json!({ "gripper": true, "arm_may_fall": true }))).0, 204);
 }
 
-/// A drive that fails while the arm is held: it is cleared alone, or with all other drives.
+/// A drive fails while the arm is held. It can be cleared alone or together with all other drives.
 #[test]
 fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let arm = Arm::avena();
@@ -89,7 +89,7 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let (healthy, found) = findings(&served);
     assert!(!healthy && found.iter().any(|f| f["what"] == "joint 2: motor-control fault"), "{found:?}");
 
-    // Clearing only another drive does not help, and is refused (J-21).
+    // Clearing only another drive would not help, and is refused (J-21).
     is_for_the_one_who_commands(&served, "POST /api/clear", &json!({ "joints": [2] }));
     let (status, error) = anna.ask("POST /api/clear", Some(json!({ "joints": [5], "gripper": true })));
     assert_eq!((status, error["code"].as_str()), (409, Some("refused")), "{error}");
@@ -100,7 +100,7 @@ fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let cleared = until(&served, |controller| controller["state"] != "Error");
     assert_eq!(cleared["errors"], json!([]), "{cleared}");
     assert_ne!(cleared["errors_occurred"], json!([]), "those that have occurred stay");
-    // Without a body, and with an empty one: all errors that have occurred.
+    // Without a body, and with an empty body, all occurred errors are cleared.
     for body in [None, Some(json!({}))] {
         assert_eq!(anna.ask("POST /api/clear", body).0, 204);
     }
@@ -116,7 +116,7 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     assert_eq!(anna.ask("PUT /api/speed", Some(json!({ "percent": 35 }))).0, 204);
     assert_eq!(look(&served, "GET /api/speed"), (200, json!({ "percent": 35 })));
 
-    // A given arm must be complete, and parameters that no frame carries must be accepted.
+    // An uploaded arm must be complete, and its parameters that no frame can transmit must be acceptable.
     is_for_the_one_who_commands(&served, "POST /api/recover", &json!({ "arm": AVENA_TOML }));
     let heavy = AVENA_TOML.replacen("mass_kg = 4", "mass_kg = 5", 1);
     let other = heavy.replacen("position_max_rad = 2.97", "position_max_rad = 2.5", 1);
@@ -150,14 +150,14 @@ fn a_controller_is_given_its_defaults_or_an_arm_and_tells_its_speed() {
     }
     assert_eq!(look(&served, "GET /api/status").1["controller"]["state"], "HoldPos");
 
-    // Back to its own arm, without torque: the controller then holds it.
+    // Returns to the controller's own arm without torque. The controller then holds the arm.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     until(&served, |controller| controller["state"] == "Init");
     assert_eq!(served.api("POST /api/arm/defaults", None, None).0, 403);
     assert_eq!(anna.ask("POST /api/arm/defaults", None).0, 204);
     until(&served, |controller| controller["state"] == "HoldPos");
     assert_eq!(mass(), before);
-    // A request from before a Stop gives no torque.
+    // A request from before a Stop cannot enable the torque.
     assert_eq!(served.get("POST /api/stop").0, 200);
     assert_eq!(anna.ask("POST /api/arm/defaults?asked_after=0", None).0, 409);
 }

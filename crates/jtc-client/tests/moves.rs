@@ -1,11 +1,11 @@
-//! Moves by HTTP: to joint positions, to a named pose, to a pose of the flange, also on a straight line.
+//! Moves by HTTP: to joint positions, to a named pose, and to a flange pose, also on a straight line.
 use crate::common;
 
 use common::Served;
 use common::program::{Program, event};
 use serde_json::{Value, json};
 
-/// Distance that the flange is moved down, m.
+/// Distance by which the flange moves down, m.
 const DOWN: f64 = 0.2;
 
 fn positions(served: &Served) -> Vec<f64> {
@@ -36,12 +36,12 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     let done = moved(json!({ "to_pose": "bent" }));
     assert_eq!(done["what"], "move to bent");
     is_at(&served, bent);
-    // Pose of the flange there, by its own kinematics.
+    // Computes the flange pose of these joint positions independently.
     let arm = jtc_host::Arm::avena();
     let flange = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&bent);
     let rpy = jtc_host::plan::kinematics::rpy_of(&flange);
     let [x, y, z] = flange.position;
-    // Down, on a line, and back without a line: largest distance of the flange from the line.
+    // Moves down on a line, and back without a line. Returns the largest distance of the flange from the line.
     let beside = |body: Value| {
         let job = anna.begin("POST /api/moves", body);
         let mut most = 0.0f64;
@@ -84,7 +84,7 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     }
     let (_, error) = anna.ask("POST /api/moves", Some(json!({ "to_pose": "bend" })));
     assert!(error["message"].as_str().is_some_and(|m| m.contains("bent")), "{error}");
-    // Out of reach: the job reports it, and no joint moves.
+    // The target is out of reach. The job reports it, and no joint moves.
     let far = json!({ "to_flange": { "xyz_m": [5.0, 0.0, 0.3], "rpy_rad": [0.0, 0.0, 0.0] } });
     let failed = anna.over(anna.begin("POST /api/moves", far));
     assert_eq!(failed["stage"], "failed", "{failed}");

@@ -1,4 +1,4 @@
-//! Trajectories through waypoints, made by the agent: planned, stored, run, and refused with the error.
+//! Trajectories through waypoints that the agent plans: stored, run, and refused with the error.
 use crate::common;
 
 use std::time::Duration;
@@ -37,7 +37,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     );
     assert!(planned["joints"][1]["torque_peak_nm"].as_f64().is_some_and(|torque| torque > 1.0), "{planned}");
 
-    // The default margin is kept; without a margin less torque is left, which gives a warning.
+    // The default torque margin is kept. With a margin of 0 less torque is left, and the response contains a warning.
     let left = |planned: &Value| planned["margin"]["percent"].as_f64().expect("a margin");
     assert!(left(&planned) >= 15.0 && planned["warnings"] == json!([]), "{}", planned["margin"]);
     let tight = plan(json!({ "waypoints": SWING, "margin_percent": 0 })).1;
@@ -46,7 +46,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     let wide = plan(json!({ "waypoints": THREE, "margin_percent": 50 })).1;
     assert!(seconds(&wide) > seconds(&planned), "{}", seconds(&wide));
 
-    // Slower, rounded, and under a number.
+    // A slower motion with rounded corners, stored under a number.
     let slower = plan(json!({ "waypoints": THREE, "speed_percent": 50 })).1;
     assert!(seconds(&slower) > 1.5 * seconds(&planned), "{}", seconds(&slower));
     let keep = json!({ "number": 4, "name": "bow" });
@@ -67,11 +67,11 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     let anna = Program::new(&served, "anna", 30.0, "continue");
     anna.recover();
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 4 }));
-    // During a motion another one is planned.
+    // Another motion can be planned while a motion runs.
     assert_eq!(plan(json!({ "waypoints": THREE })).0, 200);
     assert_eq!(anna.over(job)["stage"], "finished");
 
-    // With the limits of the controller.
+    // Planned with the limits of the controller.
     assert_eq!(anna.ask("POST /api/disable", None).0, 204);
     std::thread::sleep(Duration::from_millis(500));
     let slow = json!([{ "name": "velocity_max_rad_s", "joint": 1, "value": 0.1 }]);
@@ -79,7 +79,7 @@ fn waypoints_become_a_trajectory_that_is_kept_and_run() {
     assert_eq!(status, 204, "{error}");
     let planned = plan(json!({ "waypoints": THREE })).1;
     assert!(seconds(&planned) > 8.0, "{}", seconds(&planned));
-    // Payload of the planned motion.
+    // Planned with a payload.
     let heavy = json!({ "mass_kg": 2.0, "com_m": [0.0, 0.0, 0.1] });
     let loaded = plan(json!({ "waypoints": THREE, "payload": heavy })).1;
     let torque = |planned: &Value| planned["joints"][1]["torque_peak_nm"].as_f64().expect("a torque");

@@ -1,4 +1,4 @@
-//! Named poses by HTTP: those of the arm file, and saved ones.
+//! Named poses by HTTP: poses of the arm file, and saved poses.
 use crate::common;
 
 use common::Served;
@@ -11,7 +11,7 @@ use test_kit::written::text_with;
 
 const ZERO: [f64; 6] = [0.0; 6];
 
-/// Starts an agent with an arm file with one pose, and with trajectories and poses in a directory.
+/// Starts an agent with an arm file that contains one pose, and with trajectories and saved poses in a directory.
 fn served(directory: &std::path::Path) -> Served {
     let poses = Poses::from([("home".to_owned(), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0])]);
     let arm = Arm { poses, ..Arm::avena() };
@@ -37,7 +37,7 @@ fn poses_are_saved_used_deleted_and_outlast_the_agent() {
     assert_eq!(status, 200, "{saved}");
     assert_eq!((&saved["from"], &saved["positions_rad"][2]), (&json!("agent"), &json!(0.123456)), "{saved}");
     assert!(saved["warning"].is_null(), "{saved}");
-    // A pose without a possible motion is reported, and still saved: the limits may be wrong.
+    // A pose that the arm cannot reach causes a warning but is saved, because the limits may be wrong.
     let (_, far) = put("far", Some(json!({ "positions_rad": [0, 2, 0, 0, 0, 0] })));
     assert!(far["warning"].as_str().is_some_and(|w| w.contains("joint 2: 2 rad is outside")), "{far}");
     // Before the recovery the position of the arm is unknown.
@@ -56,7 +56,7 @@ fn poses_are_saved_used_deleted_and_outlast_the_agent() {
         let first_joint = here["positions_rad"][0].as_f64().expect("a number");
         assert!((first_joint - 0.3).abs() < 0.01, "{here}");
     }
-    // A plan goes through poses of both kinds.
+    // A plan can use poses of both kinds.
     let through = json!({ "waypoints": "pose\nhome\nabove-table\n" });
     assert_eq!(first.api("POST /api/plans", None, Some(through)).0, 200);
     text_with(&first.log, &["\"what\":\"pose\"", "above-table"]);

@@ -1,4 +1,4 @@
-//! All tests of the crate in one program, to link only once: each file here is a module of it.
+//! The tests of the crate in one program, so that only one program is linked. Each file here is a module of it.
 mod agent;
 mod api;
 mod arm;

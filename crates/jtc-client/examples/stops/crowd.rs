@@ -1,4 +1,4 @@
-//! Many viewers, and some clients that never read, in a separate process.
+//! Many viewers and some clients that never read, in a separate process.
 use std::io::Read as _;
 use std::net::SocketAddr;
 use std::process::{Child, Command, Stdio};
@@ -10,18 +10,18 @@ use tungstenite::Message;
 
 use crate::common::socket;
 
-/// Number of viewers, which get 25 statuses per second each; and paths of the clients that never read.
+/// Number of viewers, each of which gets 25 statuses per second; and paths that the clients that never read connect to.
 pub const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",
     "line", "foxglove",
 ];
 
-/// A crowd of clients, until it is dismissed.
+/// A group of clients that runs until `dismiss` is called.
 pub struct Crowd(Child);
 
 impl Crowd {
-    /// Starts the crowd. All clients are connected when this function returns.
+    /// Starts the clients. All of them are connected when this function returns.
     pub fn gather(address: SocketAddr) -> Self {
         let program = std::env::current_exe().expect("this program");
         let mut child = Command::new(program)
@@ -34,14 +34,14 @@ impl Crowd {
         Self(child)
     }
 
-    /// Ends the crowd. Returns the statuses per second of the viewer that has received fewest.
+    /// Ends the clients. Returns the statuses per second of the viewer that has received the fewest.
     pub fn dismiss(self) -> f64 {
         let ended = self.0.wait_with_output().expect("it ends");
         String::from_utf8_lossy(&ended.stdout).trim().parse().expect("a number")
     }
 }
 
-/// Runs the crowd in its process, until its stdin ends.
+/// Runs the clients in their process until its stdin ends.
 pub fn look(address: &str) {
     let address: SocketAddr = address.parse().expect("an address");
     let ended = Arc::new(AtomicBool::new(false));

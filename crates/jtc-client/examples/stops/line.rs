@@ -1,4 +1,5 @@
-//! The line: a pseudo-terminal with the controller at its other end, and a model of the UART at this rate that carries the agent's bytes.
+//! The serial line: a pseudo-terminal with the controller at its other end, and a model of a UART with this rate that
+//! transmits the agent's bytes.
 use std::os::fd::OwnedFd;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
@@ -21,31 +22,31 @@ const STOP: [u8; 7] = fixed::exec(ExecCommand::Stop);
 pub struct Stop {
     pub first_byte: Instant,
     pub last_byte: Instant,
-    /// Silence before the Stop, if the Stop follows an abandoned frame.
+    /// Silence before the Stop, if it follows an abandoned frame.
     pub gap: Option<Duration>,
 }
 
-/// Bytes that the agent has handed to the line.
+/// Bytes that the agent has written to the line.
 #[derive(Debug)]
 pub struct Seen {
-    /// Time at which the line has carried all bytes.
+    /// Time at which the line has transmitted all bytes.
     free_at: Instant,
-    /// Remaining bytes of the present frame.
+    /// Number of bytes that are missing in the current frame.
     left: usize,
     /// Largest number of bytes that waited for the line at the same time.
     pub queued_most: usize,
-    /// Bytes of frames since the last Stop.
+    /// Number of bytes in frames since the last Stop.
     pub since_stop: usize,
     pub stops: Vec<Stop>,
 }
 
 impl Seen {
-    /// Returns true while a frame is incomplete.
+    /// Returns `true` while a frame is incomplete.
     pub fn is_in_a_frame(&self) -> bool {
         self.left > 0
     }
 
-    /// Takes bytes that the agent handed over from `began` to `ended`.
+    /// Records bytes that the agent wrote between `began` and `ended`.
     fn take(&mut self, mut bytes: &[u8], began: Instant, ended: Instant) {
         let queued = self.free_at.saturating_duration_since(began).as_secs_f64() * f64::from(BAUD) / 10.0;
         self.queued_most = self.queued_most.max(queued as usize + bytes.len());
@@ -62,7 +63,7 @@ impl Seen {
         self.since_stop += bytes.len();
         while !bytes.is_empty() {
             if self.left == 0 {
-                // The first piece of a frame contains at least its head.
+                // The first piece of a frame contains at least its header.
                 self.left = usize::from(u16::from_be_bytes([bytes[2], bytes[3]]));
             }
             let taken = self.left.min(bytes.len());
@@ -72,13 +73,13 @@ impl Seen {
     }
 }
 
-/// The agent's port, with a record of its bytes.
+/// The agent's port, which records the bytes that the agent writes.
 pub struct Watched {
     port: SerialPort,
     seen: Arc<Mutex<Seen>>,
 }
 
-/// Record of the bytes of a line so far.
+/// Access to the record of a line's bytes.
 #[derive(Clone)]
 pub struct Watch(Arc<Mutex<Seen>>);
 
@@ -105,7 +106,8 @@ pub fn begin() -> (Watched, Watch) {
     (Watched { port, seen: seen.clone() }, Watch(seen))
 }
 
-/// Runs the controller's end until the end of this program. `_slave` is held, because the terminal would hang up without a host.
+/// Runs the controller's end until this program ends. `_slave` is kept open, because the terminal would hang up without
+/// a host.
 fn control(master: &OwnedFd, _slave: &OwnedFd) {
     let flags = rustix::fs::fcntl_getfl(master).expect("flags");
     rustix::fs::fcntl_setfl(master, flags | OFlags::NONBLOCK).expect("flags");

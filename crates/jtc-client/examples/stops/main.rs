@@ -1,5 +1,5 @@
-//! Measures how soon a Stop is on the line, and prints one JSON object: `cargo run --profile dist -p jtc-client --example stops [N]`, N
-//! Stops under each load.
+//! Measures the time until a Stop is on the line, and prints one JSON object. Run with `cargo run --profile dist -p
+//! jtc-client --example stops [N]` for N Stops under each load.
 //!
 //! An agent owns a pseudo-terminal at 115,200 Bd with a simulated controller at its other end. The viewers are in a separate process.
 #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! Measures Stops under each load and, at the same time, plain round trips to a server of the same library.
+//! Measures Stops under each load and, at the same time, simple round trips to a server built with the same library.
 use std::net::TcpListener;
 use std::time::{Duration, Instant};
 
@@ -10,29 +10,30 @@ use crate::crowd::Crowd;
 use crate::line::{self, Watch};
 use crate::operator::Operator;
 
-/// Time between two Stops, in which the first one gets its record; plus a random time up to `AT_ANY_TIME_US`, so that Stops come at any
-/// phase of the statuses.
+/// Time between two Stops, long enough for the record of the first one. A random time up to `AT_ANY_TIME_US` is added,
+/// so that Stops occur at any phase of the statuses.
 const BETWEEN: Duration = Duration::from_millis(220);
 const AT_ANY_TIME_US: u64 = 120_000;
-/// Time after which a missing event counts as a failure.
+/// Longest wait for an event; if it is missing then, the measurement has failed.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Bytes of an upload that are on the line before it is stopped.
+/// Number of bytes of an upload that are on the line before the Stop.
 const UPLOADED: usize = 300;
 
 /// Measurements under one load, ms.
 #[derive(Default)]
 struct Samples {
-    /// Time from the request, before it connects, to the first and to the last byte of the Stop on the line.
+    /// Time from before the request connects to the first and to the last byte of the Stop on the line.
     first: Vec<f64>,
     last: Vec<f64>,
-    /// Time from a request to its response, for a server that does nothing.
+    /// Time from a request to its response, for a server that only answers.
     bare: Vec<f64>,
     /// Silence after an abandoned frame.
     gaps: Vec<f64>,
     queued_most: usize,
 }
 
-/// Measures under each load and prints the results. If a measurement failed, its load is listed under `failed`, with the cause.
+/// Measures under each load and prints the results. If a measurement fails, its load is listed under `failed` with the
+/// cause.
 pub fn print(n: usize) {
     let (port, watch) = line::begin();
     let served = Served::start_on(port, None, &[]);
@@ -56,7 +57,7 @@ pub fn print(n: usize) {
     println!("{}", Value::Object(figures));
 }
 
-/// Starts a server of the same library with the same settings, which only answers.
+/// Starts a server, with the same library and the same settings, that only answers.
 fn bare_server() -> Http {
     let listener = TcpListener::bind("127.0.0.1:0").expect("an address");
     let address = listener.local_addr().expect("it listens");
@@ -78,7 +79,7 @@ fn measure(
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     watch.look().queued_most = 0;
     for _ in 0..n {
-        // xorshift64: a random time in the cycle of the statuses, and a random position in a frame.
+        // xorshift64, for a random time in the cycle of the statuses and a random position in a frame.
         state ^= state << 13;
         state ^= state >> 7;
         state ^= state << 17;

@@ -11,9 +11,9 @@ use jtc_wire::{FRAME_MAX, RawPoint, fixed, trajectory};
 use crate::common::Served;
 use crate::line::Watch;
 
-/// Points of a segment: five seconds of the line.
+/// Points per segment, which take five seconds on the line.
 const POINTS: usize = 1600;
-/// A segment that is not on the line after this time was stopped, and will not be sent.
+/// If a segment is not on the line after this time, a Stop has removed it, and it will not be sent.
 const AGAIN: Duration = Duration::from_millis(30);
 
 /// A client that holds the lease until it is dropped.
@@ -41,7 +41,7 @@ impl Operator {
                 port.read(&mut buffer, Duration::from_millis(5)).expect("it is there");
                 let due = wanted.load(Ordering::Relaxed) && sent_at.elapsed() > AGAIN;
                 if due && !watch.look().is_in_a_frame() {
-                    // After a Stop the agent refuses requests from before it, so each upload comes from a new client.
+                    // After a Stop the agent refuses earlier requests, so each upload uses a new client.
                     drop(port);
                     port = AgentPort::open(&url, &options).expect("it is let in");
                     port.write_all(&segment).expect("it is there");

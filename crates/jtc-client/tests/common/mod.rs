@@ -1,4 +1,4 @@
-//! Agent of a simulated controller in this process, and requests of any client.
+//! An agent for a simulated controller in this process, and requests of any client.
 
 pub mod program;
 
@@ -24,14 +24,14 @@ use tungstenite::http::HeaderValue;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
-/// A simulated arm on a line at this rate.
+/// Creates a simulated arm on a line with this rate.
 pub fn simulated(baud: u32) -> LivePort {
     let arm = Arm::avena();
     let config = SimConfig { baud: Some(baud), ..SimConfig::new(arm.config(), &arm.parameters()) };
     LivePort::new(World::new(config))
 }
 
-/// Socket of a viewer: `stream`, `line`, or `foxglove` with all its channels.
+/// Opens a viewer's WebSocket: `stream`, `line`, or `foxglove` with all its channels.
 #[allow(dead_code, reason = "the test of a load and the example of stops take it, the suite does not")]
 pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpStream>> {
     let mut request = format!("ws://{address}/api/{path}").into_client_request().expect("an address");
@@ -47,7 +47,7 @@ pub fn socket(address: SocketAddr, path: &str) -> WebSocket<MaybeTlsStream<TcpSt
     socket
 }
 
-/// Agent that ends with the test.
+/// An agent that ends with the test.
 pub struct Served {
     pub address: SocketAddr,
     pub tokens: Tokens,
@@ -68,12 +68,12 @@ impl std::ops::Deref for Served {
 }
 
 impl Served {
-    /// Starts an agent for a simulated arm on a line at this rate.
+    /// Starts an agent for a simulated arm on a line with this rate.
     pub fn start(baud: u32) -> Self {
         Self::start_with(baud, None, &[])
     }
 
-    /// Like [`Self::start`], with TLS if given, and with read access for pages of these origins.
+    /// Like [`Self::start`], with TLS if configured, and with read access for web pages from these origins.
     pub fn start_with(baud: u32, tls: Option<Arc<rustls::ServerConfig>>, origins: &[String]) -> Self {
         Self::start_on(simulated(baud), tls, origins)
     }
@@ -87,7 +87,7 @@ impl Served {
         Self::start_with_store(port, tls, origins, Store::in_memory(), Arm::avena())
     }
 
-    /// Like [`Self::start_on`], with the stored files and the given arm.
+    /// Like [`Self::start_on`], with stored files and the given arm.
     pub fn start_with_store(
         port: impl Port + Send + 'static,
         tls: Option<Arc<rustls::ServerConfig>>,

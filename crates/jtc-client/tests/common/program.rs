@@ -1,11 +1,11 @@
-//! Program that holds the lease by HTTP.
+//! A program that holds the lease by HTTP.
 use serde_json::{Value, json};
 use test_kit::patience::Patience;
 use test_kit::written::text_with;
 
 use super::Served;
 
-/// Program with the lease.
+/// A program that holds the lease.
 pub struct Program<'a> {
     pub served: &'a Served,
     pub key: String,
@@ -36,7 +36,7 @@ impl<'a> Program<'a> {
         assert_eq!(done["stage"], "finished", "{done}");
     }
 
-    /// Waits for the end of the job and returns it; renews the lease meanwhile.
+    /// Waits for the end of the job and returns it. Renews the lease meanwhile.
     pub fn over(&self, job: u64) -> Value {
         over(self.served, job, || drop(self.ask("PUT /api/lease", None)))
     }
@@ -73,7 +73,8 @@ pub fn event(served: &Served, after: u64, kind: &str) -> (u64, Value) {
     }
 }
 
-/// Checks that a viewer, an operator without the lease and an operator who waits for the lease are refused.
+/// Checks that the request is refused to a viewer, to an operator without the lease, and to an operator who waits for
+/// the lease.
 pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value) {
     let ask =
         |token: &String, key: Option<&str>| served.api_as(Some(token), request, key, Some(body.clone()));
@@ -89,7 +90,7 @@ pub fn is_for_the_one_who_commands(served: &Served, request: &str, body: &Value)
     assert!(status == 409 && error["message"].as_str().is_some_and(|m| m.contains("anna")), "{error}");
 }
 
-/// Returns the lines of the command log that contain this command; there is at least one.
+/// Returns the lines of the command log that contain this command; at least one must exist.
 pub fn logged(served: &Served, what: &str) -> Vec<Value> {
     let text = text_with(&served.log, &[what]);
     let lines = text.lines().map(|line| serde_json::from_str::<Value>(line).expect("JSON"));

@@ -45,8 +45,8 @@ fn main() {
     }
 }
 
-/// Returns the commit that is built, followed by `+` if files were changed since. It always has thirteen characters, so
-/// that logging takes the same time in every build and measurements of builds can be compared.
+/// Returns the commit that is built, followed by `+` if files were changed since. The text always has thirteen
+/// characters, so that logging takes the same time in every build and measurements of builds can be compared.
 fn build_id() -> String {
     let git = |args: &[&str]| {
         let out = Command::new("git").args(args).output().ok()?;

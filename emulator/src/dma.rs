@@ -77,7 +77,7 @@ pub struct Dma {
     pub errors: u32,
 }
 
-/// Returns `true` if DMA1 and DMA2 can access the address. They cannot access TCM, which only the core can.
+/// Returns `true` if DMA1 and DMA2 can access the address. Only the core can access TCM.
 fn reachable(address: u32) -> bool {
     !(address < 0x0001_0000 || (0x2000_0000..0x2002_0000).contains(&address))
 }

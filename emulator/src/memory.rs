@@ -68,7 +68,7 @@ fn data() -> Prot {
     Prot::READ | Prot::WRITE
 }
 
-/// Permits code in the RAM around an address. Returns `false` if there is no RAM at the address, or if code is already
+/// Permits code in the RAM around an address. Returns `false` if the address is not in RAM, or if code is already
 /// permitted.
 pub fn allow_code(uc: &mut Unicorn<'static, Chip>, address: u32) -> bool {
     let regions = uc.mem_regions().unwrap_or_default();

@@ -49,7 +49,7 @@ pub struct Nvic {
     waiting: Vec<usize>,
     /// AIRCR.PRIGROUP.
     pub prigroup: u32,
-    /// `true` if an interrupt became pending since this flag was cleared. It wakes WFE if SCR.SEVONPEND is set.
+    /// `true` if an interrupt became pending since this flag was cleared. The flag wakes WFE if SCR.SEVONPEND is set.
     pub pended: bool,
 }
 
@@ -135,7 +135,7 @@ impl Nvic {
         self.priority[exception]
     }
 
-    /// Sets a priority byte, of which only the upper four bits exist.
+    /// Sets a priority byte; only its upper four bits exist.
     pub fn set_priority(&mut self, exception: usize, priority: u8) {
         self.priority[exception] = priority & 0xF0;
     }

@@ -16,7 +16,7 @@ const DMAT: u32 = 0x80;
 const FIFO: usize = 16;
 /// Number of bytes examined in advance to find the next event.
 const LOOK_AHEAD: usize = 64;
-/// Largest difference between the rates with which bytes still arrive intact, in thousandths.
+/// Largest difference between the rates at which bytes still arrive intact, in thousandths.
 const TOLERANCE: u64 = 40;
 
 /// A byte and the time at which its stop bit ended.

@@ -1,6 +1,6 @@
-//! J-07: whatever bytes arrive on the lines and whatever frames on the joint bus, the program does not hang, no tick is
-//! missed, and no reset occurs. In every tick the outputs are the same as those of a controller on the PC with the same
-//! inputs (`rig`).
+//! J-07: with any bytes on the lines and any frames on the joint bus, the program does not hang, no tick is missed, and
+//! no reset occurs. In every tick the outputs are the same as those of a controller on the PC with the same inputs
+//! (`rig`).
 mod rig;
 
 use std::path::Path;

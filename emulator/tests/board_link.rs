@@ -39,7 +39,7 @@ fn j03_a_gap_below_5_ms_joins_and_one_above_cuts() {
     for port in PORTS {
         let mut rig = Rig::new(BOARDS[0]);
         rig.run(50);
-        // The rest of the frame takes so long that no idle line wakes the program right after the gap.
+        // The rest of the frame is too long for an idle line to wake the program right after the gap.
         let mut frame = [0; 126];
         pid_param(&mut frame, &[[8000.0, 100.0, 80.0, -1.0, 1.0]; 6]).expect("it fits");
         // The transmission time of the first bytes makes the silence 0.2 ms shorter than the time between the two
@@ -165,8 +165,8 @@ fn j04_a_record_waits_for_nothing_but_the_tick() {
         let begin = rig.board.machine.now();
         rig.ask(port, &fixed::CLEAR_OCCURRED_ERRORS);
         let end = *rig.hosts[index(port)].times.last().expect("a status");
-        // Six bytes are received, at most one tick passes, and 175 bytes are sent, at 86.8 µs per byte. It takes longer
-        // if a periodic status was sent just before.
+        // Six bytes are received, at most one tick passes, and 175 bytes are sent, at 86.8 µs per byte. The record
+        // comes later if a periodic status was sent just before.
         let took = to_us(end - begin);
         let without_waiting = 181 * 87 + 1_200;
         assert!(took < without_waiting + 15_300, "{took} µs");
@@ -263,7 +263,7 @@ fn moving(elf: openjtc_emulator::Elf, baud: u32) -> Rig {
     rig
 }
 
-/// J-04: a Stop takes effect in the tick after its last byte, whatever bytes have arrived on either line before it.
+/// J-04: a Stop takes effect in the tick after its last byte, regardless of earlier bytes on either line.
 #[test]
 fn j04_a_stop_waits_for_nothing() {
     let clear = fixed::CLEAR_OCCURRED_ERRORS;

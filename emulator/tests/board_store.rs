@@ -1,5 +1,6 @@
 //! J-54: the stored arm. The test moves the flash contents of an emulated board to the next board, which simulates a
-//! loss of power. It requests a store through the firmware's mailbox, which is accessible only to a test or a debugger.
+//! loss of power, and requests a store through the firmware's mailbox, which is accessible only to a test or a
+//! debugger.
 mod rig;
 
 use jtc_wire::{Name, SettingValue, StoreState, fixed, set_settings};
@@ -52,8 +53,8 @@ fn ask(machine: &mut Machine, image: &[u8]) {
     assert!(machine.poke(at, &ASKED.to_le_bytes()));
 }
 
-/// Returns a board with these flash contents, some ticks after its start. Erasing a sector is fast, except in tests of
-/// the erase time.
+/// Returns a board with these flash contents, some ticks after its start. Erasing a sector takes only 100 ms here;
+/// tests that need the real time set it themselves.
 fn board(bank2: Bank2) -> Rig {
     let mut rig = Rig::with(BOARDS[0], BoardConfig { bank2, ..Default::default() });
     rig.board.machine.chip().flash.erase_time = 100 * MILLISECOND;
@@ -253,8 +254,9 @@ fn cuts(bank: Bank2, new: &[u8]) -> (Bank2, Vec<(String, Bank2)>) {
         let Some(operation) = operations.get(seen).copied() else { continue };
         seen += 1;
         let what = operation.kind;
-        // The header decides if an image is valid, and a half-erased sector can have many contents, so both are tested
-        // thoroughly. Of the many data words a few are enough.
+        // Most cuts are made during the first operation (erasing) and the last one: a half-erased sector can have many
+        // contents, and the last word, the header, decides if an image is valid. A few of the many data words are
+        // enough.
         let last = 1 + 1 + new.len().div_ceil(WORD);
         let times = match seen {
             1 => 24,

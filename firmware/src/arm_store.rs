@@ -1,5 +1,6 @@
 //! The stored arm (J-54): an image of bytes that is kept without power, and the operations that a host can request on
 //! it.
+//!
 //! At the start [`load`] finds the newest complete image and copies it into memory, before the first tick. Later the
 //! tick passes an image to [`begin`] and reads the result with [`progress`]. The loop that serves the links stores the
 //! image, one small step per pass ([`Store::step`]). No code waits for the flash, and no interrupt is delayed by more
@@ -145,7 +146,7 @@ pub fn progress() -> Progress {
     }
 }
 
-/// Returns the image found at the start. It does not change until the next start.
+/// Returns the image found at the start, which does not change until the next start.
 pub fn loaded() -> Option<Loaded> {
     critical_section::with(|cs| LOADED.borrow(cs).get())
 }

@@ -5,7 +5,6 @@
 //! two seconds, but the watchdog allows only 4.5 ms. The memory protection unit therefore blocks every access,
 //! including speculative reads and cache line fills ([`memory::bank2`]). Only the few instructions in this module open
 //! the bank, as memory that is neither cached nor prefetched. Code and constants are in bank 1, which stays readable.
-//! program. Code and constants are in bank 1, which stays readable.
 use core::arch::asm;
 
 use cortex_m::peripheral::SCB;

@@ -12,7 +12,7 @@ use openjtc_firmware::reset::{self, Cause, Failure};
 
 use crate::{board, fdcan};
 
-/// Memory whose contents survive a reset. It is tightly coupled, so that a write reaches the memory without a cache.
+/// Memory whose contents survive a reset; tightly coupled, so that a write reaches the memory without a cache.
 #[repr(transparent)]
 pub struct Kept<T>(UnsafeCell<MaybeUninit<T>>);
 

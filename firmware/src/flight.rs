@@ -116,7 +116,7 @@ pub struct Flight {
     pub status_free: u8,
     /// Number of frames in `received`.
     pub received_count: u8,
-    /// Number of received frames with a wrong format since the start (J-15). They are not in `received`.
+    /// Number of received frames with a wrong format since the start (J-15), which are not in `received`.
     pub wrong_format: u32,
     /// Stop and Pause commands that arrived on each line.
     pub urgent: [FlightUrgent; HOST_LINES],
@@ -141,7 +141,7 @@ pub struct Flight {
     pub status: u8,
     /// Frame that was sent on the joint bus.
     pub sent: FlightFrame,
-    /// Index of the current point, in ms.
+    /// Index of the current point; points are 1 ms apart.
     pub point: u32,
     /// Current error word.
     pub errors: u16,

@@ -1,4 +1,5 @@
 //! Converts bytes to frames. Each line has its own parser, whose events go to the tick in batches, through one slot.
+//!
 //! A batch is a copy, so that a parser can accept more bytes while the tick executes a long frame in slices. If bytes
 //! arrive faster than the tick executes frames, they fill first the parser's buffer, then the ring, and finally some
 //! are lost. Stop and Pause are not lost, because the tick searches the received bytes for them itself.
@@ -21,8 +22,8 @@ pub const INTER_BYTE_TIMEOUT_US: u32 = 5_000;
 const CHUNK: usize = 1024;
 /// Largest number of passes over the links before they wait for the next tick.
 const ROUNDS: usize = 64;
-/// Largest lag of the links behind DMA, bytes. DMA overwrites bytes that are older than the length of the ring, and it
-/// continues while the links read.
+/// Largest lag of the links relative to DMA, bytes. DMA overwrites bytes that are older than the length of the ring,
+/// and it continues while the links read.
 const BEHIND: u32 = (uart::RING - 4 * CHUNK) as u32;
 
 /// Number of passes of the links. The tick reads it to detect that the links have stopped.

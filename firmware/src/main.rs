@@ -1,11 +1,11 @@
 //! Firmware of the joint trajectory controller.
 //!
 //! Two parts share the processor. The *tick* ([`tick`]) is an interrupt of the highest priority, a thousand times a
-//! second. It owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed by more than a
-//! few instructions. The *links* ([`link`]) run in the remaining time. They take bytes from both serial lines and split
-//! them into frames. Frames go from the links to the tick in batches, through one slot; statuses go directly from the
-//! tick to the lines' DMA. A Stop or a Pause does not depend on the links or the slot: the tick searches the bytes that
-//! DMA has received for them. The links also write the stored arm ([`arm_store`]), one step per pass.
+//! second. The tick owns the controller, the joint bus, the safety wires and the LEDs, and is never delayed by more
+//! than a few instructions. The *links* ([`link`]) run in the remaining time, take bytes from both serial lines and
+//! split them into frames. Frames go from the links to the tick in batches, through one slot; statuses go directly from
+//! the tick to the lines' DMA. A Stop or a Pause does not depend on the links or the slot: the tick searches the bytes
+//! that DMA has received for them. The links also write the stored arm ([`arm_store`]), one step per pass.
 //!
 //! Everything that does not access hardware is in the library of this package and in `jtc-core`, and is tested on a PC.
 #![no_std]
@@ -65,7 +65,7 @@ async fn main(_spawner: Spawner) {
     let memory::Memory { points, rings, statuses, receive, batch, arms, recorder } =
         memory::take(boot.lost_power);
     let store = arm_store::load(arms);
-    // Reads the recorder's whole memory, which is slow. It must therefore happen before the watchdog runs.
+    // Reads the recorder's whole memory, which is slow and must therefore happen before the watchdog runs.
     let recorder = Recorder::new(recorder, boot.cause.failed());
     let [rs422, usb] = board.lines;
     let [ring_rs422, ring_usb] = rings;

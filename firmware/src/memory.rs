@@ -16,7 +16,7 @@ use crate::uart::RING;
 #[repr(C, align(32))]
 struct Place<T>(UnsafeCell<MaybeUninit<T>>);
 
-// SAFETY: the value is accessed only through `Place::take` or `Place::keep`, and each is called once.
+// SAFETY: the value is accessed only through one call of either `Place::take` or `Place::keep`.
 unsafe impl<T: Send> Sync for Place<T> {}
 
 impl<T> Place<T> {

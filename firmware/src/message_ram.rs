@@ -28,7 +28,7 @@ const _: () = {
     assert!(END * 4 <= BYTES);
     // The codes 0..4 mean 8, 12, 16, 20 and 24 bytes.
     assert!(MAX_LEN == 8 + 4 * SIZE_CODE as usize);
-    // One register with new-data flags must cover all receive buffers.
+    // A single register with new-data flags must cover all receive buffers.
     assert!(RX <= 32 && TX <= 32);
 };
 

@@ -1,5 +1,5 @@
 //! The tick: TIM7 at the highest priority, a thousand times a second. The tick owns the controller and everything that
-//! moves or stops the arm. It shares with the rest of the program only the slot and a summary for the log.
+//! moves or stops the arm. The tick shares with the rest of the program only the slot and a summary for the log.
 use core::cell::Cell;
 use core::sync::atomic::Ordering;
 
@@ -35,7 +35,7 @@ type Jtc = Controller<&'static mut [RawPoint]>;
 /// The flight recorder; its blocks are in separate memory.
 pub type FlightRecorder = Recorder<&'static mut [Block], 3>;
 
-/// Largest number of bytes that a tick searches on a line. It is more than arrive in two ticks at 15 MBd.
+/// Largest number of bytes that a tick searches on a line: more than arrive in two ticks at 15 MBd.
 const LOOK_MAX: usize = 4096;
 
 /// Number of ticks without activity of the links after which the arm is stopped, because a host could not stop it then.

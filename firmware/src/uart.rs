@@ -200,7 +200,7 @@ impl Ring {
     }
 }
 
-/// The tick's reader of a line. It sees every byte, independently of the links.
+/// The tick's reader of a line, which sees every byte, independently of the links.
 pub struct Lookahead(Ring);
 
 // SAFETY: it reads a register and memory that only DMA writes; both are possible from any context.

@@ -18,7 +18,7 @@ pub struct FaultConfig {
     pub duplication: f64,
     /// Probability that a frame is delayed so that later frames overtake it.
     pub reordering: f64,
-    /// Time by which such a frame is delayed, s.
+    /// Delay of such a frame, s.
     pub reordering_hold_s: f64,
     /// Shortest delay of every frame, s; the order is kept.
     pub delay_min_s: f64,
@@ -30,7 +30,7 @@ pub struct FaultConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultSchedule {
-    /// Seed. The same seed and frames give the same faults.
+    /// Seed. Equal seeds and frames give equal faults.
     pub seed: u64,
     /// Faults of frames that the member sends.
     pub send: FaultConfig,

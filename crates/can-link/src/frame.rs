@@ -1,4 +1,4 @@
-//! A CAN frame of any kind. It is always valid.
+//! A CAN frame of any kind, always valid.
 
 use std::fmt;
 

@@ -214,7 +214,7 @@ mod tests {
     use super::*;
     use crate::Id;
 
-    /// Receives a frame. The timeout is so long that only a broken transport reaches it.
+    /// Receives a frame. Only a broken transport reaches the timeout.
     fn received(bus: &mut MulticastBus) -> Option<CanFrame> {
         bus.receive(Duration::from_secs(60)).unwrap()
     }

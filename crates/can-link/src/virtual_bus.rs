@@ -122,13 +122,13 @@ impl VirtualHub {
         Self { shared: Arc::new(Shared { timeout, ..Shared::default() }) }
     }
 
-    /// Adds a member. It receives all frames that are sent from now on.
+    /// Adds a member. The member receives all frames that are sent from now on.
     pub fn join(&self) -> VirtualBus {
         self.add(Member::ORDINARY)
     }
 
     /// Adds a member for which no sender ever waits. The member misses frames if more than `limit` are waiting, and
-    /// receives nothing until it is enabled.
+    /// receives nothing until `set_deaf(false)` is called.
     pub(crate) fn join_as_guest(&self, limit: usize) -> VirtualBus {
         self.add(Member { limit, stalled: true, guest: true, deaf: true, ..Member::ORDINARY })
     }

@@ -22,7 +22,7 @@ pub struct Registered {
     pub certificate: Option<PathBuf>,
 }
 
-/// File of an agent. It is locked while the agent runs, and removed at its end.
+/// File of an agent, locked while the agent runs and removed at its end.
 #[derive(Debug)]
 pub struct Registration {
     path: PathBuf,

@@ -10,7 +10,7 @@ use rustls::{ClientConfig, RootCertStore};
 use tungstenite::Connector;
 use tungstenite::stream::MaybeTlsStream;
 
-/// Creates a connector that trusts the certificates in this file, or those of the system if there is no file.
+/// Creates a connector that trusts the certificates in this file; without a file, those of the system.
 ///
 /// # Errors
 ///
@@ -24,7 +24,7 @@ pub fn connector(file: Option<&Path>) -> io::Result<Connector> {
         }
         None => rustls_native_certs::load_native_certs().certs,
     };
-    // The system has many certificates, some of which may be invalid.
+    // Some of the system's many certificates may be invalid.
     let (added, _) = roots.add_parsable_certificates(certificates);
     if added == 0 {
         let whose = file.map_or("the system".into(), |path| path.display().to_string());

@@ -49,7 +49,7 @@ fn a_program_takes_the_lease_uploads_runs_pauses_goes_on_and_reads_the_result() 
     );
     std::thread::sleep(Duration::from_millis(300));
     assert_eq!(anna.ask("POST /api/pause", None).0, 200);
-    // The same client can pause the run and resume it as soon as the arm is at rest.
+    // This client can pause the run and resume it as soon as the arm is at rest.
     let paused = |event: &Value| event["trajectory"] == "Pause";
     let (mut number, mut state) = event(&served, number, "state");
     while !paused(&state) {
@@ -300,7 +300,7 @@ fn an_arm_in_motion_is_recovered_and_the_policy_of_one_run_is_that_of_one_run() 
     let job = anna.begin("POST /api/runs", json!({ "trajectory": 1 }));
     event(&served, last, "executing");
     assert_eq!(over(&served, job, || {})["stage"], "stopped", "by its lease's own policy");
-    // Another client's motion is running; the recovery ends it.
+    // Pauses the run of another client, which then ends with a Stop.
     std::thread::sleep(Duration::from_secs(3));
     let bob = Program::new(&served, "bob", 30.0, "continue");
     let job = bob.begin("POST /api/runs", json!({ "trajectory": 1, "approach": true }));

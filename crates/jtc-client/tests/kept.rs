@@ -61,7 +61,7 @@ fn a_trajectory_that_was_replaced_since_it_was_looked_at_is_not_run() {
     let (status, job) = run(&digest(&other));
     assert_eq!(status, 202, "{job}");
     assert_eq!(anna.over(job["number"].as_u64().expect("a number"))["stage"], "finished");
-    // The same points have the same digest under any name. A run without a digest executes the stored trajectory.
+    // Equal points have equal digests under any name. A run without a digest executes the stored trajectory.
     assert_eq!(digest(&put(&served, "7", "small again", 0.1).1), seen);
     let (status, job) =
         anna.ask("POST /api/runs", Some(json!({ "trajectory": 7, "approach": true, "digest": seen })));

@@ -72,7 +72,7 @@ fn nodes_start_anew_and_an_arm_with_torque_falls_only_where_it_may() {
     assert_eq!(anna.ask("POST /api/reset", Some(json!({ "gripper": true, "arm_may_fall": true }))).0, 204);
 }
 
-/// A drive fails while the arm is held. It can be cleared alone or together with all other drives.
+/// A drive fails while the arm is held. The drive can be cleared alone or together with all other drives.
 #[test]
 fn single_nodes_are_cleared_and_a_doctor_names_them() {
     let arm = Arm::avena();

@@ -5,7 +5,7 @@ use common::Served;
 use common::program::{Program, event};
 use serde_json::{Value, json};
 
-/// Distance by which the flange moves down, m.
+/// Distance of the flange's move down, m.
 const DOWN: f64 = 0.2;
 
 fn positions(served: &Served) -> Vec<f64> {
@@ -36,7 +36,7 @@ fn a_move_leads_to_positions_a_named_pose_or_a_pose_of_the_flange() {
     let done = moved(json!({ "to_pose": "bent" }));
     assert_eq!(done["what"], "move to bent");
     is_at(&served, bent);
-    // Computes the flange pose of these joint positions independently.
+    // Computes the flange pose of these joint positions without the agent.
     let arm = jtc_host::Arm::avena();
     let flange = jtc_host::plan::kinematics::Kinematics::new(&arm.model, &[(-3.0, 3.0); 6]).flange(&bent);
     let rpy = jtc_host::plan::kinematics::rpy_of(&flange);

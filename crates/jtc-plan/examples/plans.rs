@@ -7,8 +7,8 @@
 //!   lines that follow.
 //! - `move`, then start and end positions of six joints: prints the duration in s.
 //! - `path`, then the blend (rad), 1 with torque or 0 without, the number of places, and waypoints of six joints:
-//!   prints a line with duration (s), planning time (s) and the number of places. One line per place follows, with the
-//!   path parameter, then position, first and second derivative of six joints.
+//!   prints a line with duration (s), planning time (s) and the number of places. A line for each place follows, with
+//!   the path parameter, then position, first and second derivative of six joints.
 use std::error::Error;
 use std::io::{BufRead, Write};
 use std::time::Instant;

@@ -293,7 +293,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Returns a time factor for each cell with which its limits hold.
+    /// Returns the time factor that each cell needs to keep its limits.
     pub fn slower(&self, motion: &Motion, law: &Law, with_torque: bool) -> Vec<f64> {
         let mut slower = vec![1.0f64; self.cells.len()];
         for piece in &motion.pieces {

@@ -26,7 +26,7 @@ const BACK: f64 = 0.05;
 pub struct BlendedPath {
     /// Corners without repetitions.
     corners: Vec<Corner>,
-    /// One entry for each given waypoint.
+    /// An entry for each given waypoint.
     given: Vec<Given>,
 }
 

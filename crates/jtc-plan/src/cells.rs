@@ -22,8 +22,8 @@ const FINE: Division = Division { straight: 16, curved: 9, least: 400 };
 const SPEED_TORQUE_SHARE: f64 = 0.8;
 /// Share of the usable torque that a plan uses.
 const TORQUE_SHARE: f64 = 0.9975;
-/// Share of the torque limit that must be available for motion where friction grows with the speed. With less, the
-/// speed is lowered.
+/// Share of the torque limit that must be available for motion if friction grows with the speed. With less, the speed
+/// is lowered.
 const MOTION_SHARE: f64 = 0.05;
 /// Share of the torque available above holding that must stay available for motion, if that is less.
 const STANDING_SHARE: f64 = 0.5;

@@ -102,7 +102,7 @@ pub enum PlanError {
         limit: LimitKind,
         /// Given time from waypoint `from` to this one, s.
         given: f64,
-        /// Shortest possible time, s. It is 5 % longer than the given time if only the adjacent legs leave no margin.
+        /// Shortest possible time, s; 5 % longer than the given time if only the adjacent legs leave no margin.
         shortest: f64,
     },
     /// The torque does not suffice at any speed.
@@ -143,7 +143,7 @@ pub enum PlanError {
 }
 
 impl PlanError {
-    /// Returns the waypoint in the message, counted from 1, if there is one. Of two waypoints, returns the invalid one.
+    /// Returns the waypoint in the message, counted from 1, if there is one. Returns the invalid one of two waypoints.
     pub fn waypoint(&self) -> Option<usize> {
         match self {
             Self::NotFinite { waypoint, .. }

@@ -111,7 +111,7 @@ impl Kinematics {
     }
 
     /// Returns all joint positions within the limits that bring the flange to `target`, without duplicates. Each
-    /// solution appears with every joint within (−π, π] and, if the limits permit, with a joint turned by ±2π. Returns
+    /// solution appears with every joint within (−π, π] and, if the limits permit, with joints turned by ±2π. Returns
     /// an empty list for an invalid pose.
     ///
     /// A singular target has infinitely many solutions; some of them are returned.
@@ -155,7 +155,7 @@ impl Kinematics {
         }
     }
 
-    /// Returns an error with the distance or angle by which a pose without a solution is out of reach.
+    /// Returns an error that tells how far a pose without a solution is out of reach.
     fn missing(&self, goal: &Frame) -> PoseError {
         let least = |weights: [f64; 6], from: &JointVec| {
             search::descend(&self.chain, goal, *from, &Vector6::from(weights), 100)

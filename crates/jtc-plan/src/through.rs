@@ -204,7 +204,7 @@ fn moving_on_time(
     arm: Option<&ArmDynamics>,
 ) -> Result<Motion, PlanError> {
     let mut choices = Choices::default();
-    // Speed factor for parts without a given time. It is lowered if the changes of rate leave no margin.
+    // Speed factor for parts without a given time, lowered if the changes of rate leave no margin.
     let mut room = 1.0f64;
     for attempt in 0..CORRECTIONS {
         let share_of = |waypoint: usize| {

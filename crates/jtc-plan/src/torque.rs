@@ -8,7 +8,7 @@ use crate::{JOINTS, JointVec, Limits, State};
 /// to fall.
 pub const HOLD_SHARE: f64 = 0.97;
 
-/// Share of the torque available above holding that a motion may use whatever the margin, and its minimum as a share of
+/// Share of the torque available above holding that a motion may use with every margin, and its minimum as a share of
 /// the limit.
 const MOTION_SHARE: f64 = 0.25;
 const MOTION_LEAST: f64 = 0.02;

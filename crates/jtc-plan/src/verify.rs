@@ -6,7 +6,7 @@ use crate::motion::{Motion, Piece};
 use crate::torque::HOLD_SHARE;
 use crate::{ArmDynamics, JOINTS, JointVec, Limits, PlanError};
 
-/// Share of a limit by which rounding may exceed it.
+/// Share of a limit that rounding may add to it.
 const ROUNDING: f64 = 1e-9;
 /// Time between torque samples, s.
 const TORQUE_STEP: f64 = 0.004;
@@ -16,7 +16,7 @@ const TORQUE_SHARE: f64 = 0.9985;
 const MUCH: f64 = 1.01;
 /// Maximum number of torque samples. In a longer motion they are further apart.
 const SAMPLES_MAX: f64 = 200_000.0;
-/// Maximum time factor with which a motion is slowed down because of its torque.
+/// Maximum time factor of a motion that is slowed down because of its torque.
 const SLOWEST: f64 = 64.0;
 
 /// Returns the limits restricted to the speeds in the friction table (J-36).
@@ -53,8 +53,8 @@ pub(crate) fn within_kinematics(motion: Motion, limits: &Limits) -> Result<Motio
     Ok(if stretch > 1.0 + ROUNDING { motion.stretched(stretch) } else { motion })
 }
 
-/// Returns the time factor with which velocity, acceleration and jerk limits hold in the whole piece; below 1 if they
-/// hold already.
+/// Returns the time factor that a piece needs to keep the velocity, acceleration and jerk limits; below 1 if they hold
+/// already.
 pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     let mut most = 0.0f64;
     for j in 0..JOINTS {
@@ -79,9 +79,8 @@ pub(crate) fn kinematic_stretch(piece: &Piece, limits: &Limits) -> f64 {
     most
 }
 
-/// Returns the time factor with which the torque is sufficient at a few samples of a piece. Only the part of the torque
-/// that depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at every
-/// speed.
+/// Returns the time factor that a piece needs for sufficient torque at a few samples. Only the part of the torque that
+/// depends on the speed can be reduced. Returns 1 if the torque is sufficient, or if it is too small at every speed.
 pub(crate) fn torque_stretch(piece: &Piece, limits: &Limits, arm: &ArmDynamics) -> f64 {
     let mut most = 1.0f64;
     // With a jerk limit, no acceleration jumps between pieces, and the start was already checked as the end of the
@@ -200,8 +199,8 @@ fn within_torque(motion: Motion, limits: &Limits, arm: &ArmDynamics) -> Result<M
 /// Time, joint, torque and torque limit at a place with too little torque.
 type Over = (f64, Joint, f64, f64);
 
-/// Returns the smallest time factor above `least` with which no place is `over`, and the last joint that was over;
-/// `whole` are the torque limits.
+/// Returns the smallest time factor above `least` for a motion without a place that is `over`, and the last joint that
+/// was over; `whole` are the torque limits.
 fn factor_for(
     motion: &Motion,
     whole: &JointVec,

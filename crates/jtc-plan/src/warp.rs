@@ -115,8 +115,8 @@ fn law(motion: &Motion, parts: &[Part], changes: &[f64]) -> Law {
     Law { phases, end: motion.duration(), rests: false }
 }
 
-/// Returns the rates with which each part has its wanted duration. Half of each change of rate happens in the part
-/// before it, and half in the part after it.
+/// Returns the rates that give each part its wanted duration. Half of each change of rate happens in the part before
+/// it, and half in the part after it.
 fn rates(parts: &[Part], lengths: &[f64], changes: &[f64]) -> Vec<f64> {
     let mut rates: Vec<f64> = parts.iter().zip(lengths).map(|(p, length)| length / p.wanted).collect();
     // A twelfth of the duration of the change: the effect of half a change on the distance.

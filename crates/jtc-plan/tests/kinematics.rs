@@ -173,7 +173,8 @@ fn at(position: [f64; 3]) -> Pose {
     Orientation::Rpy([0.0; 3]).at(position).unwrap()
 }
 
-/// The wrist of a PUMA 560 is 0.15005 m beside the axis of joint 1, and at most as high as both links together reach.
+/// The wrist of a PUMA 560 is 0.15005 m to the side of the axis of joint 1, and at most as high as both links together
+/// reach.
 #[test]
 fn out_of_reach_says_how_far() {
     let kin = Kinematics::new(&robots::puma560(), &TURN);

@@ -2,8 +2,9 @@
 //! positions is written to stdout.
 //!
 //! A line has 154 numbers: x y z roll pitch yaw for each of 7 joints; x y z roll pitch yaw Ixx Ixy Ixz Iyy Iyz Izz mass
-//! for each of 7 links; gravity (3); rotor inertia, position and velocity for each of 6 joints. There is no friction,
-//! no end stop and no drive. The integration is RK4 in steps of 1 ms, or of the number of ms in the first argument.
+//! for each of 7 links; gravity (3); rotor inertia, position and velocity for each of 6 joints. The arms have no
+//! friction, end stops and drives. The integration is RK4 in steps of 1 ms, or of the number of ms in the first
+//! argument.
 use std::io::{BufRead, Write};
 
 use jtc_sim::{Arm, SimArm, SimFriction};

@@ -133,7 +133,7 @@ pub struct Arm {
     pub temperature: JointVec,
     /// `true` for joints with a closed brake.
     pub braked: [bool; JOINTS],
-    /// Factor by which a fault changes the friction; normally 1.
+    /// Factor of a fault on the friction; normally 1.
     pub friction_fault: JointVec,
 }
 
@@ -290,9 +290,9 @@ impl Arm {
         self.dynamics.set_inertias(&inertias);
     }
 
-    /// Returns the inertia of the rotors for a step of `dt`, kg·m². It is increased if a light rotor, with steep
-    /// friction or at an end stop, would have a time constant below `dt`. Fourth-order Runge-Kutta is unstable if `dt`
-    /// is 2.7 time constants or more.
+    /// Returns the inertia of the rotors for a step of `dt`, kg·m². The inertia is increased if a light rotor, with
+    /// steep friction or at an end stop, would have a time constant below `dt`. Fourth-order Runge-Kutta is unstable if
+    /// `dt` is 2.7 time constants or more.
     fn inertia(&self, dt: f64) -> JointVec {
         let steepness = self.friction.steepness(&self.qd);
         core::array::from_fn(|j| {
@@ -309,7 +309,7 @@ impl Arm {
         if stopping { STOP_DAMPING + STOP_STIFFNESS * dt } else { 0.0 }
     }
 
-    /// Updates temperatures and friction. They change so slowly that they need no update in every millisecond.
+    /// Updates temperatures and friction, which change too slowly to need an update in every millisecond.
     fn warm(&mut self) {
         for j in 0..JOINTS {
             let loss = HEAT_FLOW * (self.temperature[j] - self.parts.ambient) * self.since;

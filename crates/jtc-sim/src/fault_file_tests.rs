@@ -131,7 +131,7 @@ fn files_that_counted_from_0_are_refused_with_what_to_change() {
     }
     let message = FaultPlan::from_toml(&format!("format = 1\n{old}")).unwrap_err().to_string();
     assert!(message.contains("format = 1 is none"), "{message}");
-    // An unknown format is refused, whatever its keys.
+    // An unknown format is refused with any keys.
     let later = "format = 3\nepoch = \"noon\"\n[[fault]]\nkind = \"push\"\nlimb = 1";
     let message = FaultPlan::from_toml(later).unwrap_err().to_string();
     assert!(message.contains("format = 3 is none"), "{message}");

@@ -1,6 +1,6 @@
 //! Friction of the simulated joints: its dependence on speed and temperature, and its behaviour around standstill.
 //!
-//! At speed both models follow the same measured curve (polynomial or table). They differ around zero:
+//! At speed both models follow the same measured curve (polynomial or table). The models differ around zero:
 //! [`FrictionModel::LuGre`] sticks, breaks away and slips like real gears. In [`FrictionModel::Smooth`] friction
 //! changes its sign over a small range of speed, so the model can neither stick nor hunt.
 //!

@@ -1,4 +1,4 @@
-//! A hand that leads the arm along a path in Teaching. It pulls compliantly, with limited force, on every joint.
+//! A hand that leads the arm along a path in Teaching. The hand pulls compliantly, with limited force, on every joint.
 use jtc_dynamics::{JOINTS, JointVec};
 
 /// Torque per position difference between a joint and the hand's target, N·m/rad.
@@ -22,8 +22,8 @@ pub struct HandPath {
 }
 
 impl HandPath {
-    /// Creates a path; `points` are joint positions, rad, `step_s` seconds apart. Returns `None` if there are no
-    /// points, a number is not finite, or `step_s` ≤ 0.
+    /// Creates a path; `points` are joint positions, rad, `step_s` seconds apart. Returns `None` without points, with a
+    /// number that is not finite, or with `step_s` ≤ 0.
     pub fn new(points: Vec<JointVec>, step_s: f64) -> Option<Self> {
         let finite = points.iter().flatten().all(|q| q.is_finite());
         let good = !points.is_empty() && finite && step_s.is_finite() && step_s > 0.0;

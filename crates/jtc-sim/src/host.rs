@@ -1,4 +1,4 @@
-//! A small host for tests, soak runs and the fault matrix. It creates frames, receives statuses, and plans simple
+//! A small host for tests, soak runs and the fault matrix, which creates frames, receives statuses, and plans simple
 //! motions.
 //!
 //! The real client library is `jtc-host`. This host makes tests of the simulation independent of it.

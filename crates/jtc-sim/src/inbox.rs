@@ -1,4 +1,4 @@
-//! Receive buffer of a node. It is emptied at once or, in older firmware, by one frame per interrupt.
+//! Receive buffer of a node, emptied at once or, in older firmware, by one frame per interrupt.
 use std::collections::VecDeque;
 
 use crate::request::NodeRequest;

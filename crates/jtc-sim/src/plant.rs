@@ -265,7 +265,7 @@ impl Plant {
         &self.model
     }
 
-    /// Returns the state bytes of joints and gripper (255 if there is no gripper).
+    /// Returns the state bytes of joints and gripper (255 without a gripper).
     pub fn node_states(&self) -> [NodeState; NODES] {
         self.nodes.states()
     }

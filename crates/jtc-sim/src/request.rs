@@ -1,4 +1,5 @@
-//! Requests as nodes receive them. They may contain any state byte, although the controller sends only four of them.
+//! Requests as nodes receive them. A request may contain any state byte, although the controller sends only four of
+//! them.
 use jtc_bus::{Frame, NODES, NodeState, Request, id};
 
 /// A request that has reached a node.

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 /// Picoseconds per microsecond. With this resolution the duration of a byte at any usual rate is exact enough for days.
 const PS_PER_US: u64 = 1_000_000;
 
-/// One direction of the line.
+/// A direction of the line.
 #[derive(Clone, Debug)]
 pub struct Line {
     /// Duration of a byte (10 bits), ps; 0 means no delay.

@@ -31,7 +31,7 @@ pub struct World {
     bus: Bus,
     plant: Plant,
     to_device: Line,
-    /// Clock with which the board measures silence on its line, µs; the next field is the time of the last byte.
+    /// Clock for the board's measurement of silence on its line, µs; the next field is the time of the last byte.
     line_us: u64,
     heard_us: u64,
     /// Longest silence on the line that the board measures, µs; with `None` it is the silence in virtual time.

@@ -1,4 +1,4 @@
-//! The same seed gives the same bytes on both links.
+//! Equal seeds give equal bytes on both links.
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use jtc_sim::{Fault, FaultKind, FaultPlan, Operator, SimConfig, Trigger, host};

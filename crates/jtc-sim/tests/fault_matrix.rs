@@ -3,7 +3,7 @@ use sim_checks::matrix::{contact_table, fault_matrix, standstill_table, stopping
 
 #[test]
 fn j12_j14_j16_j21_j22_each_fault_in_each_state_has_the_documented_reaction() {
-    // One test for all tables, because they are written to the same file.
+    // A single test for all tables, because they are written to the same file.
     documented("fault matrix", &fault_matrix().unwrap_or_else(|error| panic!("{error}")));
     documented("standstill", &standstill_table().unwrap_or_else(|error| panic!("{error}")));
     documented("stopping", &stopping_table().unwrap_or_else(|error| panic!("{error}")));

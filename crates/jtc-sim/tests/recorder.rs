@@ -119,7 +119,7 @@ fn j56_a_host_that_reads_the_log_changes_nothing_of_a_motion() {
 }
 
 /// The recorder keeps at least two seconds before an error and the time after it, with more traffic than the controller
-/// can execute. This holds whatever part of the first snapshot's interval is lost.
+/// can execute. This holds for any lost part of the first snapshot's interval.
 #[test]
 fn j56_two_seconds_are_kept_under_the_busiest_traffic() {
     let mut operator = loaded();

@@ -1,4 +1,4 @@
-//! A Stop or a Pause takes effect in the tick after its last byte, whatever other bytes are on the line (J-04).
+//! A Stop or a Pause takes effect in the tick after its last byte, with any other bytes on the line (J-04).
 //!
 //! Each test runs two worlds that differ only in the bytes on the line: only the Stop in one, also other bytes in the
 //! other. From the tick after the last byte of the Stop on, both must give bit-identical commands.

@@ -156,7 +156,7 @@ fn the_force_of_a_plane_acts_through_the_flange() {
         let inside = |x: [f64; 3]| -> [f64; 3] { std::array::from_fn(|i| x[i] + depth * normal[i] / length) };
         arm.set_walls(&[Wall::Plane { position, normal, stiffness, damping: 0.0 }]);
         assert_eq!(arm.wall_torque(), [0.0; JOINTS], "{name}: at the surface");
-        // The arm enters the wall because the wall is moved. The same wall, created outside the arm, is then used.
+        // The arm enters the wall because the wall is moved. An equal wall, created outside the arm, is then used.
         let mut before = POSE;
         let away = |q: &[f64; JOINTS]| -> f64 {
             (0..3).map(|i| (flange(&parts, q)[i] - inside(position)[i]) * normal[i] / length).sum()
@@ -189,7 +189,7 @@ fn the_force_of_a_plane_acts_through_the_flange() {
     }
 }
 
-/// An arm that falls onto a table comes to rest on it. It sinks in by the contact force divided by the stiffness.
+/// An arm that falls onto a table comes to rest on it. The depth is the contact force divided by the stiffness.
 #[test]
 fn an_arm_that_leans_on_a_table_is_as_deep_as_force_over_stiffness() {
     for (name, parts) in arms() {
@@ -261,7 +261,7 @@ fn what_is_not_there_changes_no_bit() {
     }
 }
 
-/// Returns the gravity torque of an arm at rest, computed from the acceleration with which it falls.
+/// Returns the gravity torque of an arm at rest, computed from the acceleration of its fall.
 fn gravity_torque(arm: &Arm, parts: &SimArm, load: &Payload) -> [f64; JOINTS] {
     let mut falling = arm.clone();
     let dt = 1e-7;

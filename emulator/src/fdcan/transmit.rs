@@ -22,7 +22,7 @@ impl Fdcan {
         self.ram.load(start, room, self.cccr & cccr::FDOE != 0, self.cccr & cccr::BRSE != 0)
     }
 
-    /// Returns the buffer to be sent next: the one with the lowest identifier. Of a FIFO only the oldest entry is
+    /// Returns the buffer to be sent next: the one with the lowest identifier. Only the oldest entry of a FIFO is
     /// considered.
     pub(super) fn next_buffer(&self) -> Option<u32> {
         let dedicated = self.dedicated();

@@ -65,7 +65,7 @@ impl Bank2 {
         self.bytes.as_flattened()[at..at + length].to_vec()
     }
 
-    /// Overwrites the bytes at an address, whatever the old contents. The words are programmed afterwards.
+    /// Overwrites the bytes at an address, regardless of the old contents. The words are programmed afterwards.
     pub fn put(&mut self, address: u32, bytes: &[u8]) {
         let at = (address - BANK2) as usize;
         self.bytes.as_flattened_mut()[at..at + bytes.len()].copy_from_slice(bytes);

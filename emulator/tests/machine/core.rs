@@ -27,7 +27,7 @@ fn f64_results_have_the_bits_of_the_pc() {
         .take(ROUNDS)
         .collect();
     let mut machine = machine(FLOATS, &[]);
-    // Each pair is run alone, because the program writes its results where the next pair would be.
+    // Each pair is run alone, because the program writes its results in the place of the next pair.
     for [a, b] in pairs {
         let mut one = 1u64.to_le_bytes().to_vec();
         one.extend(a.to_le_bytes());

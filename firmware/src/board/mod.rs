@@ -81,7 +81,7 @@ fn receive(pin: Peri<'static, impl Pin>, function: u8) {
     core::mem::forget(pin);
 }
 
-/// Bit of the safety output in port D, where it is on all boards.
+/// Bit of the safety output in port D, which all boards use for it.
 const SAFETY_OUTPUT_BIT: usize = if cfg!(feature = "swapped-safety-pins") { 3 } else { 4 };
 
 /// Drives the safety output to 0 as the first action after a reset, even if the clocks do not start: the drives may

@@ -260,8 +260,7 @@ impl SlcanBus {
         Ok(())
     }
 
-    /// Handles the unconfirmed frame, and writes it again if it was refused. Returns `true` if there is no unconfirmed
-    /// frame.
+    /// Handles the unconfirmed frame, and writes it again if it was refused. Returns `true` if no frame is unconfirmed.
     fn settle(&mut self, now: Instant) -> Result<bool, CanError> {
         let Some(frame) = &mut self.outstanding else { return Ok(true) };
         let late = now.saturating_duration_since(frame.since) >= SEND_TIMEOUT;

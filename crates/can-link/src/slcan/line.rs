@@ -8,7 +8,7 @@ use crate::{CanFrame, ControllerState, ErrorState, Id};
 const LONGEST: usize = 256;
 /// Character that ends a line.
 pub(crate) const CR: u8 = b'\r';
-/// Character that means "refused". It is not part of a line.
+/// Character that means "refused"; not part of a line.
 pub(crate) const BELL: u8 = 7;
 /// Number of digits of the time stamp that some adapters append.
 const TIME_STAMP: usize = 4;

@@ -62,7 +62,7 @@ impl SocketcandGateway {
         Ok(Self { events, server: SocketcandServer::listen(address, channels)? })
     }
 
-    /// Returns the next event of the clients, in order, or `None` if there was none within `timeout`.
+    /// Returns the next event of the clients, in order, or `None` if no event occurred within `timeout`.
     pub fn next(&mut self, timeout: Duration) -> Option<FromClient> {
         // The server holds the other end and lives as long as this gateway, so the only possible error is a timeout.
         self.events.recv_timeout(timeout).ok()

@@ -158,7 +158,7 @@ impl Drop for SocketcandServer {
     }
 }
 
-/// Returns the address with which this computer can connect to a listener.
+/// Returns the address for connections from this computer to a listener.
 fn reachable(mut address: SocketAddr) -> SocketAddr {
     if address.ip().is_unspecified() {
         address.set_ip(match address.ip() {

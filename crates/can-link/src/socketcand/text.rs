@@ -150,8 +150,8 @@ pub(crate) fn has_form(frame: &CanFrame) -> bool {
 
 /// Appends `< frame … >` with the time since 1970.
 ///
-/// The bytes have no blanks between them, because python-can reads only the first word. If there are no bytes, two
-/// blanks follow each other, because python-can would not find the empty word otherwise.
+/// The bytes have no blanks between them, because python-can reads only the first word. Without bytes, two blanks
+/// follow each other, because python-can would not find the empty word otherwise.
 pub(crate) fn push_frame(text: &mut String, frame: &CanFrame, time: Duration) {
     let (s, us) = (time.as_secs(), time.subsec_micros());
     let written = write!(text, "< frame {} {s}.{us:06} ", frame.id()).and_then(|()| {
@@ -198,7 +198,7 @@ mod tests {
         CanFrame::classic(Id::extended(id).unwrap(), data).unwrap()
     }
 
-    /// Requests as python-can 4.6.1 writes them: without leading zeros, and with two blanks if there is no data.
+    /// Requests as python-can 4.6.1 writes them: without leading zeros, and with two blanks for a message without data.
     #[test]
     fn requests_of_python_can_are_understood() {
         for (text, request) in [

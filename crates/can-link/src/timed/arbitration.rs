@@ -33,7 +33,7 @@ impl Arbitration {
         self.senders.contains(&member) || self.failed.contains(&member)
     }
 
-    /// Arbitrates between the starters. Returns `None` if there are none.
+    /// Arbitrates between the starters. Returns `None` without starters.
     pub(super) fn of(starters: &[Starter]) -> Option<Self> {
         let best = starters.iter().map(|starter| arbitration(&starter.frame)).min()?;
         let mut sending: Vec<(Starter, WireBits)> = starters

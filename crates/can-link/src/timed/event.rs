@@ -2,8 +2,8 @@
 
 use crate::{CanFrame, ControllerState};
 
-/// Identifier of a member of a [`TimedBus`](crate::TimedBus). It is only valid for that bus; another bus may panic.
-/// Numbers increase and are never reused.
+/// Identifier of a member of a [`TimedBus`](crate::TimedBus), only valid for that bus; another bus may panic. Numbers
+/// increase and are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MemberId(pub(super) usize);
 

@@ -25,7 +25,7 @@ const QUEUE: usize = 65_536;
 /// Frames take as long as on a real bus with this bit rate; stuff bits are counted exactly. The first frames of all
 /// queues take part in arbitration as on a real bus. Members acknowledge frames, count errors, become error passive and
 /// go bus-off according to ISO 11898-1. Two members that send the same identifier with different data at the same time
-/// collide. The same calls with the same seed give the same events.
+/// collide. Equal calls with equal seeds give equal events.
 ///
 /// ```
 /// use can_link::{CanFrame, BusEvent, Id, TimedBus};
@@ -123,8 +123,8 @@ impl TimedBus {
         self.recovers_by_itself = recovers;
     }
 
-    /// Adds a member. It acknowledges frames, receives all frames that end from now on, and repeats a frame if sending
-    /// fails.
+    /// Adds a member. The member acknowledges frames, receives all frames that end from now on, and repeats a frame if
+    /// sending fails.
     pub fn join(&mut self) -> MemberId {
         self.members.push(Member {
             queue: VecDeque::new(),
@@ -181,8 +181,8 @@ impl TimedBus {
         self.members[member.0].acknowledges = acknowledges;
     }
 
-    /// Sets simulated faults between a member and the bus, such as those of a gateway. They do not affect the bus
-    /// itself.
+    /// Sets simulated faults between a member and the bus, such as those of a gateway. These faults do not affect the
+    /// bus itself.
     pub fn set_faults(&mut self, member: MemberId, schedule: FaultSchedule) {
         let mut seeds = fastrand::Rng::with_seed(schedule.seed);
         let send = Line::new(schedule.send, seeds.u64(..));
@@ -272,9 +272,9 @@ impl TimedBus {
         due.chain(recoveries).chain(wire).min().map(|at| at.max(self.now))
     }
 
-    /// Advances to the next event, or to `at_ns` if there is none before. Must be called until it returns `None`. After
-    /// it returns an event, the current time is the time of the event, and frames that are queued then take part in
-    /// arbitration from that time on.
+    /// Advances to the next event, or to `at_ns` if no event comes before. Must be called until it returns `None`.
+    /// After it returns an event, the current time is the time of the event, and frames that are queued then take part
+    /// in arbitration from that time on.
     pub fn advance_to(&mut self, at_ns: u64) -> Option<TimedEvent> {
         let at_ns = at_ns.min(END_OF_TIME);
         loop {

@@ -104,7 +104,7 @@ proptest! {
         prop_assert!(errors(&events).is_empty());
     }
 
-    /// Whatever calls are made, each call ends, and the same calls give the same events.
+    /// For any sequence of calls, each call ends, and equal calls give equal events.
     #[test]
     fn any_calls_are_repeatable_and_end(calls in prop::collection::vec((0..9_u8, 0..5_usize, 0..40_u32, any::<u64>()), 1..120), seed in any::<u64>()) {
         let all = || {
@@ -221,7 +221,7 @@ fn d_07_frames_alike_bit_for_bit_look_like_one() {
     assert_eq!((bus.pending(a), bus.pending(b)), (0, 0));
 }
 
-/// D-03 and the load of 11 members: a bus at 1 Mbit/s transmits exactly as many bits as its rate.
+/// D-03 and bus load: the load is the number of transmitted bits divided by the bit rate.
 #[test]
 fn the_load_is_the_share_of_bits() {
     for bitrate in [1_000_000, 500_000, 250_000, 125_000] {

@@ -10,7 +10,7 @@ use tungstenite::Message;
 
 use crate::common::socket;
 
-/// Number of viewers, each of which gets 25 statuses per second; and paths that the clients that never read connect to.
+/// Number of viewers, with 25 statuses per second each; and paths for the clients that never read.
 pub const VIEWERS: usize = 50;
 const DEAF: [&str; 12] = [
     "stream", "line", "foxglove", "stream", "line", "foxglove", "stream", "line", "foxglove", "stream",

@@ -19,8 +19,8 @@ pub(super) struct Place {
     pub acceleration: [JointVec; 2],
     /// Highest squared speed, if speed, acceleration and torque are limited at this point.
     pub cap: f64,
-    /// Weights with which the reciprocal speed, here and at the middle of the cell, adds to the time; and the squared
-    /// speed at the middle.
+    /// Weights of the reciprocal speed, here and at the middle of the cell, in the time; and the squared speed at the
+    /// middle.
     pub weight: f64,
     pub middle: (Three, f64),
     pub torque: Option<Torque>,
@@ -55,7 +55,7 @@ impl Place {
         std::array::from_fn(|j| by_slope[j] * slope + by_b[j] * b)
     }
 
-    /// Adapts the place to rest, where only jerk along the path exists.
+    /// Adapts the place to rest: only jerk along the path remains.
     pub fn at_rest(&mut self) {
         (self.jerk[1], self.jerk[2]) = ([0.0; JOINTS], [0.0; JOINTS]);
     }

@@ -181,7 +181,7 @@ impl Shoulder {
     }
 }
 
-/// Adds solutions of the last three joints, for both signs of joint 5.
+/// Adds the two solutions of the last three joints, with the wrist flipped and not flipped.
 fn wrist(zero: &Axes, arm: &[f64; 3], rotation: &Matrix3<f64>, hint: &JointVec, found: &mut Vec<JointVec>) {
     let h = &zero.axis;
     let before = turn(&h[0], arm[0]) * turn(&h[1], arm[1]) * turn(&h[2], arm[2]);

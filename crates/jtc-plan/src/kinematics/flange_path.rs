@@ -262,8 +262,8 @@ impl<'a> Follower<'a> {
         Ok(())
     }
 
-    /// Returns the error for a singular pose at `s`. It reports the end of the arm's reach if the rest of the leg has
-    /// no solution.
+    /// Returns the error for a singular pose at `s`, or for the end of the arm's reach if the rest of the leg has no
+    /// solution.
     fn singular(&self, s: f64, axes: &Axes) -> PoseError {
         let (_, along, length) = self.trace.whereabouts(s);
         for k in 0..=LOOK_AHEAD {

@@ -5,12 +5,12 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use super::PoseError;
 use super::chain::Frame;
 
-/// Maximum deviation of the length of a quaternion from 1. It allows for quaternions written with few digits.
+/// Maximum deviation of the length of a quaternion from 1, to allow for few digits.
 const UNIT: f64 = 1e-3;
 /// Maximum deviation of the entries of RᵀR from the unit matrix.
 const ROTATION: f64 = 1e-6;
 
-/// An orientation, as given for a pose of the flange.
+/// An orientation of a flange pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Orientation {
     /// A unit quaternion x, y, z, w with the scalar last, as in ROS. Its length may deviate from 1 by a thousandth, to
@@ -86,7 +86,7 @@ pub(crate) fn checked(pose: &Pose) -> Result<Frame, PoseError> {
     if frame.rotation.determinant() < 0.0 {
         return Err(PoseError::NotRotation { deviation: 2.0 });
     }
-    // One step of Newton's iteration to the nearest rotation matrix squares the deviation.
+    // A step of Newton's iteration to the nearest rotation matrix squares the deviation.
     let rotation =
         frame.rotation * (Matrix3::identity() * 3.0 - frame.rotation.tr_mul(&frame.rotation)) * 0.5;
     Ok(Frame { rotation, ..frame })

@@ -34,6 +34,7 @@ pub struct RoutePoint {
 
 /// A path through waypoints, straight in joint space or with the flange on lines and arcs. The path stops between
 /// sections of different kinds.
+///
 /// Along lines and arcs the arm keeps the configuration (elbow, wrist, shoulder) that it has at the start of the first
 /// of them. A flange pose at the end of a line is reached in this configuration; joint positions there must be in the
 /// same configuration. Any other flange pose is reached with the solution nearest to the previous waypoint.

@@ -260,7 +260,7 @@ impl Case {
     }
 }
 
-/// Range of waypoints closer to each other than the blend, some of which may be left out.
+/// Range of waypoints closer to each other than the blend; some of them may be left out.
 fn row(waypoints: &[JointVec], at: usize, blend: f64) -> std::ops::RangeInclusive<usize> {
     let dense = |i: usize| distance(&waypoints[i], &waypoints[i + 1]) <= blend;
     let (mut from, mut to) = (at, at);

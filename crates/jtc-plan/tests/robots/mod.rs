@@ -62,8 +62,8 @@ pub fn kr5() -> ArmModel {
 
 /// Kinova Jaco 2 with six joints and a curved wrist (j2s6s200), which has no closed form.
 pub fn jaco2() -> ArmModel {
-    // The curved link offsets both of its axes by sin(a)/sin(2a) = 1/√3 of a link, where a = 30° is half of the angle
-    // between them.
+    // The curved link offsets both of its axes by sin(a)/sin(2a) = 1/√3 of a link; a = 30° is half of the angle between
+    // them.
     let part = 0.0741 / 3f64.sqrt();
     by_dh([
         [0.2755, 0.0, FRAC_PI_2],

@@ -69,7 +69,7 @@ impl Drive {
         if self.outside() {
             warnings |= warning::OUTSIDE_WORKING_AREA;
         }
-        // The warning is also set before the first configuration, whatever the level of the line.
+        // The warning is also set before the first configuration, at any level of the line.
         if self.safety_line() || !self.configured {
             warnings |= warning::SAFETY_LINE;
         }

@@ -1,4 +1,4 @@
-//! Makes the default arm's constants from `arms/avena.toml`, so that each default number stands in one place.
+//! Generates the default arm's constants from `arms/avena.toml`, so that each default value has a single source.
 use std::fmt::Write;
 use std::{env, fs, path::PathBuf};
 
@@ -14,7 +14,7 @@ fn main() {
     fs::write(&out, generate(&arm)).unwrap_or_else(|e| panic!("cannot write {}: {e}", out.display()));
 }
 
-/// The value under `key`, with the key in the message when it is missing.
+/// Returns the value under `key`. If it is missing, the panic message contains the key.
 fn get<'a>(table: &'a Table, key: &str) -> &'a Value {
     table.get(key).unwrap_or_else(|| panic!("arms/avena.toml: `{key}` is missing"))
 }

@@ -1,4 +1,4 @@
-//! Time of one control tick in Operate and memory of the controller, one `name value` a line (ns, bytes).
+//! Measures the time of one control tick in Operate and the memory of the controller. Prints one `name value` per line (ns, bytes).
 use std::collections::VecDeque;
 use std::hint::black_box;
 
@@ -17,11 +17,11 @@ fn frame(frame_type: FrameType, body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Ticks that the drives' speed is the mean over.
+/// Ticks over which the drives average their speed.
 const WINDOW: usize = 10;
 
-/// Returns the answers of nodes that answer at once and follow their set values exactly. `position` has their positions in the last ticks,
-/// rad, the newest first.
+/// Returns the answers of nodes that answer at once and follow their set values exactly. `position`: positions in the last ticks, rad,
+/// newest first.
 fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f64; 6]>) -> Vec<Frame> {
     let at = |j: usize, ago: usize| position.get(ago).or(position.back()).map_or(0.0, |position| position[j]);
     let mut out = Vec::new();
@@ -62,7 +62,7 @@ fn answers(request: &Request, state: &mut [NodeState; 7], position: &VecDeque<[f
 }
 
 fn main() {
-    // Twice there and back within 1,499 steps of 10 ms, at rest at both ends (J-36).
+    // The path goes there and back twice in 1,499 steps of 10 ms, and is at rest at both ends (J-36).
     let pace = 2.0 * std::f64::consts::TAU / 14.99;
     let points: Vec<RawPoint> = (0..1500i32)
         .map(|i| {
@@ -98,7 +98,7 @@ fn main() {
     let mut start = None;
     let mut ticks = 0;
     while recorded.len() < 4_000 {
-        // Later commands need HoldPos.
+        // Later commands require HoldPos.
         let ready = queue.len() > 2 || controller.telemetry().state == ControllerState::HoldPos;
         let host = queue
             .front()

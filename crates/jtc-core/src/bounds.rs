@@ -6,7 +6,7 @@ use crate::friction;
 use crate::limits::JointConfig;
 use crate::parameters::{PidGains, TableOf};
 
-/// Share of the velocity limit up to which friction has been measured; a curve that was fitted to it may have any value beyond.
+/// Share of the velocity limit up to which friction has been measured. Above it a fitted curve may have any value.
 const MEASURED: f64 = 0.5;
 /// Number of speeds at which a friction polynomial is checked. A cubic changes little between them.
 const SPEEDS: u8 = 16;
@@ -23,17 +23,16 @@ pub struct ParameterBounds {
     pub kd_max: f64,
     /// Largest magnitude of IntMin and IntMax, rad·s. Up to 120 is in use.
     pub integral_max: f64,
-    /// Largest torque that bounds of the integral which leave out zero may force on a joint at rest, as a share of its torque
-    /// limit.
+    /// Largest torque on a joint at rest, as a share of its torque limit, that bounds of the integral may force if they exclude zero.
     pub integral_bias_max: f64,
     /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
     pub link_mass_max: f64,
-    /// Largest moment or product of inertia of a link, kg·m²: the value of those 50 kg at 1.4 m.
+    /// Largest moment or product of inertia of a link, kg·m²: the moment of a mass of 50 kg at a distance of 1.4 m.
     pub link_inertia_max: f64,
-    /// Largest friction torque of a joint at a speed, as a share of its torque limit; of a polynomial without the factor of
-    /// its temperature. Up to 1.19 is in use.
+    /// Largest friction torque of a joint at any speed, as a share of its torque limit. A polynomial is checked without its temperature
+    /// factor. Values up to 1.19 are in use.
     pub friction_max: f64,
-    /// Like `friction_max`, up to half of the velocity limit. Up to 0.82 is in use.
+    /// Like `friction_max`, but for speeds up to half of the velocity limit. Values up to 0.82 are in use.
     pub slow_friction_max: f64,
     /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of the torque
     /// limit. Noise of a measurement can cause such a torque.
@@ -47,7 +46,7 @@ pub struct ParameterBounds {
 pub struct OutOfBounds {
     /// Name of the parameter, with its unit.
     pub what: &'static str,
-    /// Velocity that it belongs to, rad/s: friction only.
+    /// Velocity at which a friction torque is out of bounds, rad/s; `None` for other parameters.
     pub velocity: Option<f64>,
     /// The value.
     pub value: f64,
@@ -58,7 +57,7 @@ pub struct OutOfBounds {
 }
 
 impl OutOfBounds {
-    /// Checks that `value` is within `low..=high`; written so that a NaN is refused.
+    /// Checks that `value` is within `low..=high`. The comparison also refuses NaN.
     fn unless_within(what: &'static str, value: f64, low: f64, high: f64) -> Result<(), Self> {
         if value >= low && value <= high {
             Ok(())
@@ -111,7 +110,7 @@ impl ParameterBounds {
         )
     }
 
-    /// Checks the masses and inertias of a model that is physical.
+    /// Checks the masses and inertias of a model that has already passed the check for physical consistency.
     pub fn check_masses(&self, model: &ArmModel) -> Result<(), OutOfBounds> {
         for link in &model.links {
             OutOfBounds::unless_within("mass of a link (kg)", link.mass, 0.0, self.link_mass_max)?;
@@ -123,7 +122,7 @@ impl ParameterBounds {
         Ok(())
     }
 
-    /// Checks the mass and inertia of a payload, with the bounds of a link.
+    /// Checks the mass and inertia of a payload. The bounds are those of a link.
     pub fn check_payload(&self, payload: &Payload) -> Result<(), OutOfBounds> {
         OutOfBounds::unless_within("mass of the payload (kg)", payload.mass, 0.0, self.link_mass_max)?;
         let most = self.link_inertia_max;
@@ -133,7 +132,7 @@ impl ParameterBounds {
             .try_for_each(|&i| OutOfBounds::unless_within("inertia of the payload (kg·m²)", i, -most, most))
     }
 
-    /// Checks the torque (N·m) that compensates friction of a joint at a velocity (rad/s).
+    /// Checks the torque (N·m) that compensates the friction of a joint at a velocity (rad/s).
     fn check_friction(&self, torque: f64, velocity: f64, joint: &JointConfig) -> Result<(), OutOfBounds> {
         let speed = velocity.abs();
         let (low, high) = if speed == 0.0 {
@@ -143,7 +142,7 @@ impl ParameterBounds {
         } else {
             (-self.friction_max, self.friction_max)
         };
-        // Against the motion is positive for both directions.
+        // A torque against the motion is positive in both directions.
         let along = if velocity < 0.0 { -torque } else { torque };
         OutOfBounds::unless_within(
             "friction torque (N·m)",
@@ -154,20 +153,20 @@ impl ParameterBounds {
         .map_err(|e| OutOfBounds { velocity: Some(velocity), ..e })
     }
 
-    /// Checks a polynomial at all speeds that the joint may have. Its temperature factor is bounded by itself (J-42).
+    /// Checks a polynomial over the speed range of the joint. The temperature factor has bounds of its own (J-42).
     pub fn check_polynomial(&self, coefficients: &[f64; 6], joint: &JointConfig) -> Result<(), OutOfBounds> {
         let [c0, c1, c2, c3, ..] = *coefficients;
         let without_temperature = [c0, c1, c2, c3, 0.0, 0.0];
         let step = joint.velocity_max / f64::from(SPEEDS);
-        // Arms often move slowly: as many speeds again within the first step.
+        // Arms often move slowly, so the first step is divided into as many steps again.
         let slow = (1..SPEEDS).map(|k| step * f64::from(k) / f64::from(SPEEDS));
         slow.chain((1..=SPEEDS).map(|k| step * f64::from(k))).try_for_each(|v| {
-            // The sign is smoothed around standstill: the torque there is zero.
+            // The sign is smoothed around standstill, so the torque there is zero.
             self.check_friction(friction::polynomial(&without_temperature, v, 0.0, v), v, joint)
         })
     }
 
-    /// Checks a table at its own velocities, and at standstill.
+    /// Checks a table at the velocities of its rows, and at standstill.
     pub fn check_table(&self, table: &TableOf<f32>, joint: &JointConfig) -> Result<(), OutOfBounds> {
         for (&velocity, row) in table.velocity.iter().zip(&table.torque) {
             for &torque in row {
@@ -178,7 +177,7 @@ impl ParameterBounds {
             }
         }
         for &temperature in &table.temperature {
-            // A table without standstill cannot be used for any path (J-36).
+            // A table that does not include standstill cannot be used for any path (J-36).
             if let Some(torque) = friction::table(table, 0.0, temperature.into()) {
                 self.check_friction(torque, 0.0, joint)?;
             }

@@ -10,10 +10,11 @@ use crate::deceleration::moves;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Time for which a joint must be at rest, with a torque within the limit, to count as caught, ms: longer than the turn of a swing.
+/// Time for which a joint must be at rest, with a torque within its limit, before it is considered caught, ms. It is longer than the
+/// reversal of a swing.
 const CALM_MS: u16 = 100;
 
-/// Speed below which a swing that grows is noise, rad/s.
+/// Speed below which growth of a swing is treated as noise, rad/s.
 const FAST_SWING: f64 = 0.1;
 
 /// State of a joint whose load may need to be caught.
@@ -21,16 +22,16 @@ const FAST_SWING: f64 = 0.1;
 pub(crate) struct Catch {
     /// Time left for the catch, ms; 0: the catch is over, or the joint was not enabled.
     left_ms: u16,
-    /// Time left until the joint counts as caught, ms.
+    /// Time left until the joint is considered caught, ms.
     busy_ms: u16,
-    /// The joint has been calm for that long since it was enabled.
+    /// Since it was enabled, the joint has been calm for `CALM_MS` at least once.
     settled: bool,
-    /// Sag of the set position, rad: in one direction only.
+    /// Sag of the set position, rad. It grows in one direction only.
     sag: f64,
-    /// Highest speed of this half of a swing, with its sign, and of the half before, rad/s.
+    /// Highest speed of the present half swing, with its sign, and of the half swing before it, rad/s.
     peak: f64,
     peak_before: f64,
-    /// That half was faster than the one before it.
+    /// The previous half swing was faster than the one before it.
     grew: bool,
 }
 
@@ -47,13 +48,13 @@ impl Catch {
         self.left_ms > 0 && self.busy_ms > 0
     }
 
-    /// Returns `true` if the joint has been at rest, within its torque limit, since it was enabled.
+    /// Returns `true` if the joint has come to rest, within its torque limit, at any time since it was enabled.
     pub fn settled(&self) -> bool {
         self.settled
     }
 
-    /// Runs one tick, with the measured velocity (rad/s). Returns `true` if a load may still be caught. A swing that grows is not a load
-    /// that comes to rest but an unstable loop, and the catch is over.
+    /// Runs one tick, with the measured velocity (rad/s). Returns `true` if a load may still be caught. A growing swing is not a load that
+    /// comes to rest but an unstable loop; it ends the catch.
     pub fn step(&mut self, velocity: f64) -> bool {
         if self.settled && self.left_ms == 0 {
             return false;
@@ -63,7 +64,7 @@ impl Catch {
             self.busy_ms = CALM_MS;
             self.swing(velocity);
         } else {
-            // Noise around standstill does not count as a half of a swing: a fall that follows it has not grown from it.
+            // Noise around standstill is not a half swing: a fall after it has not grown from it.
             self.busy_ms = self.busy_ms.saturating_sub(1);
             self.settled |= self.busy_ms == 0;
         }
@@ -73,7 +74,7 @@ impl Catch {
         self.left_ms > 0
     }
 
-    /// Runs a tick of a swing.
+    /// Updates the peaks of the swing for one tick.
     fn swing(&mut self, velocity: f64) {
         if velocity * self.peak < 0.0 {
             let peak = self.peak.abs();
@@ -84,12 +85,13 @@ impl Catch {
         }
     }
 
-    /// Clears earlier swings: only swings from now on count.
+    /// Clears the record of earlier swings.
     pub fn watch_anew(&mut self) {
         (self.peak, self.peak_before, self.grew) = (0.0, 0.0, false);
     }
 
-    /// Runs one tick of a joint that has settled. Returns `true` if the joint swings, each of three halves faster than the one before it.
+    /// Runs one tick of a joint that has settled. Returns `true` if the joint has made three half swings, each faster than the one before
+    /// it.
     pub fn watch(&mut self, velocity: f64) -> bool {
         if !self.settled || self.left_ms > 0 {
             return false;
@@ -100,7 +102,7 @@ impl Catch {
         self.grew && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }
 
-    /// Ends the catch, because the joint has come to rest in another way.
+    /// Ends the catch, because the joint has been brought to rest in another way.
     pub fn calm_down(&mut self) {
         *self = Self { settled: true, ..Self::default() };
     }
@@ -111,16 +113,16 @@ impl Catch {
     }
 
     /// Returns the step of the set position, rad, if the computed torque exceeds the limit by `excess` (N·m) at a position error of `error`
-    /// (rad). If the sag would exceed the highest position error, or a load pulls the other way, as in a swing from limit to limit, this is
-    /// not a catch, and the catch is over.
+    /// (rad). Ends the catch if the sag would exceed the highest position error, or if the load pulls in the other direction, as in a swing
+    /// between both limits.
     pub fn sag(&mut self, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
-        // At most to the position of the joint.
+        // The set position moves at most to the measured position of the joint.
         let wanted = excess / kp;
         let step = if error > 0.0 { -wanted.max(0.0).min(error) } else { -wanted.min(0.0).max(error) };
         let sag = self.sag + step;
         let good = step * self.sag >= 0.0 && sag.abs() <= limits.position_error_max;
         if !good {
-            // The catch is over, and the joint has not settled.
+            // The catch ends, although the joint has not settled.
             (self.left_ms, self.busy_ms) = (0, CALM_MS);
             return 0.0;
         }
@@ -149,7 +151,8 @@ mod tests {
             let mut catch = begun();
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.05, &limits()), -sign * 0.01);
             assert_eq!(catch.sag(sign * 10.0, KP, sign * 0.002, &limits()), -sign * 0.002);
-            // Torque that only the derivative requires causes no sag. Without gain the set position sags to the joint, not further.
+            // Torque that only the derivative requires causes no sag. With a gain of zero the set position sags to the joint, but not
+            // further.
             assert_eq!(catch.sag(sign * 10.0, KP, -sign * 0.05, &limits()), 0.0);
             assert_eq!(catch.sag(sign * 10.0, 0.0, sign * 0.003, &limits()), -sign * 0.003);
             assert!(catch.step(0.0), "it goes on");
@@ -187,7 +190,7 @@ mod tests {
         }
     }
 
-    /// Returns `true` if the catch continues after velocities (rad/s) of one tick each.
+    /// Returns `true` if the catch continues after these velocities (rad/s), one per tick.
     fn goes_on(velocities: &[f64]) -> bool {
         let mut catch = begun();
         velocities.iter().all(|&velocity| catch.step(velocity))
@@ -202,7 +205,7 @@ mod tests {
         assert!(!goes_on(&[0.03, -0.05, 0.101]));
     }
 
-    /// A load that begins to fall after noise of the other sign must be caught like any other.
+    /// After noise of the opposite sign, a load that begins to fall must be caught like any other.
     #[test]
     fn j43_noise_around_standstill_is_no_half_of_a_swing() {
         for noise in [0.001, 0.01, 0.02] {
@@ -211,7 +214,7 @@ mod tests {
         }
     }
 
-    /// Gains on trial: a joint that has settled swings on its own only when its loop is unstable.
+    /// Gains on trial: a joint that has settled swings by itself only if its loop is unstable.
     #[test]
     fn j71_a_swing_that_grows_over_three_halves_is_seen_of_a_joint_that_has_settled() {
         let seen = |peaks: &[f64]| {

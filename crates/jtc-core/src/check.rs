@@ -1,9 +1,9 @@
 //! The check of a trajectory while it is loaded, point by point, before the arm moves (J-36).
 //!
-//! Between two points (J-32) the commanded velocity is a cubic, the position a quintic and its derivative a quartic: the cubic
-//! and a bump for the way that the velocities do not explain. In Bernstein form each lies within the hull of a few control
-//! points. An interval whose hulls, roughly taken, are within the limits passes at once (`screen`); for any other the curves
-//! are halved until the hull is within or the curve itself is seen outside (`curve`).
+//! Between two points (J-32) the commanded velocity is a cubic and the position a quintic. The derivative of the position is a quartic: the
+//! cubic plus a bump for the distance that the velocities do not explain. In Bernstein form each curve lies within the hull of a few
+//! control points. An interval passes at once if a rough estimate of its hulls is within the limits (`screen`). For any other interval the
+//! curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
 //!
 //! Positions come in steps of 96 µrad. The effect of that rounding on the derivative is not a fault of the path, so the distance of each
 //! interval is reduced by one such step. `range` handles the effect on the positions themselves, and the path of a joint that begins
@@ -27,26 +27,27 @@ pub use range::PathRange;
 pub(crate) use screen::SpeedRange;
 use screen::{Screen, Steps};
 
-/// Speed at the first and the last point that counts as standing, rad/s.
+/// Highest speed at the first and the last point that is considered standstill, rad/s.
 pub const REST_SPEED: f64 = 0.02;
-/// rad, rad/s and rad/s² of one step of the wire.
+/// One step of the wire format in rad, rad/s and rad/s².
 const POSITION_STEP: f64 = POSITION_SCALE / RAW_FULL_SCALE;
 const VELOCITY_STEP: f64 = VELOCITY_SCALE / RAW_FULL_SCALE;
 const ACCELERATION_STEP: f64 = ACCELERATION_SCALE / RAW_FULL_SCALE;
-/// Highest number of halvings of curves in one interval, all joints together. A curve is halved until its hull is within about a thousandth
-/// of its own height. Six joints at their limits in the same interval share the halvings; if these are used up, the hull decides.
+/// Highest number of halvings of curves in one interval, for all joints together. A curve is halved until its hull is within about a
+/// thousandth of its own height. Six joints at their limits in the same interval share the halvings. When these are used up, the check uses
+/// the hull.
 const HALVINGS: u8 = 16;
 
 /// Quantity of a trajectory that can be outside its bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// The position, rad: at a point, or of the quintic between two.
+    /// The position at a point, or of the quintic between two points, rad.
     Position,
-    /// The velocity, rad/s: at a point, or of the cubic between two.
+    /// The velocity at a point, or of the cubic between two points, rad/s.
     Velocity,
     /// The acceleration at a point, rad/s².
     Acceleration,
-    /// The speed of the position itself between two points, less one int16 step, rad/s.
+    /// Derivative of the position between two points, rad/s. The distance is first reduced by one int16 step.
     PositionSpeed,
     /// The speed of the first or the last point, which must be at rest, rad/s.
     Rest,
@@ -85,9 +86,9 @@ impl Remembered for Quantity {
 /// First place at which a trajectory is outside its bounds (J-36).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Violation {
-    /// Point from 0.
+    /// Index of the point, from 0.
     pub point: u32,
-    /// Fraction of the way to the next point, 0..1.
+    /// Fraction of the interval to the next point, 0..1.
     pub fraction: f64,
     /// Index of the joint, base to wrist.
     pub joint: usize,
@@ -95,7 +96,7 @@ pub struct Violation {
     pub quantity: Quantity,
     /// Its value, in the unit of the quantity.
     pub value: f64,
-    /// The bound that it crosses.
+    /// The bound that the value exceeds.
     pub limit: f64,
 }
 
@@ -107,16 +108,16 @@ struct JointBounds {
     position: PathRange,
     speed: f64,
     acceleration: f64,
-    /// Velocities inside the friction table; unbounded if no table is used.
+    /// Velocities that the friction table contains; unbounded if no table is used.
     friction: (f64, f64),
 }
 
-/// The state of one check: its bounds, and the point before.
+/// State of one check: its bounds and the last point.
 #[derive(Clone, Debug)]
 pub struct TrajectoryCheck {
     bounds: [JointBounds; JOINTS],
     screen: Screen,
-    /// s between points.
+    /// Time between points, s.
     step: f64,
     points: u32,
     last: RawPoint,
@@ -124,19 +125,19 @@ pub struct TrajectoryCheck {
     passed: Passed,
 }
 
-/// State of the check after the points that were checked.
+/// State of the check after all points so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Passed {
-    /// Velocities.
+    /// Velocities of each joint.
     pub speeds: [SpeedRange; JOINTS],
-    /// Joints that began outside their limits and are not inside yet.
+    /// Joints that began outside their limits and have not come inside yet.
     coming_in: [bool; JOINTS],
 }
 
 remembered!(Passed { speeds, coming_in });
 
 impl Violation {
-    /// Returns the error that the joint would have in motion (J-43), as a bit of [`crate::joint_error`].
+    /// Returns the error that this violation would cause in motion (J-43), as a bit of [`crate::joint_error`].
     pub fn joint_error(&self) -> u16 {
         match self.quantity {
             Quantity::Position => joint_error::POSITION,
@@ -168,13 +169,13 @@ impl TrajectoryCheck {
         }
     }
 
-    /// Continues after `points` points that have passed, with the last of them and the state after them.
+    /// Continues a check after `points` points that have passed: `last` is the last of them, `passed` the state after them.
     pub(crate) fn behind(mut self, points: u32, last: RawPoint, passed: Passed) -> Self {
         (self.points, self.last, self.last_steps, self.passed) = (points, last, (&last).into(), passed);
         self
     }
 
-    /// Checks the next point, and the interval between it and the point before. The point is taken in any case.
+    /// Checks the next point, and the interval from the last point to it. The check then continues from this point, even if it was refused.
     pub fn take(&mut self, point: &RawPoint) -> Result<(), Violation> {
         let steps = Steps::from(point);
         let verdict = if self.points == 0 {
@@ -198,7 +199,7 @@ impl TrajectoryCheck {
         verdict
     }
 
-    /// Checks that the trajectory may end with the point taken last.
+    /// Checks that the trajectory may end with the last point.
     pub fn end(&self) -> Result<(), Violation> {
         at_rest(&self.last, self.points.saturating_sub(1))
     }
@@ -208,7 +209,7 @@ impl TrajectoryCheck {
         self.passed
     }
 
-    /// Returns the joints that are outside their position limits at a point, without the tolerance.
+    /// Returns for each joint whether it is outside its position limits, without the tolerance, at a point.
     fn outside(&self, point: &RawPoint) -> [bool; JOINTS] {
         let positions = point.position_rad();
         core::array::from_fn(|j| !self.bounds[j].position.limits_contain(positions[j]))
@@ -220,7 +221,7 @@ impl TrajectoryCheck {
         at_rest(point, 0)
     }
 
-    /// Checks a point by itself.
+    /// Checks a point by itself, without the interval before it.
     fn stands(&self, point: &RawPoint) -> Result<(), Violation> {
         let (at, before) = (SetPoint::from(point), self.last.position_rad());
         for (j, bounds) in self.bounds.iter().enumerate() {
@@ -244,14 +245,14 @@ impl TrajectoryCheck {
             outside(Quantity::Acceleration, a, (-bounds.acceleration, bounds.acceleration))?;
             outside(Quantity::FrictionVelocity, v, bounds.friction)?;
             if self.points == 0 {
-                // Every ramp of path time leads through standstill.
+                // Every ramp of path time passes through standstill.
                 outside(Quantity::FrictionVelocity, 0.0, bounds.friction)?;
             }
         }
         Ok(())
     }
 
-    /// Checks a point, and the interval between it and the last one.
+    /// Checks a point, and the interval from the last point to it.
     fn judge(&self, point: &RawPoint) -> Result<(), Violation> {
         self.stands(point)?;
         let (a, b, h) = (SetPoint::from(&self.last), SetPoint::from(point), self.step);
@@ -279,7 +280,7 @@ impl TrajectoryCheck {
             let found = leaves(position, low, high, &mut halvings);
             let limit = |found: Leaves| Leaves { bound: range.limit_at(found.value), ..found };
             outside(Quantity::Position, found.map(limit))?;
-            // Velocities in rad per interval until here, from here in rad/s.
+            // The velocities are in rad per interval up to this line, and in rad/s from here.
             let velocity = [v0, v0 + a0 / 3.0, v1 - a1 / 3.0, v1].map(|v| v / h);
             let found = leaves(velocity, -bounds.speed, bounds.speed, &mut halvings);
             outside(Quantity::Velocity, found)?;
@@ -300,7 +301,8 @@ impl TrajectoryCheck {
             if coming_in && !range.contains(p0) {
                 let (low, high) = range.inward(p0, VELOCITY_STEP + h * ACCELERATION_STEP);
                 let found = leaves(speed, low, high, &mut halvings);
-                // The place at which the curve turns outwards, or the point before if the curve is inside there.
+                // The place at which the curve turns outwards. If the curve is still inside there, the point at the start of the interval
+                // is reported.
                 let place = |Leaves { at, .. }: Leaves| {
                     let value = interpolate(&a, &b, h, at).position[j];
                     let value = if range.contains(value) { p0 } else { value };
@@ -313,7 +315,7 @@ impl TrajectoryCheck {
     }
 }
 
-/// Checks that every joint stands.
+/// Checks that every joint is at rest.
 fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     for (j, value) in point.velocity_rad_s().into_iter().enumerate() {
         if let Some(limit) = bound_crossed(value, -REST_SPEED, REST_SPEED) {
@@ -324,7 +326,7 @@ fn at_rest(point: &RawPoint, index: u32) -> Result<(), Violation> {
     Ok(())
 }
 
-/// Checks that a trajectory with these `speeds`, loaded under other friction, is inside the `tables` now in use.
+/// Checks that a trajectory with these `speeds`, which was loaded while another friction model was in use, is inside the present `tables`.
 pub(crate) fn inside_tables(
     speeds: &[SpeedRange; JOINTS],
     tables: &[TableOf<f32>; JOINTS],

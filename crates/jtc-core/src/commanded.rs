@@ -1,32 +1,32 @@
 //! Set values of the last ticks, so that a measurement is compared with the set value of the same time (J-62).
 //!
-//! A measurement is late: the drive had read its encoder before it received the Move that it answered, and a command in answer to the
-//! measurement acts later still. The *due* position is the position that was commanded this *delay*
-//! ([`Config::delay_ticks`](crate::Config)) ago; a joint that follows exactly would measure it now. The difference between the measured and
-//! the due position is an error of the joint, not the distance that the joint has moved since.
+//! A measurement is delayed: the drive read its encoder before it received the Move that it answered, and the command that follows from the
+//! measurement acts even later. The *due* position is the position that was commanded this *delay* ([`Config::delay_ticks`](crate::Config))
+//! ago; a joint that follows exactly would measure it now. The difference between the measured and the due position is therefore an error
+//! of the joint. It does not contain the distance that the joint has moved meanwhile.
 use crate::config::Config;
 use crate::interpolation::SetPoint;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Set values that are kept: a power of two, so that an index needs no comparison.
+/// Number of stored set values: a power of two, so that an index needs no comparison.
 const SLOTS: usize = 8;
 
 /// The last set values, in a ring.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Commanded {
-    /// rad.
+    /// Positions, rad.
     position: [[f64; JOINTS]; SLOTS],
-    /// rad/s.
+    /// Velocities, rad/s.
     velocity: [[f64; JOINTS]; SLOTS],
-    /// Slot of the present tick; the number wraps around.
+    /// Slot of the present tick. The number wraps around.
     now: u8,
 }
 
 remembered!(Commanded { position, velocity, now });
 
 impl Commanded {
-    /// Age of the oldest set values that are kept, ticks.
+    /// Age of the oldest stored set values, ticks.
     pub const OLDEST: u8 = SLOTS as u8 - 1;
 
     /// Begins the next tick.
@@ -34,7 +34,7 @@ impl Commanded {
         self.now = self.now.wrapping_add(1);
     }
 
-    /// Stores the set values of the present tick, each time that the tick changes them.
+    /// Stores the set values of the present tick. Call this each time that the tick changes them.
     pub fn put(&mut self, point: &SetPoint) {
         let now = self.slot(0);
         (self.position[now], self.velocity[now]) = (point.position, point.velocity);
@@ -50,14 +50,14 @@ impl Commanded {
         &self.velocity[self.slot(ticks)]
     }
 
-    /// Returns the velocities (rad/s) that are due in the measurement of this tick, before its set values are known: at the latest those of
-    /// the last tick.
+    /// Returns the velocities (rad/s) that are due in the measurement of this tick. The set values of this tick are not known yet, so the
+    /// newest ones are those of the last tick.
     pub fn due_velocity(&self, config: &Config) -> &[f64; JOINTS] {
         self.velocity(config.delay_ticks.max(1))
     }
 
-    /// Restarts a joint as if it had always been commanded to move at `velocity` (rad/s), and to be at `position` (rad) `ticks` ago. A
-    /// measurement of that position is then due, for any delay, and so are the measurements of the ticks that follow.
+    /// Restarts a joint as if it had always been commanded to move at `velocity` (rad/s), and to be at `position` (rad) `ticks` ago. For a
+    /// delay of `ticks`, a measurement of that position is then due, and so are the measurements of the ticks that follow.
     pub fn begin(&mut self, joint: usize, position: f64, velocity: f64, ticks: u8) {
         for ago in 0..SLOTS as u8 {
             let slot = self.slot(ago);
@@ -73,7 +73,8 @@ impl Commanded {
         (self.position, self.velocity) = ([*position; SLOTS], [[0.0; JOINTS]; SLOTS]);
     }
 
-    /// Shifts all stored set positions of a joint that has sagged by `way` (rad): a sag is not a motion, so the older positions shift, too.
+    /// Shifts all stored set positions of a joint that has sagged by `way` (rad). A sag is not a motion, so the older positions change as
+    /// well.
     pub fn shift(&mut self, joint: usize, way: f64) {
         for positions in &mut self.position {
             if let Some(position) = positions.get_mut(joint) {
@@ -101,7 +102,7 @@ mod tests {
     }
 
     proptest! {
-        /// Set values of earlier ticks are found again for any start of the ring, also if a tick stores them twice.
+        /// Set values of earlier ticks can be read again, wherever the ring starts, and even if a tick stores its values twice.
         #[test]
         fn j62_the_last_set_values_are_kept(start in any::<u8>(), values in prop::collection::vec(-3.0..3.0f64, 8..300)) {
             let mut commanded = Commanded { now: start, ..Commanded::default() };
@@ -117,8 +118,8 @@ mod tests {
             }
         }
 
-        /// The measured position of a joint is due now and, if the joint keeps its velocity, in the ticks that follow. Other joints do not
-        /// change.
+        /// The measured position of a joint is due now. If the joint keeps its velocity, its position is also due in the ticks that follow.
+        /// Other joints do not change.
         #[test]
         fn j44_j62_a_joint_that_begins_anew_has_no_error(
             start in any::<u8>(),
@@ -146,7 +147,7 @@ mod tests {
         }
     }
 
-    /// A sag applies to all stored positions, as in the errors that the PID controller remembers.
+    /// A sag shifts all stored positions, like the position errors that the PID controller stores.
     #[test]
     fn j43_j62_a_sag_is_no_motion() {
         let mut commanded = Commanded::default();

@@ -6,7 +6,7 @@ use crate::JOINTS;
 use crate::bounds::ParameterBounds;
 use crate::limits::JointConfig;
 
-/// Half of the drives' working area, rad either way from zero (J-43).
+/// Half of the drives' working area, in rad from zero in each direction (J-43).
 pub const WORKING_AREA: f64 = 2.9905;
 
 /// Settings of the device. A host reads and changes them by the table in [`crate::settings`] (J-53).
@@ -24,7 +24,7 @@ pub struct Config {
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
-    /// Speed at which the drives trip by themselves while configuration bit 0x10 is set, rad/s (J-35).
+    /// Speed at which the drives stop with an error of their own while configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
     /// Time over which the drives average their speed, ms. The controller compares their position with their speed over this time (J-35); 0
     /// means no comparison.
@@ -32,14 +32,15 @@ pub struct Config {
     /// Torque that twists a gear by 1 rad, N·m/rad: the position at one end of the gear may differ from the speed at the other by the twist
     /// (J-35).
     pub gear_stiffness: f64,
-    /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, far coarser than the bus. At rest the integral is
-    /// held within one such step (J-41).
+    /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, which is far coarser than the bus. While a joint is at rest,
+    /// the integral does not change within one such step (J-41).
     pub encoder_step: f64,
-    /// Age of a measurement when the command that follows from it begins to act, ticks (J-62); 7 at most. The drives read their encoder and
-    /// apply the torque in the same millisecond loop of their own. A Move that they receive between two loops is answered with the reading
-    /// of the first and acts in the second; its answer is used in the next tick, whose Move acts in the third: two loops after the reading,
-    /// for any phase of the loops in the controller's millisecond. An arm with a slower bus, or with drives that filter their positions,
-    /// has a longer delay; 0 compares with the present command.
+    /// Age of a measurement when the command that follows from it takes effect, in ticks (J-62); 7 at most. The drives have a loop of 1 ms,
+    /// in which they read their encoder and apply the torque. A drive answers a Move that it receives between two loops with the reading of
+    /// the first loop, and applies the torque in the second. The controller uses the answer in its next tick, and the Move of that tick
+    /// takes effect in the third loop. So the delay is two loops after the reading, whatever the phase between the drive's loops and the
+    /// controller's ticks. An arm with a slower bus, or with drives that filter their positions, has a longer delay. 0: measurements are
+    /// compared with the present command.
     pub delay_ticks: u8,
     /// Configuration bits sent to every joint (J-11).
     pub joint_config_bits: u8,
@@ -47,63 +48,66 @@ pub struct Config {
     pub gripper_config_bits: u8,
     /// Ticks between statuses without a response (J-04).
     pub status_period_ms: u16,
-    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14); also of Moves without a usable
-    /// answer of a joint (J-35). Until then the joint's motion is predicted (J-63).
+    /// Number of consecutive Moves without an answer or an acknowledgement that raises an error (J-14). Also the number of consecutive
+    /// Moves without a usable answer of one joint (J-35). Below this number the joint's motion is predicted (J-63).
     pub missed_moves_max: u8,
-    /// Silence of a node after its reset that is not an error yet, ms.
+    /// Time for which a node may be silent after its reset without an error, ms.
     pub node_boot_ms: u32,
-    /// Longest READY→ENABLE, ms (J-16); counted while enabling is requested.
+    /// Longest time from READY to ENABLE, ms (J-16). It is measured while enabling is requested.
     pub enable_timeout_ms: u32,
-    /// Joints are enabled only if every joint has moved slower than this for `enable_still_ms`, rad/s (J-16), so that a falling arm is not
-    /// caught with a jolt.
+    /// Highest speed at which joints are enabled, rad/s (J-16). Every joint must have been slower for `enable_still_ms`, so that a falling
+    /// arm is not stopped with a jolt.
     pub enable_speed_max: f64,
     /// Time for which the arm must have been slower than `enable_speed_max`, ms.
     pub enable_still_ms: u16,
-    /// Time for which joints are not enabled after torque was taken away, ms. The motor control of the drives rests for this time after a
-    /// stop. If enabling were requested earlier, the drives would enable only after it, when the arm may have begun to fall.
+    /// Time after the torque was taken away in which joints are not enabled, ms. The motor control of the drives pauses for this time after
+    /// a stop. If enabling were requested earlier, the drives would enable only after the pause, when the arm may have begun to fall.
     pub enable_rest_ms: u16,
     /// Start position tolerance, rad (J-34).
     pub start_tolerance_rad: f64,
-    /// Time scale ramp for pause, stop and resume, ms (J-33); longer if the acceleration or torque limits require it.
+    /// Length of the ramp of path time for pause, stop and resume, ms (J-33). It is longer if the acceleration or torque limits require it.
     pub ramp_ms: u16,
-    /// Measured speed that is an error while torque is on, as a multiple of the joint's limit (J-35).
+    /// Measured speed that raises an error while torque is on, as a multiple of the joint's velocity limit (J-35).
     pub overspeed_factor: f64,
-    /// Time for which a joint may exceed `overspeed_factor` before this is an error, ms.
+    /// Time for which a joint may exceed that speed before an error is raised, ms.
     pub overspeed_ms: u16,
-    /// Longest pause or stop, ms, if the torque limits allow it (J-33).
+    /// Longest pause or stop if the torque limits allow it, ms (J-33).
     pub stop_ms: u16,
-    /// Time for which a pause or stop may brake with all available torque, ms; an arm that still moves then is an error (J-33).
+    /// Time for which a pause or stop may brake with all available torque, ms. If the arm still moves after that, an error is raised
+    /// (J-33).
     pub braking_ms_max: u16,
-    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque beyond it counts as a push
-    /// (J-66).
+    /// Torque of a yielding joint against a slow push, as a share of its torque limit (J-68). A feedback torque above this share is
+    /// considered a push (J-66).
     pub yield_torque_share: f64,
-    /// Time out of any 100 ms, ms, in which a computed torque may exceed its limit before the joint is overloaded (J-43). Meanwhile the
-    /// limit is commanded and the integral held; 0: in the tick that finds it. A single point missing in a recorded trajectory makes a peak
-    /// of a few milliseconds.
+    /// Time in which a computed torque may exceed its limit before the joint is overloaded, in ms of any 100 ms (J-43). During this time
+    /// the torque limit is commanded and the integral does not change. 0: the joint is overloaded in the first such tick. A single missing
+    /// point in a recorded trajectory makes a peak of a few milliseconds.
     pub torque_over_ms: u16,
-    /// An overloaded joint releases the arm, as in the manual, instead of a reaction of the controller (J-43, J-66).
+    /// If `true`, an overloaded joint releases the arm, as in the manual. Otherwise the controller reacts as in J-66 (J-43, J-66).
     pub torque_release: bool,
     /// A held stop ends only when the host has cleared it (J-69).
     pub protective_stop_latches: bool,
-    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43): the load of the joint
-    /// may be unknown before, and must be caught.
+    /// Longest time after a joint was enabled for which its torque may stay at the limit without an error, ms (J-43). The load of the joint
+    /// may be unknown at first, and must be caught.
     pub catch_ms_max: u16,
-    /// Time over which torque steps at a change of state are blended out, ms (J-25, J-44).
+    /// Time over which a torque step at a change of state is blended out, ms (J-25, J-44).
     pub blend_ms: u16,
-    /// Torque, as a share of the torque limit, up to which Teaching holds a joint at standstill, friction of its own included (J-25).
+    /// Torque up to which Teaching holds a joint at standstill, as a share of the torque limit and including the friction of the joint
+    /// (J-25).
     pub teach_stiction: f64,
-    /// Share of the joints' Coulomb friction that Teaching takes away (J-25).
+    /// Share of the joints' Coulomb friction that Teaching compensates (J-25).
     pub teach_friction: f64,
-    /// Highest speed of the flange in a jog (J-58), and speed from which on Teaching brakes harder, fully at twice that (J-25), m/s; 0:
-    /// any.
+    /// Highest speed of the flange in a jog, m/s (J-58). In Teaching, braking increases above this speed, up to its full value at twice the
+    /// speed (J-25). 0: no limit.
     pub tool_speed_max: f64,
-    /// Time in which a motion can stop when the safety input becomes 0, before the torque is taken away, ms (J-22); 0: none.
+    /// Time in which a motion can stop after the safety input has become 0, before the torque is taken away, ms (J-22). 0: the torque is
+    /// taken away at once.
     pub safety_input_ramp_ms: u16,
     /// Speed around zero in which the sign of the friction polynomial is smoothed, rad/s (J-42).
     pub friction_sign_width: f64,
-    /// Silence of all hosts after which a motion is paused and teaching ends, ms (J-59); 0: never.
+    /// Time without a frame from any host after which a motion is paused and teaching ends, ms (J-59); 0: never.
     pub host_timeout_ms: u16,
-    /// Speed override: path seconds per second on the path, 0.05 to 1 (J-57). The speed override is not part of an arm.
+    /// Speed override, in seconds of path time per second, 0.05 to 1 (J-57). The speed override is not part of an arm.
     pub speed: f64,
     /// Absent joints, for work on a bench (J-53). The controller expects no node for them, and executes no motion. This setting is not part
     /// of an arm: at the start of the device no joint is absent.
@@ -112,13 +116,13 @@ pub struct Config {
     pub absent_position: [f64; JOINTS],
     /// Payload at the flange of the arm (J-60). The payload is not part of an arm, and the device starts without one.
     pub payload: Payload,
-    /// Bounds of the gains and masses that a host may send (J-06).
+    /// Bounds of gains, masses and friction that a host may send (J-06).
     pub parameter_bounds: ParameterBounds,
 }
 
 impl Config {
-    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded: its limits, inside the working
-    /// area of the drives while these are configured to keep to it (J-43). The range is empty for an index that no joint has.
+    /// Returns the lowest and highest position (rad) to which the joint with index `joint` may be commanded: its position limits, clipped
+    /// to the working area while the drives are configured to keep to it (J-43). If `joint` is out of range, the range is empty.
     pub fn position_range(&self, joint: usize) -> (f64, f64) {
         let Some(limit) = self.joints.get(joint) else { return (f64::INFINITY, f64::NEG_INFINITY) };
         let (low, high) = (limit.position_min, limit.position_max);
@@ -135,7 +139,7 @@ impl Config {
     }
 }
 
-/// Reason why no arm can be run with some settings: the drives cannot do what the limits allow.
+/// Reason why settings are refused: the drives cannot do what the limits allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConfigError {
@@ -148,7 +152,7 @@ pub enum ConfigError {
         /// Half of the working area, rad.
         limit: f64,
     },
-    /// A lowest position that is not below the highest one.
+    /// The lowest position is not below the highest one.
     Range {
         /// Joint, from 1.
         joint: usize,
@@ -157,23 +161,23 @@ pub enum ConfigError {
         /// Highest position, rad.
         limit: f64,
     },
-    /// A pause or stop may take longer than there is braking for it (J-33).
+    /// The braking time is shorter than a pause or stop may take (J-33).
     Braking {
         /// [`Config::braking_ms_max`].
         value: u16,
         /// Twice [`Config::stop_ms`].
         limit: u32,
     },
-    /// The torque limit times the torque gain (J-61) is above what the bus carries.
+    /// The torque limit times the torque gain (J-61) is above the full scale of the bus.
     TorqueScale {
         /// Joint, from 1.
         joint: usize,
-        /// That product, N·m.
+        /// The product, N·m.
         value: f64,
         /// Full scale of the bus, N·m.
         limit: f64,
     },
-    /// The speed that is an error (J-35) is above what the drives can report.
+    /// The over-speed threshold (J-35) is above the highest speed that the drives can report.
     SpeedScale {
         /// Joint, from 1.
         joint: usize,
@@ -182,7 +186,7 @@ pub enum ConfigError {
         /// Full scale of the drives' velocity, rad/s.
         limit: f64,
     },
-    /// The speed that is an error (J-35) is above the one at which the drives trip.
+    /// The over-speed threshold (J-35) is above the speed at which the drives trip.
     SpeedTrip {
         /// Joint, from 1.
         joint: usize,
@@ -194,7 +198,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// Returns the joint that the error is about, from 1; 0: the whole arm.
+    /// Returns the number of the joint with the error, from 1; 0 for the whole arm.
     pub const fn joint(&self) -> usize {
         match *self {
             Self::Braking { .. } => 0,
@@ -247,11 +251,11 @@ impl core::fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 impl Config {
-    /// Checks that the drives can do what the joints' limits allow (J-35, J-43): position limits inside the working area, and a threshold
-    /// of over-speed that the drives can report and do not trip below.
+    /// Checks that the drives can do what the joints' limits allow (J-35, J-43). Position limits must be inside the working area. The
+    /// drives must be able to report the over-speed threshold, and must not trip below it.
     ///
     /// # Errors
-    /// Returns the first joint whose limits the drives cannot do; a limit that is NaN is one.
+    /// Returns the first joint whose limits the drives cannot do. A limit that is NaN is refused as well.
     #[allow(clippy::neg_cmp_op_on_partial_ord)]
     pub const fn check(&self) -> Result<(), ConfigError> {
         let (value, limit) = (self.braking_ms_max, 2 * self.stop_ms as u32);
@@ -263,7 +267,7 @@ impl Config {
             let limits = &self.joints[j];
             j += 1;
             let joint = j;
-            // Written so that NaN is refused.
+            // The comparisons also refuse NaN.
             if self.keeps_to_working_area() {
                 if !(limits.position_min >= -WORKING_AREA) {
                     return Err(ConfigError::Position {

@@ -21,10 +21,10 @@ use crate::store::Store;
 use crate::telemetry::Observed;
 use crate::{ControllerState, TrajectoryState};
 
-/// The joint trajectory controller. `M` is the memory of its trajectory: [`crate::POINTS_MAX`] points.
+/// The joint trajectory controller. `M` is the memory for the trajectory: [`crate::POINTS_MAX`] points.
 ///
-/// Parts with their own state are in separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory),
-/// `motion` (control law), `errors`. This type connects them; [`Controller::tick`] is the figure of the manual, top to bottom.
+/// Parts with their own state are in separate modules: `nodes` (the bus), `received` (parameters), `store` (trajectory), `motion` (control
+/// law), `errors`. This type connects them. [`Controller::tick`] follows the figure of the manual from top to bottom.
 #[derive(Clone, Debug)]
 pub struct Controller<M> {
     pub(crate) config: Config,
@@ -44,9 +44,9 @@ pub struct Controller<M> {
     pub(crate) trajectory: TrajectoryState,
     pub(crate) clock: PathClock,
     pub(crate) phase: Phase,
-    /// Ticks since a pause or stop was commanded on the path, until the arm stands (J-33).
+    /// Ticks since a pause or stop was commanded on the path, until the arm is at rest (J-33).
     pub(crate) braking_ms: Option<u16>,
-    /// Ticks since the safety input has stopped a motion, which takes the torque away later (J-22).
+    /// Ticks since the safety input stopped a motion. The torque is taken away at the end of this stop (J-22).
     pub(crate) safety_stop_ms: Option<u16>,
     pub(crate) motion: Motion,
     /// Cause of the last held stop (J-69).
@@ -97,13 +97,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Raises an internal error that no other bit explains: the device failed and was reset because of that (J-12). The error latches like
-    /// any other (J-21). The board calls this before the first tick.
+    /// Raises an internal error that no other bit explains: the device failed and was reset as a result (J-12). The error latches like any
+    /// other (J-21). The board calls this before the first tick.
     pub fn raise_internal(&mut self) {
         self.errors.raise_device();
     }
 
-    /// Returns the JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first one.
+    /// Returns the JtcStatus frame of the last tick whose outputs had `status` set; zeros before the first such tick.
     pub fn status_frame(&self) -> &[u8; STATUS_LEN] {
         &self.status_frame
     }
@@ -128,7 +128,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.state.has_torque()
     }
 
-    /// Returns the goal of the nodes in the present state.
+    /// Returns the state into which the controller brings the nodes in its present state.
     pub(crate) fn goal(&self) -> Goal {
         match self.state {
             ControllerState::Start | ControllerState::Init => Goal::Ready,
@@ -146,7 +146,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Evaluates the conditions that choose the state of this tick.
     fn conditions(&mut self) -> Conditions {
         let clearing = self.nodes.clearing();
-        // Init ends with every node in ReadyToOperate; afterwards they may also be enabled.
+        // Init ends when every node is in ReadyToOperate. Later the nodes may also be enabled.
         let mut initialised = self.parameters.missing() == 0
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
@@ -160,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             clearing,
             initialised,
             teaching: self.teaching,
-            // J-60: the load that HoldPos finds missing is known only when the payload is in the model.
+            // J-60: HoldPos can find the load that the model lacks only after the payload is in the model.
             teachable: self.teaching
                 && self.parameters.blend_left_ms() == 0
                 && self.motion.may_be_taught(&self.config, self.errors.held_stop(), self.teaching_waits_ms),
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::POINTS_MAX;
 
-    /// Checks the size of the part that the board's fast memory must hold: all but the trajectory.
+    /// Checks the size of the part that the board's fast memory must hold: everything except the trajectory.
     #[test]
     fn memory_beside_the_trajectory_fits_40_kib() {
         let bytes = size_of::<Controller<[RawPoint; POINTS_MAX]>>() - size_of::<[RawPoint; POINTS_MAX]>();

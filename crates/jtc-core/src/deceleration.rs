@@ -1,19 +1,19 @@
-//! Deceleration to rest of a joint that moves when it begins to be held, because a hand still led it, or because it sagged or
-//! fell while it was enabled (J-16, J-25).
+//! Deceleration to rest of a joint that still moves when position hold begins, because a hand was leading it, or because it sagged or fell
+//! while it was enabled (J-16, J-25).
 use crate::DT;
 use crate::config::Config;
 use crate::interpolation::smooth;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Highest speed at which a joint counts as standing, rad/s.
+/// Highest speed at which a joint is considered at rest, rad/s.
 const STANDING: f64 = 0.02;
-/// Highest deceleration of a joint that falls while it is enabled, rad/s²: most of its torque is gravity's.
+/// Highest deceleration of a joint that falls while it is enabled, rad/s². Gravity uses most of the torque of such a joint.
 const CATCH_DECELERATION: f64 = 3.0;
-/// Highest deceleration of a falling joint, in the middle of its way, as a multiple of the mean.
+/// Peak deceleration of a falling joint, as a multiple of the mean deceleration. The peak is in the middle of the motion.
 const STEEPEST: f64 = 1.5;
-/// Highest deceleration of a joint that was led, at the beginning, as a multiple of the mean. There the damping of Teaching already
-/// decelerates the joint.
+/// Peak deceleration of a joint that was led, as a multiple of the mean deceleration. The peak is at the beginning, where the damping of
+/// Teaching already decelerates the joint.
 pub(crate) const STEEPEST_LED: f64 = 2.0;
 
 /// Returns `true` if a joint with this velocity (rad/s) moves.
@@ -26,7 +26,7 @@ pub(crate) fn moves(velocity: f64) -> bool {
 pub(crate) struct Deceleration {
     from: f64,
     velocity: f64,
-    /// 0 in the first tick, which commands the measured values: the error begins at 0, and so does its derivative.
+    /// 0 in the first tick, which commands the measured values. So the position error and its derivative begin at 0.
     elapsed_ms: f64,
     length_ms: f64,
     /// The joint falls: no torque decelerates it at the beginning.
@@ -36,14 +36,14 @@ pub(crate) struct Deceleration {
 remembered!(Deceleration { from, velocity, elapsed_ms, length_ms, falls });
 
 impl Deceleration {
-    /// Creates the deceleration of a joint that a hand leads: from a measured position (rad) and velocity (rad/s), at most the velocity
-    /// limit, within `length_ms`.
+    /// Creates the deceleration of a joint that a hand leads, from a measured position (rad) and velocity (rad/s), within `length_ms`. The
+    /// velocity is clipped to the velocity limit.
     pub fn led(from: f64, velocity: f64, length_ms: f64, limits: &JointConfig) -> Self {
         let velocity = velocity.max(-limits.velocity_max).min(limits.velocity_max);
         Self { from, velocity, elapsed_ms: -1.0, length_ms: length_ms.max(1.0), falls: false }
     }
 
-    /// Creates the deceleration of a joint that falls: the faster the joint is, the longer it takes.
+    /// Creates the deceleration of a joint that falls. A faster joint takes longer.
     pub fn falling(from: f64, velocity: f64, config: &Config, limits: &JointConfig) -> Self {
         let led = Self::led(from, velocity, f64::from(config.ramp_ms), limits);
         let length_ms = led.length_ms.max(STEEPEST * led.velocity.abs() / (CATCH_DECELERATION * DT));
@@ -60,18 +60,18 @@ impl Deceleration {
         self.from += way;
     }
 
-    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint rests then.
+    /// Returns position, velocity and acceleration of the next tick, and `true` if the joint is at rest after it.
     pub fn step(&mut self, limits: &JointConfig) -> ([f64; 3], bool) {
         self.elapsed_ms += 1.0;
         let u = (self.elapsed_ms / self.length_ms).min(1.0);
         let (seconds, left) = (self.length_ms * DT, 1.0 - u);
-        // The velocity, and its integral and its slope, as shares of v, v·T and v/T.
+        // The velocity, its integral and its slope, as shares of v, v·T and v/T.
         let (velocity, way, slope) = if self.falls {
             (1.0 - smooth(u), u - u * u * u + 0.5 * u * u * u * u, -6.0 * u * left)
         } else {
             (left * left, (1.0 - left * left * left) * (1.0 / 3.0), -2.0 * left)
         };
-        // Never out of the limits; an arm that is already outside does not go further out.
+        // The position never leaves the limits. A joint that is already outside does not go further out.
         let position = (self.from + self.velocity * way * seconds)
             .max(limits.position_min.min(self.from))
             .min(limits.position_max.max(self.from));
@@ -88,7 +88,7 @@ mod tests {
 
     const RAMP_MS: f64 = 200.0;
 
-    /// Wide enough for every way in here.
+    /// Limits that are wide enough for every motion in these tests.
     fn limits() -> JointConfig {
         JointConfig { position_min: -9.0, position_max: 9.0, ..Config::avena().joints[0] }
     }
@@ -145,7 +145,7 @@ mod tests {
             let most = decelerations(velocity);
             assert!((0.99 * CATCH_DECELERATION..1.001 * CATCH_DECELERATION).contains(&most), "{most}");
         }
-        // A slow one takes the time of the ramp.
+        // A slow joint takes the time of the ramp.
         assert_eq!(
             ways(Deceleration::falling(0.0, 0.1, &config, &limits()), &limits()).len(),
             usize::from(config.ramp_ms) + 1
@@ -163,7 +163,7 @@ mod tests {
                     ways(Deceleration::led(end - 0.1 * outside, velocity, RAMP_MS, &limits), &limits);
                 let inward = velocity * outside < 0.0;
                 assert!(inside.iter().all(|(q, _)| (limits.position_min..=limits.position_max).contains(q)));
-                // An arm that is found outside is not driven further out.
+                // A joint that is outside its limits at the start is not driven further out.
                 let found = end + outside;
                 let beyond = ways(Deceleration::led(found, velocity, RAMP_MS, &limits), &limits);
                 let last = beyond[beyond.len() - 1].0;

@@ -1,4 +1,4 @@
-//! Defaults at the start of the device (rules, section 7): made from `arms/avena.toml` at build time.
+//! Defaults at the start of the device (rules, section 7). They are generated from `arms/avena.toml` at build time.
 use jtc_dynamics::{ArmModel, Link, Origin, Payload};
 
 use crate::bounds::ParameterBounds;
@@ -17,7 +17,7 @@ pub(crate) use arm::{MODEL, NAME, PID, POLYNOMIAL};
 
 /// Returns the default friction table of joint `j`.
 pub(crate) fn friction_table(j: usize) -> &'static TableOf<f32> {
-    // A single table may stand for all joints.
+    // A single table may apply to all joints.
     arm::TABLES.get(j).unwrap_or(&arm::TABLES[0])
 }
 
@@ -71,7 +71,7 @@ impl Config {
     }
 }
 
-// The arm that is built in is one that its drives can do.
+// The drives of the built-in arm can do what its limits allow.
 const _: () = assert!(Config::avena().check().is_ok());
 
 impl Default for Config {

@@ -18,7 +18,7 @@ pub(crate) struct Errors {
     held: [u16; JOINTS],
     /// CAN flags that are errors.
     can: u32,
-    /// Present CAN flags that are only shown, because they are not errors.
+    /// Present CAN flags that are shown but are not errors.
     can_shown: u32,
     can_occurred: u32,
     occurred: u16,
@@ -65,8 +65,8 @@ impl Errors {
         self.occurred |= self.word();
     }
 
-    /// Takes the causes of a held stop (J-69): they have occurred. If the stop `latches` they are shown until the host clears them; the
-    /// safety output stays 1.
+    /// Adds the causes of a held stop to the occurred errors (J-69). If the stop `latches`, they are also shown as current until the host
+    /// clears them. The safety output stays 1.
     pub fn hold_joints(&mut self, causes: &[u16; JOINTS], latches: bool) {
         for j in 0..JOINTS {
             self.joints_occurred[j] |= causes[j];
@@ -75,7 +75,7 @@ impl Errors {
         self.occurred |= error::INTERNAL | error::INTERNAL_JOINTS;
     }
 
-    /// Takes the errors of joints that a refused trajectory would have in motion (J-36): the errors have occurred, but are not latched.
+    /// Adds the errors that a refused trajectory would have caused in motion (J-36) to the occurred errors. They are not latched.
     pub fn occur_joints(&mut self, bits: &[u16; JOINTS]) {
         self.hold_joints(bits, false);
     }
@@ -85,7 +85,7 @@ impl Errors {
         any(&self.held)
     }
 
-    /// Ends a held stop: without torque the arm is not held.
+    /// Ends a held stop, because an arm without torque is not held.
     pub fn end_held_stop(&mut self) {
         self.held = [0; JOINTS];
     }
@@ -172,8 +172,8 @@ mod tests {
 
     const INTERNAL: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
 
-    /// An error is in both words from the tick in which it is raised; it stays in the word of occurred errors until the host clears that,
-    /// too.
+    /// An error is in both words from the tick in which it is raised. It stays in the word of occurred errors until the host clears that
+    /// word as well.
     #[test]
     fn j21_what_is_raised_has_occurred_until_that_is_cleared() {
         for (raise, word) in [
@@ -195,8 +195,7 @@ mod tests {
         }
     }
 
-    /// The cause of a held stop has occurred, and is shown as current if the stop latches; it is not an error, and the safety output stays
-    /// 1.
+    /// The cause of a held stop is shown as occurred, and as current if the stop latches. It is not an error, so the safety output stays 1.
     #[test]
     fn j66_j69_the_cause_of_a_held_stop_is_shown_and_is_no_error() {
         for latches in [false, true] {

@@ -15,7 +15,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Starts the path: Execute from Stop or Finish.
     pub(crate) fn start_path(&mut self) -> Result<(), DataStatus> {
         let first = self.store.first().ok_or(DataStatus::NotAllowed)?;
-        // Joints that are enabled later are checked again then.
+        // Joints that are enabled later are checked again when they are enabled.
         if !self.near(&first) || (self.motion.set.all_holding() && self.approach_to(&first).is_none()) {
             return Err(DataStatus::StartPositionMismatch);
         }
@@ -33,7 +33,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (0..JOINTS).all(|j| (self.nodes.positions()[j] - position[j]).abs() <= tolerance)
     }
 
-    /// Resumes the path: Execute from Pause, at the paused point only.
+    /// Resumes the path: Execute from Pause. The arm must be at the paused point.
     pub(crate) fn resume_path(&mut self) -> Result<(), DataStatus> {
         let paused = self.path_point();
         let there = self.motion.set.point.position == paused;
@@ -57,14 +57,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Returns the phase that takes the arm from the held position to `point` of the path; `None` if a joint would leave its range on the
-    /// way, or if the torque limits leave too little for an approach. An arm that stands exactly at the first point needs no approach.
+    /// Returns the phase that moves the arm from the held position to `point` of the path. Returns `None` if a joint would leave its range,
+    /// or if the torque limits leave too little torque for an approach. An arm that is exactly at the first point needs no approach.
     fn approach_to(&mut self, point: &[f64; JOINTS]) -> Option<Phase> {
         let from = self.motion.set.point.position;
         if from == *point && self.clock.time == 0.0 {
             return Some(Phase::AtStart);
         }
-        // The path may begin outside the limits (J-36), for an arm that stands there.
+        // If the arm is outside its limits, the path may begin there (J-36).
         let within = |j: usize| {
             let (low, high) = PathRange::of(&self.config, j, self.store.step_ms()).of_path(from[j]);
             point[j] >= low && point[j] <= high
@@ -78,13 +78,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Some(Phase::approach(from, self.motion.approach_ms(point, &inputs)?))
     }
 
-    /// Goes from standstill on the path to the speed that is set.
+    /// Ramps path time from standstill to the configured speed.
     fn go_on(&mut self) {
         self.clock.go(self.config.speed);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
     }
 
-    /// Sets another speed on the path (J-57). Path time changes to it along the ramp of J-33.
+    /// Changes the speed on the path (J-57). Path time follows along the ramp of J-33.
     pub(crate) fn set_speed(&mut self, speed: f64) {
         self.config.speed = speed;
         if self.clock.set_pace(speed) {
@@ -92,8 +92,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Holds back the time of the path or of the approach, because a joint is overloaded by that motion (J-75). Returns `false` if the arm
-    /// is not in such a motion, or stops already. In the tick in which the arm arrives, the overload needs no reaction.
+    /// Slows down the time of the path or of the approach, because this motion overloads a joint (J-75). Returns `false` if the arm is not
+    /// in such a motion, or is already stopping. In the tick in which the arm arrives, the overload needs no reaction.
     pub(crate) fn hold_back(&mut self) -> bool {
         if self.state != ControllerState::Operate {
             return false;
@@ -110,7 +110,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         true
     }
 
-    /// Runs a tick of a motion that is held back.
+    /// Runs one tick of a motion that is held back.
     pub(crate) fn step_hold_back(&mut self) {
         if !self.motion.hold_back.is_watched() || !self.phase.goes_on() {
             return;
@@ -134,7 +134,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Pauses or stops the execution: TES stays Execute until standstill (J-33).
+    /// Pauses or stops the execution. TES stays Execute until standstill (J-33).
     pub(crate) fn leave_path(&mut self, command: ExecCommand) {
         let to = if command == ExecCommand::Pause { TrajectoryState::Pause } else { TrajectoryState::Stop };
         match &mut self.phase {
@@ -157,7 +157,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Allows all available torque to brake from now on.
+    /// Allows braking with all available torque from now on.
     pub(crate) fn begin_braking(&mut self) {
         self.braking_ms = Some(0);
         self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
@@ -167,15 +167,15 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn walk(&mut self) {
         match self.phase {
             Phase::Waiting { elapsed_ms } => {
-                // Drives may take seconds to enable; meanwhile the arm is held, and may have sagged.
+                // Drives may take seconds to enable. Meanwhile the arm is held, and it may have sagged.
                 self.motion.set.hold(&self.config);
                 if self.parameters.blend_left_ms() > 0 {
                     self.motion.law.payload_comes();
                 }
                 self.parameters.blend_payload();
-                // On the path the model does not change (J-60).
+                // The model must not change while the arm is on the path (J-60).
                 if !self.motion.set.all_holding() || self.parameters.blend_left_ms() > 0 {
-                    // The wait ends: by then the operator no longer expects a motion (J-16).
+                    // The wait ends here, because the operator no longer expects a motion (J-16).
                     self.phase = Phase::Waiting { elapsed_ms: elapsed_ms.saturating_add(1) };
                     if elapsed_ms >= self.config.enable_timeout_ms {
                         self.set_trajectory(TrajectoryState::Stop);
@@ -185,7 +185,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                     match if self.near(&to) { self.approach_to(&to) } else { None } {
                         Some(phase) => self.phase = phase,
                         None => {
-                            // The host was told that the arm would move.
+                            // The host has been told that the arm would move, so the cause of this stop is kept.
                             self.keep_cause(StopCause { kind: StopKind::Approach, ..StopCause::default() });
                             self.set_trajectory(TrajectoryState::Stop);
                         }
@@ -227,7 +227,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.clock.advance(f64::from(self.store.duration_ms()));
                 self.follow();
                 match leave {
-                    // The last point is at rest: the arm stands there, whether the rate is zero or not.
+                    // The last point is at rest, so the arm stops there even if the rate is not zero.
                     Some(trajectory) if self.clock.standing() || self.at_end() => {
                         self.clock.rest();
                         self.set_trajectory(trajectory);
@@ -250,7 +250,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.motion.follow(&at, &mut self.clock, &self.config);
     }
 
-    /// Returns the positions at the present path time; without a trajectory (which Execute refuses), the held position.
+    /// Returns the positions at the present path time. Without a trajectory, for which Execute is refused, returns the held position.
     fn path_point(&self) -> [f64; JOINTS] {
         self.store.at(self.clock.time).map_or(self.motion.set.point.position, |at| at.position)
     }
@@ -266,13 +266,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Runs one more tick of a pause or stop, until the arm stands. Returns `true` if the stop continues. Meanwhile all available torque
-    /// may brake. After `stop_ms` the remaining motion may be too slow to count. If path time still runs when the braking time is over,
-    /// torque cannot stop it: this is an error of the joints that move. If the arm is already held then, and is moved from outside, the
+    /// Runs one more tick of a pause or stop. Returns `true` if the arm still moves and the stop continues. Meanwhile all available torque
+    /// may brake. After `stop_ms` the remaining motion may be slow enough to be ignored. If path time still runs when the braking time is
+    /// over, torque cannot stop it: the joints that move get an error. If the arm is already held by then, and is moved from outside, the
     /// ordinary limits apply.
     pub(crate) fn brake(&mut self) -> bool {
         if self.motion.set.jogs_on() {
-            // A jog has begun since, or continues.
+            // A jog has begun since then, or continues.
             self.braking_ms = None;
         }
         let Some(ms) = self.braking_ms else { return false };
@@ -294,7 +294,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             if self.config.torque_release {
                 self.errors.raise_joints(&causes);
             } else {
-                // The path stands, and joints that still move are let down (J-70).
+                // Path time is at rest, and joints that still move are lowered (J-70).
                 self.motion.begin_yields(&[false; JOINTS], &moving, &self.config);
                 self.hold_stop(&causes, StopKind::Overload);
                 if jogged {

@@ -1,4 +1,4 @@
-//! The extensions of the protocol (J-50 to J-59): identity of the device, its settings, the arm as a unit, jogging.
+//! Extensions of the protocol (J-50 to J-59): identity of the device, its settings, the arm as a unit, jogging.
 mod answers;
 mod arm;
 mod image;
@@ -20,13 +20,13 @@ use answers::Answers;
 use image::StoredArm;
 pub use log::firmware_hash;
 
-/// Highest number of values of a SetSettings frame in motion.
+/// Highest number of values of a SetSettings frame that is accepted in every state.
 const LIVE_MAX: usize = 4;
 
-/// Highest number of values of a SetSettings frame under an arm that is held or taught: a payload has ten.
+/// Highest number of values of a SetSettings frame while the arm is held or taught. A payload has ten values.
 const STANDING_MAX: usize = 16;
 
-/// Highest velocity of a jog while encoders do not fit (J-35), rad/s: a host has single numbers.
+/// Highest velocity of a jog while the encoders do not agree (J-35), rad/s. A host sends f32 values.
 const UNTRUSTED_MAX: f32 = 0.1;
 
 /// Identity of the device, as its board knows it (J-52).
@@ -36,13 +36,13 @@ pub struct Identity {
     pub board: &'static str,
     /// Version of the firmware.
     pub firmware: &'static str,
-    /// Its git revision.
+    /// Git revision of the firmware.
     pub revision: &'static str,
-    /// Number of its starts.
+    /// Number of starts of the device.
     pub boots: u32,
-    /// Cause of its last start.
+    /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// Program in its flash; `None` if the board has none, or has not read it (J-67).
+    /// Program in the flash of the board. `None` if the board has none, or has not read it (J-67).
     pub program: Option<Program>,
 }
 
@@ -59,14 +59,14 @@ pub(crate) struct Extensions {
     pub hash: Option<u64>,
     /// Ticks since a frame of a host was received.
     pub hosts_silent_ms: u32,
-    /// Ticks without a Jog with a velocity until one is accepted again.
+    /// Time left in which a Jog with a velocity is refused. It begins again with each such Jog.
     pub jogs_refused_ms: u16,
     /// Progress of the hash of the arm.
     hashed: (usize, Hash),
     pub identity: Identity,
     /// Hash of the firmware's version and revision.
     pub firmware_hash: u64,
-    /// State of the flight recorder, and the request of a host to it (J-56).
+    /// State of the flight recorder, and the pending request of a host to it (J-56).
     pub log: LogState,
     pub log_request: Option<LogRequest>,
     name: Name,
@@ -75,7 +75,7 @@ pub(crate) struct Extensions {
 }
 
 impl Extensions {
-    /// Refuses jogs after a jog was stopped: a key that is still held down moves nothing (J-58).
+    /// Refuses jogs after a jog was stopped, so that a key that is still held down causes no motion (J-58).
     pub fn refuse_jogs(&mut self) {
         self.jogs_refused_ms = crate::jog::LASTS_MS;
     }
@@ -108,12 +108,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.identity = identity;
     }
 
-    /// Sets the program in the flash, for boards that read it after the start (J-67).
+    /// Sets the program in the flash. Boards that read their program after the start call this (J-67).
     pub fn set_program(&mut self, program: Option<Program>) {
         self.extensions.identity.program = program;
     }
 
-    /// Returns the answer to an extension request. Send it when the outputs of the last tick had [`crate::Outputs::answer_line`] set.
+    /// Returns the answer to an extension request. Send it if the outputs of the last tick had [`crate::Outputs::answer_line`] set.
     pub fn answer_frame(&self) -> &[u8] {
         self.extensions.answers.frame()
     }
@@ -138,8 +138,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::StoreArm => self.store_arm(),
             Command::Disable if self.settable() || self.holds_at_rest() => {
-                // J-53: with its parameters missing the controller goes to Init, without torque, and stays there. In Init and Error another
-                // arm can be given then, whose parts do not go with those of the last one (J-71).
+                // J-53: without its parameters the controller goes to Init, without torque, and stays there. In Init and Error a host can
+                // then send another arm. Its parts would not match the parameters of the last arm (J-71).
                 self.parameters.withdraw_all();
                 SliceOutcome::Done
             }
@@ -160,7 +160,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Jogs at joint velocities (J-58), in HoldPos, and not while a path is paused.
+    /// Jogs at joint velocities (J-58). This requires HoldPos, and no paused path.
     fn jog(&mut self, velocities: &Floats<'_>) -> Result<(), DataStatus> {
         let set = &self.motion.set;
         let free = self.state == ControllerState::HoldPos
@@ -181,7 +181,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let untrusted = self.nodes.untrusted() != 0;
         for (j, (wanted, joint)) in wanted.iter_mut().zip(&self.config.joints).enumerate() {
             let velocity = f64::from(velocities.get(j).unwrap_or(f32::NAN));
-            // The wire has f32: the limit itself may come as the next number above it. Written so that NaN is refused.
+            // The wire format uses f32, so the limit itself may arrive as the next higher number. The comparison also refuses NaN.
             let taken = velocity.abs() <= f64::from(joint.velocity_max as f32).max(joint.velocity_max);
             *wanted = taken.then_some(velocity).ok_or(DataStatus::IncorrectValue)?;
             // J-53: an absent joint does not move.
@@ -196,7 +196,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 return Err(DataStatus::NotAllowed);
             }
         } else if !set.jogging() {
-            // No jog needs to end.
+            // There is no jog that must end.
             return Ok(());
         }
         let jogging = set.jogging();
@@ -215,7 +215,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.motion.set.jog(&room.velocity, &room.acceleration, config);
                 Ok(())
             }
-            // A torque limit leaves nothing for the jog: the jog comes to rest.
+            // The torque limits leave no torque for the jog, so it comes to rest.
             None if jogging => {
                 self.motion.set.end_jog();
                 Ok(())
@@ -224,7 +224,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Brings a jog to rest, and refuses further jogs that follow from it. Returns `true` if there was a jog.
+    /// Brings a jog to rest, and refuses the Jogs that follow it. Returns `true` if there was a jog.
     pub(crate) fn stop_jog(&mut self) -> bool {
         let jogging = self.motion.set.jogging();
         if jogging {
@@ -238,17 +238,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.state == ControllerState::HoldPos && self.at_rest()
     }
 
-    /// Returns `true` if the arm stands, and no motion is commanded; its drives need not be enabled already.
+    /// Returns `true` if the arm is at rest and no motion is commanded. The drives need not be enabled yet.
     fn at_rest(&self) -> bool {
         !self.motion.set.coming_to_rest() && self.motion.set.moving(&self.nodes) == [false; JOINTS]
     }
 
-    /// Returns `true` while the torque is off: the settings of the arm change only then (J-53).
+    /// Returns `true` while the torque is off. The settings of the arm change only then (J-53).
     fn settable(&self) -> bool {
         matches!(self.state, ControllerState::Init | ControllerState::Error)
     }
 
-    /// Returns `true` if the arm is held or taught, and no motion is commanded: live settings that bear on the torque may change.
+    /// Returns `true` if the arm is held or taught and no motion is commanded. Live settings that affect the torque may then change.
     fn stands(&self) -> bool {
         match self.state {
             ControllerState::Teaching => true,
@@ -262,7 +262,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns `true` if an answer that was requested on this line before is on its way (J-50).
+    /// Returns `true` if the answer to an earlier request on this line has not been sent yet (J-50).
     fn asked_twice(&self, line: usize, command: &Command<'_>) -> bool {
         let returns = matches!(
             command,
@@ -332,12 +332,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Applies all values or none (J-53). If friction tables are in use, one is checked in a tick.
+    /// Applies all values or none (J-53). If friction tables are in use, one table is checked per tick.
     fn set_settings(&mut self, values: Values<'_>) -> SliceOutcome {
         let all = |taken: fn(Live) -> bool| {
             values.iter().all(|value| settings::setting(value.setting).is_some_and(|row| taken(row.live)))
         };
-        // A few values only: they are taken in addition to the work of every state.
+        // Every state has time for a few values in addition to its own work.
         let all_live = values.len() <= LIVE_MAX && all(|live| live == Live::Always);
         let standing = self.stands()
             && values.len() <= STANDING_MAX
@@ -358,7 +358,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
         if standing {
             if reloaded {
-                // An empty payload that is moved, or replaces an empty payload, is not a change of payload.
+                // If both payloads are empty, the payload does not change, even if its position does.
                 if config.payload.is_there() || self.config.payload.is_there() {
                     let heavier = config.payload.mass - self.config.payload.mass;
                     self.parameters.change_payload(&config, heavier);
@@ -385,7 +385,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         SliceOutcome::Done
     }
 
-    /// Uses these settings from now on, in a state without torque.
+    /// Uses these settings from now on. The controller must be in a state without torque.
     fn use_settings(&mut self, config: Config) {
         if self.nodes.use_settings(&config, &self.config) {
             // The pump does not start again by itself (J-23).
@@ -396,7 +396,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
     }
 
-    /// Handles hosts that send nothing for too long (J-59): path time comes to rest, and teaching ends. `done`: host events of this tick.
+    /// Reacts if no host has sent anything for too long (J-59): path time comes to rest, and teaching ends. `done`: number of host events
+    /// that were done in this tick.
     pub(crate) fn watch_hosts(&mut self, inputs: &crate::Inputs<'_>, done: usize) {
         let received = inputs.urgent.iter().any(|commands| !commands.is_empty())
             || inputs.host.iter().take(done).any(|host| matches!(host.event, jtc_wire::LinkEvent::Frame(_)));

@@ -4,17 +4,17 @@ use crate::parameters::TableOf;
 
 /// Returns the torque of the polynomial c0..c5 at speed `v` (rad/s) and temperature `t` (°C), N·m.
 ///
-/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³); the temperature factor is kept within 0.2..2, because the straight line of
-/// the measured drives changes its sign near 60 °C and compensation would become drag.
+/// (1 + c4·(T − c5))·(c0·s + c1·v + c2·v²·s + c3·v³), where s is the smoothed sign of v. The temperature factor is clipped to 0.2..2,
+/// because the straight line that was fitted to the measured drives changes its sign near 60 °C: the compensation would then act as drag.
 pub fn polynomial(c: &[f64; 6], v: f64, t: f64, sign_width: f64) -> f64 {
     polynomial_by_slope(c, v, t, 1.0 / sign_width)
 }
 
-/// Like [`polynomial`]; `sign_slope`: reciprocal of the speed at which the sign of the speed, which is a straight line around 0, reaches
-/// ±1, s/rad.
+/// Like [`polynomial`]. The sign of the speed is a straight line around 0, and `sign_slope` is the reciprocal of the speed at which it
+/// reaches ±1, s/rad.
 #[inline]
 pub fn polynomial_by_slope(c: &[f64; 6], v: f64, t: f64, sign_slope: f64) -> f64 {
-    // A speed that is NaN makes the torque NaN by c1.
+    // If the speed is NaN, the c1 term makes the torque NaN.
     let s = within(v * sign_slope, -1.0, 1.0);
     warmth(c, t) * (c[0] * s + v * (c[1] + v * (c[2] * s + c[3] * v)))
 }
@@ -29,8 +29,8 @@ fn warmth(c: &[f64; 6], t: f64) -> f64 {
     within(1.0 + c[4] * (t - c[5]), 0.2, 2.0)
 }
 
-/// Returns the Coulomb friction of the table, N·m: the value at standstill of a straight line through two slow speeds, in the direction in
-/// which that is less. Zero if the table does not have these speeds.
+/// Returns the Coulomb friction of the table, N·m. A straight line through two slow speeds is extended to standstill, in both directions;
+/// the lower value is used. Returns zero if the table does not contain these speeds.
 pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     const SLOW: f64 = 0.1;
     let at = |direction: f64| {
@@ -40,7 +40,7 @@ pub(crate) fn coulomb_of_table(of: &TableOf<f32>, t: f64) -> f64 {
     at(1.0).unwrap_or(0.0).min(at(-1.0).unwrap_or(0.0)).max(0.0)
 }
 
-/// Not `clamp`, which compares: the board has an instruction for each of these.
+/// Clips `x` without `clamp`, which compares. The board has an instruction for each of `max` and `min`.
 fn within(x: f64, low: f64, high: f64) -> f64 {
     x.max(low).min(high)
 }
@@ -60,28 +60,29 @@ fn ends(axis: &[f32; 20]) -> (f64, f64) {
     (f64::from(*first), f64::from(*last))
 }
 
-/// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. A temperature outside has the value of the
-/// nearest column; `None` for a velocity outside, the ends being inside.
+/// Returns the bilinear value of the table at speed `v` (rad/s) and temperature `t` (°C), N·m. For a temperature outside the table the
+/// nearest column is used. Returns `None` for a velocity outside; both ends are inside.
 pub fn table(table: &TableOf<f32>, v: f64, t: f64) -> Option<f64> {
     let (slowest, fastest) = velocities(table);
-    // Rounding in the interpolation between two points does not count as outside the table.
+    // A velocity that is outside only because of rounding in the interpolation between two points is considered inside.
     let inside = (v >= slowest - ROUNDING) & (v <= fastest + ROUNDING);
     let (coldest, warmest) = temperatures(table);
-    // Not `clamp`, which may panic. NaN becomes the coldest.
+    // `clamp` is not used, because it may panic. NaN becomes the lowest temperature.
     let (v, t) = (v.max(slowest).min(fastest), t.max(coldest).min(warmest));
     let (x, [row, next]) = locate(&table.velocity, table.torque.array_windows(), v)?;
     let columns = row.array_windows().zip(next.array_windows());
     let (y, ([a, b], [c, d])) = locate(&table.temperature, columns, t)?;
     let [a, b, c, d] = [a, b, c, d].map(|&torque| f64::from(torque));
-    // Along the velocity at both temperatures of the cell, then between them.
+    // First interpolates along the velocity at both temperatures of the cell, then between the temperatures.
     let (low, high) = (a + x * (c - a), b + x * (d - b));
     inside.then_some(low + y * (high - low))
 }
 
-/// Returns the place of `value` in its cell of an axis (0..1), and that one of `cells`; `None` outside the axis.
+/// Returns the position of `value` within its cell of an axis (0..1), and the element of `cells` for that cell. Returns `None` outside the
+/// axis.
 fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Option<(f64, T)> {
     let mut found = None;
-    // No early exit: the same number of instructions for every value.
+    // The loop has no early exit, so that it takes the same number of instructions for every value.
     for (&[start, end], cell) in axis.array_windows().zip(cells) {
         if value >= f64::from(start) {
             found = Some((start, end, cell));
@@ -91,7 +92,7 @@ fn locate<T>(axis: &[f32; 20], cells: impl Iterator<Item = T>, value: f64) -> Op
     Some(((value - f64::from(start)) / (f64::from(end) - f64::from(start)), cell))
 }
 
-/// Returns the temperature in °C: drives send negative ones modulo 256, and no bearing reaches 200 °C.
+/// Returns the temperature in °C. Drives send negative temperatures modulo 256, and no bearing reaches 200 °C.
 pub(crate) fn celsius(byte: u8) -> f64 {
     let t = f64::from(byte);
     if byte >= 200 { t - 256.0 } else { t }
@@ -105,7 +106,7 @@ mod tests {
     fn sample() -> TableOf<f32> {
         let velocity = core::array::from_fn(|i| -1.0 + i as f32 * 0.125);
         let temperature = core::array::from_fn(|i| 20.0 + i as f32 * 2.0);
-        // Bilinear in both axes: a correct interpolation reproduces it everywhere.
+        // This torque is bilinear in both axes, so a correct interpolation reproduces it everywhere.
         let torque = core::array::from_fn(|r| {
             core::array::from_fn(|c| {
                 3.0 + 2.0 * velocity[r] - 0.5 * temperature[c] + 0.25 * velocity[r] * temperature[c]
@@ -178,7 +179,7 @@ mod tests {
         assert_eq!([200, 246, 255].map(celsius), [-56.0, -10.0, -1.0]);
     }
 
-    /// Rounding on the way between two points does not lead out of the table; twice as much does.
+    /// A velocity that is outside the table by no more than rounding gets the torque at the end; twice as far outside is refused.
     #[test]
     fn j36_j42_what_rounding_adds_to_a_velocity_has_the_torque_at_the_end() {
         let t = sample();

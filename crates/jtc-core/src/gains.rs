@@ -1,7 +1,7 @@
-//! Gains that suit the inertia of the joints (J-71), and gains on trial.
+//! Gains that match the inertia of the joints (J-71), and gains on trial.
 //!
-//! The torque of the derivative and of the position is late, so a joint that is too light for its gains oscillates. The controller searches
-//! the least inertia that a joint feels in some fixed poses, one per tick, and compares gains with it.
+//! The torques of the derivative and of the position error act with a delay, so a joint that is too light for its gains oscillates. The
+//! controller computes the least inertia that each joint feels in some fixed poses, one pose per tick, and compares the gains with it.
 use core::f64::consts::TAU;
 
 use jtc_dynamics::{ArmModel, Dynamics, JointVec};
@@ -16,29 +16,29 @@ use crate::{DT, JOINTS};
 
 /// Number of poses in which the inertia of the joints is computed.
 pub(crate) const POSES: usize = 17;
-/// Half of the ticks over which the derivative is taken, and half of the tick for which a torque is held: how much older than
-/// [`Config::delay_ticks`] the torque of the derivative is, ticks.
+/// Age of the derivative's torque beyond [`Config::delay_ticks`], ticks. It is half of the ticks over which the derivative is taken, plus
+/// half of the tick for which a torque is held.
 const DERIVATIVE_AGE: f64 = 3.0;
 /// Age of the torque of the position error beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
-/// Required inertia, as factors of Kd and of Kp times these ages: 1.1 to 1.7 times the inertia that the loop of one joint needs to
-/// be stable, if Kp is at most half of the Kp that its Kd can damp.
+/// Factors of the required inertia: of Kd and of Kp, each times the age of its torque. The result is 1.1 to 1.7 times the inertia at which
+/// the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.
 const PER_KD: f64 = 0.75;
 const PER_KP: f64 = 2.0;
-/// Highest sag of a joint, as a share of the limit of the position error, when gains take its integral away.
+/// Highest sag of a joint, as a share of the position error limit, if new gains reduce the torque of its integral.
 const SAG: f64 = 0.25;
-/// Share of the torque limit that the position gain makes at the limit of the position error, at least.
+/// Least torque of the position gain at the position error limit, as a share of the torque limit.
 const STIFF: f64 = 0.03;
-/// Time over which new gains come in, and for which they are on trial, ms.
+/// Time over which new gains are blended in, and time for which they are on trial, ms.
 const BLEND_MS: u16 = 500;
 const TRIAL_MS: u16 = 2_000;
 /// Time after new gains during which an unstable loop is attributed to them, ms.
 const BLAMED_MS: u16 = 10_000;
-/// Factor of the gains of a joint whose loop is unstable, and time within which it may not be unstable again, ms.
+/// Factor that reduces the gains of a joint whose loop is unstable, and time after that within which a second instability is an error, ms.
 const SOFTER: f64 = 0.3;
 const AGAIN_MS: u16 = 500;
 
-/// Shares of the joints' ranges in the poses after the first: points that fill them evenly (Halton 1960).
+/// Position of each joint within its range in the poses after the first: points that fill the ranges evenly (Halton 1960).
 const SHARES: [[f32; JOINTS]; POSES - 1] = shares();
 
 const fn shares() -> [[f32; JOINTS]; POSES - 1] {
@@ -61,7 +61,7 @@ const fn shares() -> [[f32; JOINTS]; POSES - 1] {
     shares
 }
 
-/// Returns the pose of this number: the zero pose first, each within the limits of the joints.
+/// Returns the pose with this number, within the limits of the joints. Pose 0 is the zero pose.
 fn pose(number: usize, config: &Config) -> JointVec {
     let shares = number.checked_sub(1).and_then(|n| SHARES.get(n));
     core::array::from_fn(|j| {
@@ -74,7 +74,7 @@ fn pose(number: usize, config: &Config) -> JointVec {
     })
 }
 
-/// The least inertia that each joint feels, with the others free, in the poses computed so far; kg·m².
+/// Least inertia that each joint feels while the other joints are free, in the poses computed so far, kg·m².
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FeltInertia {
     joints: [f64; JOINTS],
@@ -83,10 +83,10 @@ pub(crate) struct FeltInertia {
 remembered!(FeltInertia { joints });
 
 impl FeltInertia {
-    /// No pose was computed yet.
+    /// Start value before the first pose.
     pub const NONE: Self = Self { joints: [f64::INFINITY; JOINTS] };
 
-    /// Computes the pose of this number of an arm, without a payload.
+    /// Computes the inertia in the pose with this number, for an arm without a payload.
     #[inline(never)]
     pub fn look(&mut self, number: usize, model: &ArmModel, config: &Config) {
         let rotor = config.joints.each_ref().map(JointConfig::counted_rotor);
@@ -96,28 +96,28 @@ impl FeltInertia {
         }
     }
 
-    /// Returns `true` if all poses of an arm were computed.
+    /// Returns `true` if all poses of an arm have been computed.
     pub fn is_known(&self) -> bool {
         self.joints.iter().all(|felt| felt.is_finite())
     }
 
     /// Returns `true` if every joint is heavy enough for its gains.
     pub fn bears(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
-        // Written so that NaN is refused.
+        // The comparison also refuses NaN.
         gains.iter().zip(&self.joints).all(|(gains, felt)| *felt >= inertia_needed(gains, config.delay_ticks))
     }
 }
 
-/// Returns the least inertia (kg·m²) that each joint of an arm without a payload feels, with the others free, as a controller with these
-/// settings looks for it (J-71): in the zero pose and sixteen poses within the position limits. A drive without a configured rotor inertia
-/// counts with 0.7 kg·m².
+/// Returns the least inertia (kg·m²) that each joint of an arm without a payload feels while the others are free. A controller with these
+/// settings computes it in the same way (J-71): in the zero pose and in sixteen poses within the position limits. For a drive without a
+/// configured rotor inertia, 0.7 kg·m² is used.
 pub fn least_felt_inertia(model: &ArmModel, config: &Config) -> [f64; JOINTS] {
     let mut felt = FeltInertia::NONE;
     (0..POSES).for_each(|number| felt.look(number, model, config));
     felt.joints
 }
 
-/// Returns the inertia (kg·m²) that a joint must feel for a controller to take its gains (J-71).
+/// Returns the inertia (kg·m²) that a joint must feel before a controller accepts its gains (J-71).
 pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
     let derivative = DT * (f64::from(delay_ticks) + DERIVATIVE_AGE);
     derivative * (PER_KD * gains.kd + PER_KP * gains.kp * position_delay(delay_ticks))
@@ -125,13 +125,13 @@ pub fn inertia_needed(gains: &PidGains, delay_ticks: u8) -> f64 {
 
 /// Returns the delay of the torque of the position error, s.
 fn position_delay(delay_ticks: u8) -> f64 {
-    // No delay is shorter than the tick for which a torque is held.
+    // The delay is never shorter than the tick for which a torque is held.
     DT * (f64::from(delay_ticks) + POSITION_AGE).max(1.0)
 }
 
-/// Returns `true` if a joint that is held by the torque `p` of its position error and the torque `i` of its integral, N·m, does not fall
-/// when it gets these gains: its position gain makes some torque, and the torque that its integral no longer holds makes a small error
-/// (J-71).
+/// Returns `true` if a held joint does not fall when it gets these gains (J-71). `p`: torque of its position error; `i`: torque of its
+/// integral, N·m. The position gain must make a minimum torque, and the torque that the integral can no longer hold must cause only a small
+/// position error.
 pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) -> bool {
     let held = p + i;
     let kept = held.max(gains.ki * gains.int_min).min(gains.ki * gains.int_max);
@@ -142,15 +142,15 @@ pub(crate) fn hold_on(gains: &PidGains, p: f64, i: f64, limits: &JointConfig) ->
 /// Gains that were received under torque, and the state of their trial.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trial {
-    /// Gains before, while they may come back.
+    /// Gains before the trial, while they may be restored.
     before: Option<[PidGains; JOINTS]>,
-    /// Time for which all joints were held with the others, ms.
+    /// Time for which all joints have been held during the trial, ms.
     held_ms: u16,
-    /// Kp and Kd that acted when the gains changed, and time left in which they go over into the new ones, ms.
+    /// Kp and Kd that were in use when the gains changed, and time left in which they are blended into the new ones, ms.
     from: [[f32; 2]; JOINTS],
     blend_ms: u16,
-    /// Joints (a bit each) whose gains were reduced or taken back because their loop was unstable, and time left in which it may not
-    /// be so again, ms.
+    /// Joints (a bit each) whose gains were reduced or restored because their loop was unstable, and time left in which the loop must not
+    /// become unstable again, ms.
     unstable: u8,
     again_ms: u16,
 }
@@ -159,10 +159,10 @@ remembered!(Trial { before, held_ms, from, blend_ms, unstable, again_ms });
 remembered!(PidGains { kp, ki, kd, int_min, int_max });
 
 impl Trial {
-    /// Begins a trial: these gains were `given` under torque, in place of those `before`.
+    /// Begins a trial: a host sent the gains `given` under torque, in place of `before`.
     pub fn begin(&mut self, before: &[PidGains; JOINTS], given: &[PidGains; JOINTS]) {
         self.blend_from(before);
-        // Those that were on trial have not held yet.
+        // If the gains in `before` are themselves still on trial, they have not held the arm yet.
         if self.before.is_none() || self.held_ms >= TRIAL_MS {
             self.before = Some(*before);
         }
@@ -171,25 +171,26 @@ impl Trial {
         self.held_ms = 0;
     }
 
-    /// Ends the trial, because the arm is not held any more. Gains on trial have not held it: returns the gains before.
+    /// Ends the trial, because the arm is no longer held. If gains are on trial, returns the gains before them, because the new ones have
+    /// not held the arm.
     pub fn end(&mut self) -> Option<[PidGains; JOINTS]> {
         let before = self.before.filter(|_| self.is_on());
         *self = Self::default();
         before
     }
 
-    /// Keeps the gains before only if they may come back.
+    /// Discards the gains before the trial unless `may` allows them to be restored.
     pub fn keep_if(&mut self, may: impl FnOnce(&[PidGains; JOINTS]) -> bool) {
         self.before = self.before.filter(may);
     }
 
-    /// Returns `true` if a time must be counted.
+    /// Returns `true` if any of the times is running.
     #[inline(always)]
     pub fn runs(&self) -> bool {
         self.before.is_some() | (self.again_ms > 0) | (self.blend_ms > 0)
     }
 
-    /// Runs a tick under torque; `held`: all joints have settled, and none yields.
+    /// Runs one tick under torque. `held`: all joints have settled, and none yields.
     pub fn step(&mut self, held: bool) {
         self.again_ms = self.again_ms.saturating_sub(1);
         self.blend_ms = self.blend_ms.saturating_sub(1);
@@ -204,8 +205,8 @@ impl Trial {
         self.before.is_some() && self.held_ms <= TRIAL_MS
     }
 
-    /// Returns the gains of this tick, while those that were `given` come in: stiffness and damping go over, the integral has changed at
-    /// once.
+    /// Returns the gains of this tick while the gains `given` are blended in: Kp and Kd change gradually, the integral has changed at once.
+    /// Returns `None` if the blend is over.
     pub fn blended(&self, given: &[PidGains; JOINTS]) -> Option<[PidGains; JOINTS]> {
         if self.blend_ms == 0 {
             return None;
@@ -219,7 +220,7 @@ impl Trial {
         Some(blended)
     }
 
-    /// Begins to change to other gains from those that act while `given` are in use.
+    /// Begins a blend to other gains. It starts from the gains that act now, while `given` are in use.
     fn blend_from(&mut self, given: &[PidGains; JOINTS]) {
         let acting = self.blended(given).unwrap_or(*given);
         self.from = acting.map(|gains| [gains.kp as f32, gains.kd as f32]);
@@ -231,8 +232,8 @@ impl Trial {
         self.again_ms > 0 && self.unstable >> joint & 1 != 0
     }
 
-    /// Takes joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. Returns the cause and the
-    /// new gains, if they must change: the gains before come back. Without such gains, an unstable joint is held more softly.
+    /// Handles joints (a bit each) that fail with their `gains`; the loops of the `unstable` joints are unstable. If the gains must change,
+    /// returns the cause and the new gains: those before the trial or, if there are none, softer gains for the unstable joints.
     pub fn fails(
         &mut self,
         failed: u8,
@@ -251,7 +252,7 @@ impl Trial {
             (unstable != 0).then(|| (StopKind::Unstable, softer(gains, unstable, delay_ticks)))
         })?;
         self.blend_from(gains);
-        // The joints that fail are not held with these gains any more.
+        // The joints that fail get the new gains at once, without a blend.
         for j in 0..JOINTS {
             if failed >> j & 1 != 0 {
                 self.from[j] = [next.1[j].kp as f32, next.1[j].kd as f32];
@@ -261,13 +262,13 @@ impl Trial {
     }
 }
 
-/// Returns softer gains for the `joints` (a bit each), which damp them at least.
+/// Returns softer gains for the `joints` (a bit each). The damping of these gains is sufficient for their Kp.
 fn softer(gains: &[PidGains; JOINTS], joints: u8, delay_ticks: u8) -> [PidGains; JOINTS] {
     core::array::from_fn(|j| match gains[j] {
         own if joints >> j & 1 == 0 => own,
         own => {
             let kp = SOFTER * own.kp;
-            // The delay of Kp takes half of it at most.
+            // The delay of Kp uses at most half of Kd.
             let kd = (SOFTER * own.kd).max(2.0 * kp * position_delay(delay_ticks));
             PidGains { kp, kd, ki: 0.0, ..own }
         }

@@ -31,7 +31,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.hold_stop_for(errors, self.cause(kind, joint, value, limit));
     }
 
-    /// Like [`Self::hold_stop`], for a known cause.
+    /// Like [`Self::hold_stop`], for a cause that is already known.
     pub(crate) fn hold_stop_for(&mut self, errors: &[u16; JOINTS], cause: StopCause) {
         // A cause that occurs while the arm is already held is usually a consequence of the first one.
         if !self.errors.held_stop() {
@@ -51,7 +51,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Brings the arm to rest and holds it, also from Teaching, because encoders of joints do not agree (J-35).
+    /// Brings the arm to rest and holds it, also in Teaching, because the encoders of a joint do not agree (J-35).
     #[cold]
     pub(crate) fn hold_misfits(&mut self) {
         let misfits = self.nodes.misfits();
@@ -67,14 +67,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Ends Teaching if a joint is led too fast, before its over-speed releases the arm (J-25): the arm comes to rest and is held. This
-    /// tick is `late` by this time, ms.
+    /// Ends Teaching if a joint is led too fast, before its over-speed would release the arm (J-25). The arm comes to rest and is held.
+    /// `late`: delay of this tick, ms.
     pub(crate) fn end_fast_teaching(&mut self, late: u16) {
         let speeds = self.motion.law.hear_led_joints(&self.nodes, late);
         for j in 0..JOINTS {
             let speed = f64::from(speeds[j]);
             let limit = too_fast(&self.config.joints[j], &self.config);
-            // The speed that the drive reports is later, but shows that no encoder has jumped.
+            // The speed that the drive reports is older, but it shows that the encoder has not jumped.
             if speed.abs() > limit && self.nodes.node(j).report.velocity * speed.signum() > 0.5 * limit {
                 self.teaching = false;
                 let cause = self.cause(StopKind::Shove, j, speed, limit);
@@ -84,7 +84,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses the execution of a trajectory while positions are not trusted (J-35), and shows that as an error that has occurred.
+    /// Refuses to execute a trajectory while the positions are not trusted (J-35), and shows that as an error that has occurred.
     pub(crate) fn check_trust(&mut self) -> Result<(), DataStatus> {
         match self.nodes.untrusted() {
             0 => Ok(()),
@@ -128,12 +128,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             StopKind::Velocity | StopKind::FrictionTable => (of(&set.point.velocity), limits.velocity_max),
             StopKind::Acceleration => (of(&set.point.acceleration), limits.acceleration_max),
-            // These kinds come with their values, or have none.
+            // The caller sets the values of these kinds, or they have none.
             _ => (0.0, 0.0),
         }
     }
 
-    /// Returns the present reactions of the controller, and the cause of the last held stop, for Info (J-69).
+    /// Returns the reactions of the controller that are in progress, and the cause of the last held stop, for Info (J-69).
     pub fn reactions(&self) -> Reactions {
         let LastStop { cause, tick } = self.last_stop;
         let ago = self.observed.tick.saturating_sub(tick).min(u32::MAX.into()) as u32;

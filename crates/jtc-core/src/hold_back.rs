@@ -1,8 +1,8 @@
 //! Path time that is held back while a joint is overloaded by its motion (J-75).
 //!
-//! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than available. A slower path
-//! needs less torque: that for inertia falls with the square of the rate. Therefore path time slows down as much as the joints at their
-//! limits need it (time scaling under torque limits, Dahl and Nielsen 1990), and returns to its rate when no joint is at its limit any
+//! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
+//! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as far as the joints at
+//! their limits require (time scaling under torque limits, Dahl and Nielsen 1990). It returns to its rate when no joint is at its limit any
 //! more.
 use crate::JOINTS;
 use crate::path::PathClock;
@@ -10,14 +10,14 @@ use crate::remembered::remembered;
 
 /// Time for which the inertia of the arm is assumed to be constant, ms.
 const INERTIA_MS: u16 = 60;
-/// Time without a joint at its limit after which the path returns to its rate, ms.
+/// Time after the last joint has left its limit until the path returns to its rate, ms.
 const QUIET_MS: u16 = 200;
-/// Longest time that a joint may be at its limit without a break, ms.
+/// Longest time for which joints may be at their limits without interruption, ms.
 const PRESSED_MS: u16 = 250;
-/// Longest total time of holding back in a run, ms.
+/// Longest total time for which the path may be held back in one run, ms.
 const RUN_MS: u16 = 5_000;
-/// Rate below which the path stands, and longest time below it, ms, until the path returns to its normal rate. If the torque just sufficed
-/// to hold the arm, the path could stand for ever.
+/// Rate below which the path is considered at rest, and longest time at such a rate before the path returns to its normal rate, ms. Without
+/// this time, a path whose torque just suffices to hold the arm could rest for ever.
 const STANDS: f64 = 0.02;
 const STANDS_MS: u16 = 1_000;
 
@@ -25,18 +25,18 @@ const STANDS_MS: u16 = 1_000;
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HoldBack {
     active: bool,
-    /// The path returns to its rate (`restores`), and the time for which it has stood.
+    /// `restores`: the path returns to its rate. `stands_ms`: time for which the path has been at rest.
     restores: bool,
     stands_ms: u16,
     /// Ticks since the inertia was computed.
     since_ms: u16,
-    /// Ticks in which a joint has been at its limit, without a break.
+    /// Consecutive ticks in which a joint has been at its limit.
     pressed_ms: u16,
-    /// Ticks since a joint was at its limit.
+    /// Ticks since the last joint was at its limit.
     quiet_ms: u16,
-    /// Ticks of holding back in this run.
+    /// Ticks of this run in which the path was held back.
     run_ms: u16,
-    /// Joints that have been at their limits, a bit for each.
+    /// Joints that have been at their limits since then, a bit each.
     pressed: u8,
 }
 
@@ -49,7 +49,7 @@ pub(crate) enum Next {
     Nothing,
     /// The path returns to its rate.
     Restore,
-    /// Holding back does not help: the arm stops.
+    /// The arm stops, because holding back does not help.
     Stop,
 }
 
@@ -59,7 +59,7 @@ impl HoldBack {
         self.active
     }
 
-    /// Returns `true` if each tick must be watched.
+    /// Returns `true` if `step` must be called in each tick.
     pub fn is_watched(&self) -> bool {
         self.active | self.restores
     }
@@ -76,12 +76,12 @@ impl HoldBack {
         true
     }
 
-    /// Ends holding back because the path stops. Its time in this run still counts.
+    /// Ends holding back because the path stops. The time so far remains part of the run.
     pub fn end(&mut self) {
         (self.active, self.restores, self.stands_ms) = (false, false, 0);
     }
 
-    /// Returns the time of holding back in this run, ms.
+    /// Returns the time for which the path was held back in this run, ms.
     pub fn run_ms(&self) -> u16 {
         self.run_ms
     }
@@ -91,7 +91,7 @@ impl HoldBack {
         self.pressed & (1 << joint) != 0
     }
 
-    /// Runs a tick on the path, in the time of this clock; `joints`: `true` for those at their torque limits.
+    /// Runs one tick on the path. `joints`: `true` for those at their torque limits; `clock`: the clock of the motion.
     pub fn step(&mut self, joints: &[bool; JOINTS], clock: &PathClock) -> Next {
         for (j, at_limit) in joints.iter().enumerate() {
             self.pressed |= u8::from(*at_limit) << j;
@@ -130,7 +130,7 @@ mod tests {
 
     const PRESSED: [bool; JOINTS] = [false, false, true, false, false, false];
 
-    /// A clock on the way to its pace.
+    /// A clock that is ramping to its normal rate.
     fn at(rate: f64) -> PathClock {
         let mut clock = PathClock::start(1.0);
         clock.rate = rate;

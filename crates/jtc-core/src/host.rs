@@ -1,4 +1,4 @@
-//! The host's commands: executed in bounded slices, answered by one record each (J-04, J-06).
+//! The host's commands: executed in bounded slices, with one response record each (J-04, J-06).
 pub(crate) mod overtaking;
 pub(crate) mod slices;
 pub(crate) mod upload;
@@ -27,7 +27,7 @@ use upload::LineUpload;
 const JOINTS_MASK: u8 = (1 << JOINTS) - 1;
 const GRIPPER_MASK: u8 = 1 << GRIPPER;
 
-/// Returns the data status for existing hosts, which know none above 6 (J-51).
+/// Returns the data status for existing hosts, which know no value above 6 (J-51).
 pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
     match data {
         DataStatus::NotAllowed | DataStatus::StartPositionMismatch => DataStatus::IncorrectValue,
@@ -37,17 +37,17 @@ pub(crate) fn in_plain_words(data: DataStatus) -> DataStatus {
 
 /// Cost of an event that was served.
 enum Served {
-    /// Took a few instructions: the tick has time for another event.
+    /// The event took a few instructions, so the tick has time for another one.
     Quickly,
-    /// Took the full budget of a tick.
+    /// The event took the full budget of a tick.
     Fully,
-    /// Served in part; the remainder takes more ticks.
+    /// The event was served in part. The remainder takes more ticks.
     Partly,
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Serves urgent commands first, then the oldest events of the host link: short ones up to the first long one, or a slice of it.
-    /// Returns the number of events that are done.
+    /// Serves urgent commands first, then the oldest events of the host link: short events up to the first long one, or one slice of a long
+    /// event. Returns the number of events that are done.
     pub(crate) fn serve_host(&mut self, inputs: &Inputs<'_>) -> usize {
         for (line, commands) in inputs.urgent.iter().enumerate() {
             for (command, count) in commands.iter() {
@@ -55,7 +55,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
         }
         if inputs.host.is_empty() {
-            // Most ticks; the loop has much to prepare.
+            // Most ticks return here, because the loop needs much preparation.
             return 0;
         }
         let mut done = 0;
@@ -69,7 +69,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         done
     }
 
-    /// Executes Stop and Pause at once (J-04). Their records are sent in the turn of their frames.
+    /// Executes Stop and Pause at once (J-04). Their records are sent when it is the turn of their frames.
     fn overtake(&mut self, line: usize, command: UrgentCommand, count: u8) {
         let stops = command == UrgentCommand::Stop;
         self.overtaking.iter_mut().for_each(|overtaking| overtaking.stopped |= stops);
@@ -80,7 +80,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Serves one event, or a slice of it; an event that is done has its record.
+    /// Serves one event or a slice of it. When the event is done, its record is queued.
     fn serve(&mut self, received: &HostEvent<'_>) -> Served {
         let Some(overtaking) = self.overtaking.get_mut(received.line) else { return Served::Quickly };
         let mut plain = received.plain;
@@ -117,7 +117,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                         };
                         match progress {
                             SliceOutcome::Done => (DataStatus::NoError, served),
-                            // A command that the state forbids took no time. A jog may have been computed before it was refused.
+                            // A command that is refused because of the state took no time. Only a Jog may have been computed before it was
+                            // refused.
                             SliceOutcome::Refused(DataStatus::NotAllowed) if !computes => {
                                 (DataStatus::NotAllowed, Served::Quickly)
                             }
@@ -138,8 +139,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         served
     }
 
-    /// Returns `true` if the command takes a few instructions and does not change the state of the controller, on which the next command
-    /// depends.
+    /// Returns `true` if the command takes a few instructions and does not change the state of the controller. The next command may depend
+    /// on that state.
     fn is_quick(&self, command: &Command<'_>) -> bool {
         match command {
             Command::ClearCurrentErrors { .. } | Command::ClearOccurredErrors => {
@@ -152,7 +153,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     pub(crate) fn carry_out(&mut self, received: &HostEvent<'_>, command: Command<'_>) -> SliceOutcome {
-        // Parameters would change the torque of a moving arm.
+        // New parameters would change the torque of a moving arm.
         let jogging = self.motion.set.jogging();
         let settable =
             matches!(self.state, ControllerState::Init | ControllerState::HoldPos | ControllerState::Error)
@@ -160,7 +161,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 && !self.motion.set.is_led()
                 && !self.motion.law.is_yielding();
         match command {
-            // J-69: the condition that the controller reacts to persists.
+            // J-69: the condition to which the controller reacts persists.
             Command::ClearCurrentErrors { jtc: true, .. } | Command::ClearOccurredErrors
                 if self.is_reacting() =>
             {
@@ -188,7 +189,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             }
             Command::Trajectory(segment) => self.take_segment(&segment, received),
             Command::TrajSetExecStatus(exec) => self.execute(exec).into(),
-            // J-53: a drive on a bench does not carry the load of the model.
+            // J-53: joints are absent, so the drives on the bench do not carry the load of the model.
             Command::TeachingModeEnable
                 if self.state == ControllerState::HoldPos
                     && !self.joints_absent()
@@ -203,7 +204,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 self.teaching = false;
                 SliceOutcome::Done
             }
-            // J-23: torque would be taken from a moving arm.
+            // J-23: the reset would take the torque from a moving arm.
             Command::ResetCanDevices { nodes }
                 if nodes & JOINTS_MASK != 0
                     && (jogging
@@ -232,8 +233,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Clears errors (J-21): a fault that a joint still reports is raised again in this tick. A `clear` without an effect is refused. The
-    /// controller does not execute it later either, when the joint has been cleared.
+    /// Clears errors (J-21). A fault that a joint still reports is raised again in this tick. If `clear` has no effect, it is refused, and
+    /// the controller does not repeat it after the joint has been cleared.
     fn clear_errors(&mut self, clear: fn(&mut Errors)) -> Result<(), DataStatus> {
         let mut after = self.errors;
         clear(&mut after);
@@ -251,7 +252,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.forget_hash();
         if command.frame_type().is_default() {
             if self.extensions.unusable {
-                // The built-in arm is another arm than the one that was stored (J-54).
+                // The built-in arm is not the arm that was stored (J-54).
                 return SliceOutcome::Refused(DataStatus::NotAllowed);
             }
             if self.extensions.stored.is_there() {
@@ -283,7 +284,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Takes a model, in slices, `taken` by the parameters.
+    /// Takes a model in slices. `taken` passes a slice to the parameters.
     fn take_model(
         &mut self,
         taken: impl FnOnce(
@@ -306,7 +307,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         outcome
     }
 
-    /// Takes gains. Under torque they must hold the torque that is held now, and are on trial (J-71).
+    /// Takes gains. Under torque they must hold the present torque, and are on trial (J-71).
     #[inline(never)]
     fn take_gains(&mut self, gains: &[PidGains; JOINTS]) -> Result<(), DataStatus> {
         self.parameters.check_pid(gains, &self.config)?;
@@ -322,7 +323,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Ok(())
     }
 
-    /// Uses the stored arm for a default, if an arm is stored (J-54).
+    /// Takes a default from the stored arm, if an arm is stored (J-54).
     #[inline(never)]
     fn use_stored(&mut self, frame_type: FrameType) -> SliceOutcome {
         let Self { extensions, parameters, config, nodes, .. } = self;
@@ -338,7 +339,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 let outcome = parameters.take_model(&arm.model, self.slice_progress, at, config);
                 self.model_taken(outcome)
             }
-            // The stored arm has one kind of friction for both requests of a host.
+            // The stored arm has one kind of friction. It is used for both requests of a host.
             _ => match arm.friction {
                 FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).into(),
                 FrictionImage::Table(floats) => parameters.take_table(&floats, self.slice_progress, config),
@@ -351,29 +352,29 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.errors.held_stop() || self.motion.law.any_yields() || self.safety_stop_ms.is_some()
     }
 
-    /// Returns `true` if joints are set absent (J-53).
+    /// Returns `true` if joints are marked as absent (J-53).
     fn joints_absent(&self) -> bool {
         self.config.absent.contains(&true)
     }
 
-    /// J-34.
+    /// Executes Execute, Pause or Stop (J-34).
     fn execute(&mut self, command: ExecCommand) -> Result<(), DataStatus> {
-        // J-30: also while joints are jogged.
+        // J-30: this also applies while joints are jogged.
         let dropped = command == ExecCommand::Stop && self.store.drop_upload();
-        // A Stop or a Pause holds the arm. Therefore it also ends Teaching, and cancels Teaching that has not begun.
+        // A Stop or a Pause holds the arm. Therefore it also ends Teaching, or cancels Teaching that has not begun yet.
         let taught = command != ExecCommand::Execute && core::mem::take(&mut self.teaching);
         if command != ExecCommand::Execute && self.stop_jog() {
             return Ok(());
         }
         match (self.trajectory, command) {
-            // J-33: a stopped path must not continue.
+            // J-33: a path that is being stopped must not become a paused one.
             (TrajectoryState::Execute, ExecCommand::Pause)
                 if self.phase.leave() == Some(TrajectoryState::Stop) =>
             {
                 Err(DataStatus::NotAllowed)
             }
-            // Teaching was accepted, and begins as soon as the arm is held; a hand had led the arm, and it is not at rest yet; or joints
-            // are absent (J-53).
+            // Three cases: Teaching was accepted and begins as soon as the arm is held; a hand was leading the arm, and the arm is not at
+            // rest yet; or joints are absent (J-53).
             (_, ExecCommand::Execute)
                 if self.teaching
                     || self.motion.set.is_led()
@@ -383,7 +384,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             {
                 Err(DataStatus::NotAllowed)
             }
-            // J-30: the Stop during its upload was meant for this trajectory.
+            // J-30: the Stop during its upload applied to this trajectory.
             (TrajectoryState::Stop | TrajectoryState::Finish, ExecCommand::Execute)
                 if self.store.stopped() =>
             {
@@ -418,7 +419,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Refuses a trajectory that was taken although the check had found a violation (J-36), and shows that as an error that has occurred.
+    /// Refuses a trajectory that was stored although the check had found a violation (J-36). The violation is shown as an error that has
+    /// occurred.
     fn check_verdict(&mut self) -> Result<(), DataStatus> {
         let Some(violation) = self.store.refused() else { return Ok(()) };
         let error = |j: usize| if j == violation.joint { violation.joint_error() } else { 0 };
@@ -427,8 +429,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         Err(DataStatus::IncorrectValue)
     }
 
-    /// Checks J-36: bearings inside the temperatures of the friction table and, if friction was received since the trajectory was loaded,
-    /// the path inside its velocities. No other parameter that is accepted in HoldPos affects this check.
+    /// Checks J-36: the bearing temperatures must be inside the friction table. If friction was received since the trajectory was loaded,
+    /// the velocities of the path must be inside as well. No other parameter that is accepted in HoldPos affects this check.
     fn check_friction(&mut self) -> Result<(), DataStatus> {
         let Some(tables) = self.parameters.tables_in_use() else { return Ok(()) };
         let temperatures = core::array::from_fn(|j| celsius(self.nodes.node(j).report.temperature));

@@ -1,8 +1,8 @@
 //! Set values between two trajectory points (J-32).
 //!
-//! Each channel comes from its own samples: the position from the quintic through both points' position, velocity and
-//! acceleration, the velocity from the cubic through their velocity and acceleration, the acceleration from the line. No
-//! channel is the derivative of another, because the int16 grid of the positions (96 µrad) would turn into tens of rad/s².
+//! Each channel has its own interpolation. The position is the quintic through the positions, velocities and accelerations of both points,
+//! the velocity is the cubic through their velocities and accelerations, and the acceleration is a straight line. No channel is the
+//! derivative of another, because the derivative of the int16 grid of the positions (96 µrad) would reach tens of rad/s².
 use core::array::from_fn;
 
 use jtc_wire::{ACCELERATION_SCALE, POSITION_SCALE, RAW_FULL_SCALE, RawPoint, VELOCITY_SCALE};
@@ -13,11 +13,11 @@ use crate::{DT, JOINTS};
 /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of every joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SetPoint {
-    /// rad.
+    /// Position, rad.
     pub position: [f64; JOINTS],
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: [f64; JOINTS],
-    /// rad/s².
+    /// Acceleration, rad/s².
     pub acceleration: [f64; JOINTS],
 }
 
@@ -40,17 +40,16 @@ impl From<&RawPoint> for SetPoint {
     }
 }
 
-/// Addition to a value between two points by rounding, in rad and rad/s: too small to matter for any limit.
+/// Amount by which rounding may increase a value between two points, in rad and rad/s. It is too small to matter for any limit.
 pub(crate) const ROUNDING: f64 = 1e-9;
 
-/// Rises from 0 to 1 without a corner.
+/// Rises from 0 to 1 with zero slope at both ends.
 pub(crate) fn smooth(u: f64) -> f64 {
     let u = u.clamp(0.0, 1.0);
     u * u * (3.0 - 2.0 * u)
 }
 
-/// Weights of the samples of both points in the channels at one place between them: Hermite's basis. The weights are the same for all
-/// joints.
+/// Weights of the samples of both points in the channels at one place between the points (Hermite basis). All joints have the same weights.
 struct Weights {
     /// Weights of the positions, the velocities and the accelerations in the position.
     position: [[f64; 2]; 3],
@@ -60,14 +59,15 @@ struct Weights {
     acceleration: [f64; 2],
 }
 
-/// Units of the samples, and their changes in a step: the same in all of a trajectory.
+/// Units of the samples, and the changes that they cause in a step. They are constant for a trajectory.
 #[derive(Clone, Copy, Debug)]
 struct Units {
-    /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one.
+    /// Position (rad), velocity (rad/s) and acceleration (rad/s²) of one unit.
     position: f64,
     velocity: f64,
     acceleration: f64,
-    /// Way of the velocity in a step (rad), half of that of the acceleration (rad), and the change of velocity by it (rad/s).
+    /// Changes in a step: distance due to one unit of velocity (rad), half of the distance due to one unit of acceleration (rad), and
+    /// change of the velocity due to one unit of acceleration (rad/s).
     way: f64,
     half_way: f64,
     change: f64,
@@ -103,7 +103,7 @@ impl Weights {
         }
     }
 
-    /// Returns position, velocity and acceleration from those of both points.
+    /// Interpolates position, velocity and acceleration between the samples of both points.
     #[inline(always)]
     fn between(&self, a: [f64; 3], b: [f64; 3]) -> (f64, f64, f64) {
         let of = |weights: &[f64; 2], channel: usize| weights[0] * a[channel] + weights[1] * b[channel];
@@ -119,14 +119,14 @@ impl Weights {
 /// The step between the points of a trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Step {
-    /// ms, and its reciprocal.
+    /// Length of the step, ms, and its reciprocal.
     pub ms: u16,
     pub per_ms: f64,
     units: Units,
 }
 
 impl Step {
-    /// Creates a step of `ms` milliseconds, at least one.
+    /// Creates a step of `ms` milliseconds; 0 is taken as 1.
     pub fn new(ms: u16) -> Self {
         let ms = ms.max(1);
         let [position, velocity, acceleration] =
@@ -135,7 +135,7 @@ impl Step {
         Self { ms, per_ms: 1.0 / f64::from(ms), units }
     }
 
-    /// Puts set values at the fraction `u` (0..1) of the way from one point to the next.
+    /// Writes the set values at the fraction `u` (0..1) between one point and the next to `out`.
     #[inline(always)]
     pub fn between(&self, a: &RawPoint, b: &RawPoint, u: f64, out: &mut SetPoint) {
         let weights = Weights::at(u, &self.units);
@@ -146,7 +146,7 @@ impl Step {
     }
 }
 
-/// Returns the set values at the fraction `u` (0..1) of the way from `a` to `b`, which are `h` seconds apart.
+/// Returns the set values at the fraction `u` (0..1) between `a` and `b`, which are `h` seconds apart.
 pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     let weights = Weights::at(u, &Units::new(1.0, 1.0, 1.0, h));
     let mut out = SetPoint::default();
@@ -157,8 +157,8 @@ pub fn interpolate(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> SetPoint {
     out
 }
 
-/// Returns the speed of the position itself (rad/s) at the place of [`interpolate`]: the speed of the cubic, plus the part due to the way
-/// that the velocities of both points do not explain.
+/// Returns the derivative of the position (rad/s) at the place of [`interpolate`]: the velocity of the cubic, plus the part due to the
+/// distance that the velocities of both points do not explain.
 pub fn position_speed(a: &SetPoint, b: &SetPoint, h: f64, u: f64) -> [f64; JOINTS] {
     let cubic = interpolate(a, b, h, u).velocity;
     from_fn(|j| {
@@ -208,7 +208,7 @@ mod tests {
             }
         }
 
-        /// A motion that is itself a quintic in position is reproduced in position; one that is a cubic in velocity, in velocity.
+        /// A motion with a quintic position is reproduced in the position; a motion with a cubic velocity is reproduced in the velocity.
         #[test]
         fn j32_reproduces_polynomials(c in prop::array::uniform6(-1.0..1.0f64), h in 0.005..0.5f64, u in 0.0..1.0f64) {
             let at = |t: f64| {
@@ -220,7 +220,7 @@ mod tests {
             let knot = |t: f64| { let (p, v, a) = at(t); SetPoint { position: [p; 6], velocity: [v; 6], acceleration: [a; 6] } };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
             prop_assert!((got.position[3] - at(u * h).0).abs() < 1e-12);
-            // Velocity: compare with the cubic of a motion whose velocity is one.
+            // Compares the velocity with a motion whose velocity is a cubic.
             let cubic = |t: f64| (c[1] + t * (c[2] + t * (c[3] + t * c[4])), c[2] + t * (2.0 * c[3] + t * 3.0 * c[4]));
             let knot = |t: f64| SetPoint { position: [0.0; 6], velocity: [cubic(t).0; 6], acceleration: [cubic(t).1; 6] };
             let got = interpolate(&knot(0.0), &knot(h), h, u);
@@ -228,7 +228,7 @@ mod tests {
             prop_assert!((got.acceleration[0] - (cubic(0.0).1 + u * (cubic(h).1 - cubic(0.0).1))).abs() < 1e-12);
         }
 
-        /// From points as they are on the wire the same comes out, up to rounding: far less than the limits allow for it.
+        /// Points in the wire format give the same result, up to a rounding error far below the allowance in the limits.
         #[test]
         fn j32_points_of_the_wire_are_interpolated_alike(
             (a, b) in (raw(), raw()), ms in prop::sample::select(&[1, 2, 7, 10, 100, u16::MAX][..]), u in 0.0..1.0f64,
@@ -236,7 +236,7 @@ mod tests {
             let wanted = interpolate(&SetPoint::from(&a), &SetPoint::from(&b), f64::from(ms) * 1e-3, u);
             let mut got = SetPoint::default();
             Step::new(ms).between(&a, &b, u, &mut got);
-            // A step of a minute leads far away between its ends.
+            // In a step of a minute the values between the points are far from those at its ends.
             let rounding = 0.01 * ROUNDING * (1.0 + f64::from(ms) * 1e-3).powi(2);
             for j in 0..JOINTS {
                 prop_assert!((got.position[j] - wanted.position[j]).abs() < rounding);
@@ -245,7 +245,7 @@ mod tests {
             }
         }
 
-        /// A point of a trajectory is met to the last bit, and at rest it is at rest.
+        /// At a point of the trajectory the result equals the point bit for bit, and a point at rest gives a standstill.
         #[test]
         fn j32_points_of_the_wire_are_met(a in raw(), b in raw(), ms in 1..=u16::MAX) {
             let (step, mut at) = (Step::new(ms), SetPoint::default());
@@ -255,7 +255,7 @@ mod tests {
             prop_assert_eq!(at, SetPoint::from(&b));
         }
 
-        /// The speed of the position is its derivative.
+        /// The position speed equals the derivative of the position.
         #[test]
         fn j32_the_speed_of_the_position_is_its_slope(a in point(), b in point(), h in 0.01..0.5f64, u in 0.01..0.99f64) {
             let at = |u| interpolate(&a, &b, h, u).position[2];

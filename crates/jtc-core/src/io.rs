@@ -7,22 +7,22 @@ use crate::HOST_LINES;
 /// State of the joint bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusState {
-    /// The frame that the last tick returned was acknowledged on the bus.
+    /// The frame that the last tick returned was acknowledged.
     pub acknowledged: bool,
     /// The CAN controller is bus-off.
     pub bus_off: bool,
 }
 
-/// Event that a host sent, in the order of its line.
+/// Event on a host line. The events of a line are in the order of their arrival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostEvent<'a> {
     /// The line, which gets the response record.
     pub line: usize,
-    /// The event was received before an urgent command that the controller was given in this tick or an earlier one: an Execute is not
-    /// executed any more, and a Stop or a Pause has already acted (J-04).
+    /// The event was received before an urgent command that was an input of this tick or an earlier one. An overtaken Execute is no longer
+    /// executed, and an overtaken Stop or Pause has already taken effect (J-04).
     pub overtaken: bool,
-    /// A frame that came on a plain line: no extension request in the 2 s before its first byte (J-51). Its record has no data
-    /// status above 6, and segment 0 acts as a Stop in Operate (J-30).
+    /// The frame came on a plain line: no extension request was received in the 2 s before its first byte (J-51). Its record contains no
+    /// data status above 6, and segment 0 acts as a Stop in Operate (J-30).
     pub plain: bool,
     /// The event.
     pub event: LinkEvent<'a>,
@@ -35,23 +35,23 @@ pub struct Inputs<'a> {
     pub bus: &'a [Frame],
     /// State of the bus.
     pub bus_state: BusState,
-    /// Level of the safety input: true = no error (J-22). A board that latches pulses shorter than a tick reports false in the tick after
-    /// such a pulse.
+    /// Level of the safety input: `true` means no error (J-22). A board that latches pulses shorter than a tick reports `false` in the tick
+    /// after such a pulse.
     pub safety_input: bool,
-    /// Ticks since the last one that did not come, or came half a tick late or more (J-12).
+    /// Number of ticks since the last one that were missed, or were at least half a tick late (J-12).
     pub missed_ticks: u16,
-    /// Stop and Pause that have arrived on each line since the last tick. These commands act in this tick, before all events that wait
-    /// (J-04). Their frames also come as events in their turn.
+    /// Stop and Pause commands that have arrived on each line since the last tick. They take effect in this tick, before all waiting events
+    /// (J-04). Their frames also appear as events when it is their turn.
     pub urgent: [UrgentCommands; HOST_LINES],
-    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Events that are not done must be offered
-    /// again in the next tick.
+    /// The oldest events of the host link. The controller reads at most [`jtc_wire::EVENTS_MAX`]. Offer the events that are not done again
+    /// in the next tick.
     pub host: &'a [HostEvent<'a>],
     /// The serial transmitters can take a status now.
     pub status_free: bool,
 }
 
 impl Inputs<'_> {
-    /// A tick without frames, events and faults.
+    /// Inputs of a tick without frames, events and faults.
     pub const QUIET: Self = Inputs {
         bus: &[],
         bus_state: BusState { acknowledged: true, bus_off: false },
@@ -66,20 +66,20 @@ impl Inputs<'_> {
 /// Outputs of one tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Outputs {
-    /// The one frame of this tick (J-12); `None` in Start.
+    /// The frame of this tick (J-12); `None` in Start.
     pub bus: Option<Frame>,
-    /// Level of the safety output: true = no error (J-22).
+    /// Level of the safety output: `true` means no error (J-22).
     pub safety_output: bool,
-    /// A JtcStatus frame must be sent now: [`Controller::status_frame`](crate::Controller::status_frame) has it. The outputs do not contain
-    /// the frame, because they are copied in every tick and few of them have a status.
+    /// A JtcStatus frame must be sent now. [`Controller::status_frame`](crate::Controller::status_frame) returns it. The outputs do not
+    /// contain the frame, because they are copied in every tick and few ticks have a status.
     pub status: bool,
-    /// Line that gets the response record in that status. The other line gets the status without it. `None`: the status has no record.
+    /// Line that gets the response record in that status; the other line gets the status without it. `None` if the status has no record.
     pub record_line: Option<usize>,
-    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). Never together with a
-    /// status.
+    /// [`Controller::answer_frame`](crate::Controller::answer_frame) must be sent now, on this line only (J-50). It is never set together
+    /// with `status`.
     pub answer_line: Option<usize>,
     /// [`Controller::stored_arm`](crate::Controller::stored_arm) must be written to non-volatile memory (J-54).
     pub store: bool,
-    /// Number of host events that are done, from the oldest on: release them.
+    /// Number of host events that are done, from the oldest on. Release them.
     pub host_done: usize,
 }

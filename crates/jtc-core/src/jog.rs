@@ -1,6 +1,6 @@
 //! Jogging: commanded joint velocities, the only motion without a trajectory (J-58). Each joint follows its velocity along ramps of bounded
-//! acceleration and jerk, and slows down by itself before the end of its range. When the jog ends, its time comes to rest like path time,
-//! so that all joints stop as hard as on a path (J-33).
+//! acceleration and jerk, and slows down by itself before the end of its range. When the jog ends, its clock comes to rest like path time,
+//! so that all joints stop as quickly as on a path (J-33).
 use jtc_dynamics::sqrt;
 
 use crate::config::Config;
@@ -10,14 +10,14 @@ use crate::path::PathClock;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Ticks without a new command after which the joints come to rest.
+/// Time without a new command after which the joints come to rest, ticks.
 pub(crate) const LASTS_MS: u16 = 200;
 /// Highest acceleration, as a share of the joint's limit.
 const ACCELERATION: f64 = 0.2;
 /// Time in which that acceleration is reached, s.
 const RISE_S: f64 = 0.1;
 
-/// Returns the highest acceleration of a joint if the torque limits leave enough torque for it, rad/s².
+/// Returns the highest acceleration of a joint while the torque limits leave enough torque for it, rad/s².
 pub(crate) fn hardest(limits: &JointConfig) -> f64 {
     ACCELERATION * limits.acceleration_max
 }
@@ -34,18 +34,18 @@ struct JointJog {
     acceleration: f64,
 }
 
-/// Returns the rate at which the acceleration of a joint changes, rad/s³.
+/// Returns the jerk limit of a joint, rad/s³.
 pub(crate) fn jerk(limits: &JointConfig) -> f64 {
     hardest(limits) / RISE_S
 }
 
-/// Jog of all joints, from the first command until they rest.
+/// Jog of all joints, from the first command until they are at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Jog {
     joints: [JointJog; JOINTS],
     /// Ticks since the last command.
     silent_ms: u16,
-    /// Time in which the joints move.
+    /// Clock of the jog.
     clock: PathClock,
 }
 
@@ -53,13 +53,13 @@ remembered!(JointJog { wanted, most, velocity, acceleration });
 remembered!(Jog { joints, silent_ms, clock });
 
 impl Jog {
-    /// Begins at rest.
+    /// Creates a jog that begins at rest.
     pub fn begin() -> Self {
         Self { joints: Default::default(), silent_ms: 0, clock: PathClock::start(1.0) }
     }
 
-    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that arrive while the joints come to rest count when the
-    /// joints stand.
+    /// Commands velocities, rad/s, and the highest accelerations, rad/s². Commands that arrive while the joints come to rest take effect
+    /// when the joints are at rest.
     pub fn command(
         &mut self,
         wanted: &[f64; JOINTS],
@@ -70,7 +70,7 @@ impl Jog {
         self.silent_ms = 0;
         for (j, joint) in self.joints.iter_mut().enumerate() {
             joint.wanted = wanted[j];
-            // A joint that is too fast to stop within its range at this acceleration keeps the previous one.
+            // A joint that could not stop within its range at this acceleration keeps the previous one.
             let (softer, jerk) = (JointJog { most: acceleration[j], ..*joint }, jerk(&config.joints[j]));
             let (low, high) = config.position_range(j);
             let rest = position[j] + softer.stopping_way(jerk);
@@ -86,7 +86,7 @@ impl Jog {
         self.joints.iter_mut().for_each(|joint| joint.wanted = 0.0);
     }
 
-    /// Begins a tick. Returns `true` if all joints begin to come to rest in it.
+    /// Begins a tick. Returns `true` if this is the tick in which all joints begin to come to rest.
     pub fn ends(&mut self) -> bool {
         self.silent_ms = self.silent_ms.saturating_add(1);
         if self.silent_ms > LASTS_MS {
@@ -99,7 +99,7 @@ impl Jog {
         ends
     }
 
-    /// Returns `true` if the jog has not begun to come to rest.
+    /// Returns `true` until the jog begins to come to rest.
     pub fn goes_on(&self) -> bool {
         self.clock.is_going()
     }
@@ -108,13 +108,13 @@ impl Jog {
         self.joints.iter().any(|joint| joint.wanted != 0.0)
     }
 
-    /// Returns `true` if every joint rests and no velocity is commanded.
+    /// Returns `true` if every joint is at rest and no velocity is commanded.
     pub fn rests(&self) -> bool {
         let rests = |joint: &JointJog| joint.velocity == 0.0 && joint.acceleration == 0.0;
         !self.is_wanted() && (self.clock.standing() || self.joints.iter().all(rests))
     }
 
-    /// Runs a tick: moves `point` on; `ramp` advances the clock on its way to another rate.
+    /// Runs one tick: moves `point`. `ramp` advances the clock while it ramps to another rate.
     pub fn step(
         &mut self,
         point: &mut SetPoint,
@@ -147,7 +147,7 @@ impl Jog {
 }
 
 impl JointJog {
-    /// Runs a tick that takes this time of the jog (s), towards the wanted velocity if the jog `goes` on.
+    /// Runs one tick that takes `tick` seconds of the jog's clock. While the jog `goes` on, the joint approaches the commanded velocity.
     fn step(
         &mut self,
         position: &mut f64,
@@ -159,33 +159,33 @@ impl JointJog {
         let jerk = jerk(limits);
         let wanted = if goes { self.wanted } else { 0.0 };
         let wanted = wanted.max(-limits.velocity_max).min(limits.velocity_max);
-        // The wanted velocity, as long as the joint could still stop inside its range from there.
+        // The joint approaches the commanded velocity as long as it could still stop inside its range afterwards.
         let onward = self.toward(wanted, jerk, limits.velocity_max, tick);
         let way = self.way(&onward, tick) + onward.stopping_way(jerk);
         let room = if way < 0.0 { low - *position } else { high - *position };
         let onward_fits = way.abs() < room.abs() && way * room >= 0.0;
         let next = if onward_fits { onward } else { self.toward(0.0, jerk, limits.velocity_max, tick) };
-        // Never out of the range; from outside only back into it.
+        // The joint never leaves its range. A joint that is outside only moves back into it.
         let reached = *position + self.way(&next, tick);
         let within = reached.max(low.min(*position)).min(high.max(*position));
         *self = if within == reached { next } else { Self { velocity: 0.0, acceleration: 0.0, ..next } };
         *position = within;
     }
 
-    /// Returns the distance that the joint moves in this time (s) until it is in the state `next`, rad.
+    /// Returns the distance that the joint moves in `tick` seconds until it is in the state `next`, rad.
     fn way(&self, next: &Self, tick: f64) -> f64 {
         0.5 * (self.velocity + next.velocity) * tick
     }
 
-    /// Returns the state after this time (s), on the way to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster than
-    /// `fastest` (rad/s).
+    /// Returns the state after `tick` seconds of the approach to a velocity (rad/s), with at most this `jerk` (rad/s³), and never faster
+    /// than `fastest` (rad/s).
     fn toward(&self, target: f64, jerk: f64, fastest: f64, tick: f64) -> Self {
         if tick <= 0.0 {
             return *self;
         }
         let round = jerk * tick;
         let left = target - self.velocity;
-        // Highest acceleration that can still be reduced to zero before the joint has this velocity.
+        // Highest acceleration that can still be reduced to zero before the joint reaches the target velocity.
         let flat = round * (sqrt(0.25 + 2.0 * left.abs() / (round * tick)) - 0.5);
         let next =
             flat.min(self.most).copysign(left).max(self.acceleration - round).min(self.acceleration + round);
@@ -193,8 +193,8 @@ impl JointJog {
         if arrives {
             Self { velocity: target, acceleration: 0.0, ..*self }
         } else {
-            // A joint that accelerates when its jog ends gets faster until its acceleration is back at zero. The joint arrives at the
-            // velocity that was commanded before; whole ticks can add a few µrad/s, which the limit does not allow.
+            // A joint that still accelerates when its jog ends becomes faster until its acceleration is zero. It then reaches the velocity
+            // that was commanded before. Rounding to whole ticks can add a few µrad/s, which the limit does not allow.
             let reached = self.velocity + next * tick;
             let velocity = reached.max(-fastest).min(fastest);
             let acceleration = if velocity == reached { next } else { (velocity - self.velocity) / tick };
@@ -202,8 +202,8 @@ impl JointJog {
         }
     }
 
-    /// Returns the distance until the joint stands, rad, if it stops at once: the acceleration falls to its highest, against the motion,
-    /// with this `jerk` (rad/s³), stays there, and rises to zero as steadily. A little is added for the effect of whole ticks.
+    /// Returns the stopping distance of a joint that stops at once, rad. With this `jerk` (rad/s³) the acceleration falls to its limit
+    /// against the motion, stays there, and rises to zero. A small margin is added for the effect of whole ticks.
     fn stopping_way(&self, jerk: f64) -> f64 {
         let sign = if self.velocity == 0.0 { self.acceleration } else { self.velocity };
         let (v, a) = if sign < 0.0 {
@@ -211,7 +211,7 @@ impl JointJog {
         } else {
             (self.velocity, self.acceleration)
         };
-        // Counted from the point of zero acceleration: it is still to come while the joint gets faster, and in the past while the joint
+        // The distance is measured from the point of zero acceleration, which is ahead of a joint that accelerates, and behind a joint that
         // brakes.
         let (peak, past) = (v + 0.5 * a * a / jerk, a * v / jerk + a * a * a / (3.0 * jerk * jerk));
         let rise = self.most / jerk;
@@ -237,13 +237,13 @@ mod tests {
         Config::avena()
     }
 
-    /// A command without a bound by torque.
+    /// A command that the torque limits do not restrict.
     fn command(jog: &mut Jog, wanted: &[f64; JOINTS], position: &[f64; JOINTS], config: &Config) {
         let acceleration = core::array::from_fn(|j| hardest(&config.joints[j]));
         jog.command(wanted, &acceleration, position, config);
     }
 
-    /// A tick that moves `position` on, of joints without inertia: their velocities and accelerations.
+    /// Runs a tick that moves `position`, for joints without inertia. Returns their velocities and accelerations.
     fn tick(jog: &mut Jog, position: &mut [f64; JOINTS], config: &Config) -> ([f64; JOINTS], [f64; JOINTS]) {
         let mut point = SetPoint::still(*position);
         jog.ends();
@@ -254,8 +254,8 @@ mod tests {
     }
 
     proptest! {
-        /// For any commands at any time: within the range, the velocity and acceleration limits and the jerk, and at rest soon after the
-        /// last command.
+        /// Whatever is commanded at any time, the joints stay within the range and the limits of velocity, acceleration and jerk. They are
+        /// at rest soon after the last command.
         #[test]
         fn j58_a_jog_keeps_to_every_limit_and_ends_by_itself(
             start in prop::array::uniform6(-1.0..1.0f64),
@@ -281,18 +281,18 @@ mod tests {
                 let ramps = was_ramping || jog.clock.ramping();
                 for j in 0..JOINTS {
                     let (limits, (low, high)) = (&config.joints[j], config.position_range(j));
-                    // On its way to rest it is stopped as on a path.
+                    // While the jog comes to rest, it may brake as hard as a path.
                     let most = if ramps { limits.acceleration_max } else { ACCELERATION * limits.acceleration_max };
                     assert!((low..=high).contains(&position[j]), "joint {}: {}", j + 1, position[j]);
                     assert!(v[j].abs() <= limits.velocity_max && a[j].abs() <= most + 1e-9);
                     let at_end = position[j] == low || position[j] == high;
-                    // The velocity that remains at the very end of the range is almost zero.
+                    // The velocity that remains at the end of the range is almost zero.
                     let step = (v[j] - last.0[j]).abs();
                     assert!(step <= most * DT + 1e-9 || (at_end && step < 0.005), "{} {}", v[j], last.0[j]);
                     let jerk = (a[j] - last.1[j]).abs();
                     assert!(ramps || jerk <= 2.0 * most / RISE_S * DT + 1e-9 || v[j] == 0.0 || a[j] == 0.0);
                     let way = 0.5 * (v[j] + last.0[j]) * DT;
-                    // While the clock ramps, its rate is taken for even within a tick.
+                    // While the clock ramps, its rate is assumed to be constant within a tick.
                     let precise = if ramps { 1e-7 } else { 1e-12 };
                     assert!((position[j] - before[j] - way).abs() < precise || at_end, "{way}");
                 }
@@ -318,7 +318,7 @@ mod tests {
         }
     }
 
-    /// Limits as they are imported from UR5 and Z1, in wide ranges.
+    /// Limits as imported from the UR5 and Z1 models, in wide ranges.
     fn arms() -> [Config; 3] {
         let avena = config();
         let with = |velocity: [f64; JOINTS], acceleration: f64| {
@@ -337,25 +337,25 @@ mod tests {
         [avena, with([3.15, 3.15, 3.15, 3.2, 3.2, 3.2], 20.0), with([3.1415; JOINTS], 15.0)]
     }
 
-    /// Event that ends a jog, or changes it.
+    /// Event that ends or changes a jog.
     #[derive(Clone, Copy, Debug)]
     enum End {
-        /// No further Jog comes.
+        /// No further Jog arrives.
         Silence,
         /// A Stop or a Pause.
         Stop,
-        /// A Jog of another rate, as a share of the velocity limit.
+        /// A Jog with another velocity, as a share of the velocity limit.
         Rate(f64),
     }
 
-    /// Ticks after the end of a jog: silence counts from [`LASTS_MS`] on, and then the acceleration takes [`RISE_S`] to get to zero.
+    /// Ticks after the end of a jog: silence is noticed after [`LASTS_MS`], and then the acceleration takes [`RISE_S`] to reach zero.
     const AFTER: u16 = LASTS_MS + 120;
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
 
-        /// A joint that is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when that ends: the set
-        /// velocity keeps to the limit, and no limit of J-43 is found, whichever tick it ends in.
+        /// A joint is jogged at its velocity limit, or up to a thousandth below it, and still accelerates when the jog ends. In whichever
+        /// tick that is, the set velocity stays within the limit, and no limit of J-43 is violated.
         #[test]
         fn j58_the_set_velocity_never_exceeds_its_limit_whenever_a_jog_ends(
             arm in 0..3usize,
@@ -444,7 +444,7 @@ mod tests {
         }
     }
 
-    /// Ticks from the end of a jog until it rests, and the way of joint 1 meanwhile (rad).
+    /// Returns the ticks from the end of a jog until it is at rest, and the distance of joint 1 in this time (rad).
     fn stop(mut jog: Jog, mut position: [f64; JOINTS], config: &Config, end: End) -> (u16, f64) {
         let begin = position[0];
         match end {
@@ -474,7 +474,8 @@ mod tests {
                     tick(&mut jog, &mut position, &config);
                     position[0] = position[0].min(0.0);
                 }
-                // A path stops from this speed in the time of the ramp, on half of the way; a fast joint by its acceleration limit.
+                // A path stops from this speed within the time of the ramp, after half of the distance; a fast joint stops with its
+                // acceleration limit.
                 let hard = config.joints[0].acceleration_max;
                 let longest = 20 + config.ramp_ms.max((1_600.0 * share * fastest / hard) as u16);
                 for (end, wait) in [(End::Stop, 0), (End::Rate(0.0), 0), (End::Silence, LASTS_MS)] {
@@ -487,8 +488,8 @@ mod tests {
         }
     }
 
-    /// A key that is pressed before the arm stands, the same, the opposite one or another: first the arm comes to rest, and no joint gets
-    /// faster on the way. A joint that moves then keeps to the acceleration of a jog.
+    /// A key is pressed before the arm is at rest: the same key, the opposite one or another. The arm comes to rest first, and no joint
+    /// becomes faster meanwhile. A joint that moves afterwards keeps to the acceleration of a jog.
     #[test]
     fn j58_a_jog_that_is_commanded_on_the_way_to_rest_begins_when_the_arm_stands() {
         let then = [[1.0, 0.0], [-0.4, 0.0], [0.0, 1.0]];

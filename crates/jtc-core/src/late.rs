@@ -1,9 +1,9 @@
-//! Late and missing ticks (J-12): a few are tolerated; ten within a second are a failure of the device.
+//! Late and missing ticks (J-12). A few are tolerated; ten within a second are a failure of the device.
 use crate::remembered::remembered;
 
-/// Number of late ticks that are a failure.
+/// Number of late ticks that is a failure.
 const COUNT: usize = 10;
-/// Window for these ticks, ms: they must come within less than this.
+/// Window in which these ticks are a failure, ms.
 const WINDOW_MS: u64 = 1_000;
 
 /// Times of the last late or missing ticks.
@@ -24,7 +24,7 @@ impl Default for LateTicks {
 }
 
 impl LateTicks {
-    /// Counts one tick, before which `missed` ticks did not come or came late. Returns `true` if there have been too many.
+    /// Records one tick, before which `missed` ticks were missing or late. Returns `true` if there have been too many.
     pub fn count(&mut self, missed: u16) -> bool {
         self.now_ms += 1 + u64::from(missed);
         let mut too_many = false;
@@ -33,7 +33,7 @@ impl LateTicks {
                 *slot = self.now_ms;
             }
             self.next = (self.next + 1) % COUNT;
-            // This slot now has the oldest of the last ten.
+            // This slot now holds the oldest of the last ten times.
             too_many |= self.at_ms.get(self.next).is_some_and(|oldest| self.now_ms - oldest < WINDOW_MS);
         }
         too_many
@@ -44,7 +44,7 @@ impl LateTicks {
 mod tests {
     use super::*;
 
-    /// Returns the tick in which the late ticks are too many, if every `n`-th tick comes after `missed` missing ones.
+    /// Returns the tick in which there are too many late ticks, if every `n`-th tick comes after `missed` missing ones.
     fn until_too_many(n: u32, missed: u16) -> Option<u32> {
         let mut late = LateTicks::default();
         (1..20_000).find(|tick| late.count(if tick % n == 0 { missed } else { 0 }))
@@ -58,7 +58,7 @@ mod tests {
         // A late tick every 112 ms: the first and the tenth are 1008 ms apart.
         assert_eq!(until_too_many(111, 1), None);
         assert_eq!(until_too_many(109, 1), Some(1090));
-        // Several at once count each.
+        // Each of several ticks that are missing at once is counted.
         assert_eq!(until_too_many(50, 5), Some(100));
         assert_eq!(until_too_many(1_500, 9), None);
         assert_eq!(until_too_many(1_500, 10), Some(1_500));
@@ -67,7 +67,7 @@ mod tests {
 
     #[test]
     fn j12_ten_late_ticks_in_exactly_a_second_are_borne() {
-        // From the first to the ninth 16 ms; the last of these many and the tenth 2 ms apart.
+        // The first to the ninth tick take 16 ms; the last two of them are 2 ms apart.
         for (between, too_many) in [(981, true), (982, false)] {
             let mut late = LateTicks::default();
             assert!(!(0..9).any(|_| late.count(1)));

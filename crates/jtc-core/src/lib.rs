@@ -67,13 +67,13 @@ pub use telemetry::{JointTelemetry, Telemetry};
 
 /// Joints of the arm.
 pub const JOINTS: usize = 6;
-/// Joints and gripper.
+/// Joints and the gripper.
 pub const NODES: usize = 7;
 /// Points that the trajectory store holds (J-30).
 pub const POINTS_MAX: usize = 12_000;
-/// Segments of a trajectory (J-30).
+/// Highest number of segments of a trajectory (J-30).
 pub const SEGMENTS_MAX: usize = 100;
-/// Points of a segment (J-30).
+/// Highest number of points of a segment (J-30).
 pub const SEGMENT_POINTS_MAX: usize = 1_500;
 
 /// Length of a tick, s.

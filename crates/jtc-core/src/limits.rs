@@ -16,28 +16,28 @@ pub struct JointConfig {
     pub acceleration_max: f64,
     /// Highest torque at the joint, N·m.
     pub torque_max: f64,
-    /// Largest difference of commanded and measured position, rad.
+    /// Largest difference between the commanded and the measured position, rad.
     pub position_error_max: f64,
     /// Reflected inertia of the drive's rotor, kg·m² at the joint (J-40).
     pub rotor_inertia: f64,
-    /// Torque that is requested from the drive, as a multiple of the wanted torque at the joint (J-61). Drives that deliver less than the
-    /// requested torque need more than 1.
+    /// Torque that is requested from the drive, as a multiple of the commanded torque at the joint (J-61). Drives that deliver less torque
+    /// than requested need a value above 1.
     pub torque_gain: f64,
-    /// Damping in Teaching, N·m·s/rad (J-25); less if the joint is too light for it.
+    /// Damping in Teaching, N·m·s/rad (J-25). It is reduced if the joint is too light for it.
     pub teach_damping: f64,
 }
 
-/// Rotor inertia of a drive for which none is configured, kg·m²: that of the known drives.
+/// Rotor inertia of a drive for which none is configured, kg·m²: the value of the known drives.
 const UNKNOWN_ROTOR: f64 = 0.7;
 
 impl JointConfig {
-    /// Returns the rotor inertia that counts, kg·m²: a drive also has a rotor if the configuration has no value for it.
+    /// Returns the rotor inertia to compute with, kg·m². A drive also has a rotor if no value is configured.
     pub fn counted_rotor(&self) -> f64 {
         if self.rotor_inertia > 0.0 { self.rotor_inertia } else { UNKNOWN_ROTOR }
     }
 }
 
-/// Number of the last ticks that count.
+/// Number of ticks in the window.
 const WINDOW: u16 = 100;
 
 /// Ticks with a property among the last [`WINDOW`] ticks.
@@ -51,7 +51,8 @@ pub(crate) struct Recent {
 remembered!(Recent { history, count });
 
 impl Recent {
-    /// Counts a tick. Returns `true` if it `has` the property, and more than `most` of the last 100 ticks have it.
+    /// Adds a tick to the window. `has`: the tick has the property. Returns `true` if it has, and more than `most` of the last 100 ticks
+    /// have it.
     #[inline]
     pub fn exceeds(&mut self, has: bool, most: u16) -> bool {
         if has | (self.count > 0) {
@@ -68,10 +69,10 @@ impl Recent {
     }
 }
 
-/// State of a joint's torque at its limit, and the recent ticks with that.
+/// State of a joint's torque at its limit, with the recent ticks at the limit.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Saturation {
-    /// The last torque was beyond the limit: the integral is held (J-41).
+    /// The last torque was above the limit, so the integral does not change (J-41).
     pub saturated: bool,
     over: Recent,
 }
@@ -79,9 +80,9 @@ pub(crate) struct Saturation {
 remembered!(Saturation { saturated, over });
 
 impl Saturation {
-    /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: computed torques were beyond the limit in
-    /// more than `over_ms_max` of the last 100 ticks, with either sign. For NaN no torque is commanded. While the arm is `braking` with all
-    /// available torque (J-33), ticks are not counted.
+    /// Returns the torque to command, within its limit, and `true` if the joint is overloaded: the computed torque was above the limit,
+    /// with either sign, in more than `over_ms_max` of the last 100 ticks. For NaN no torque is commanded. While the arm is `braking` with
+    /// all available torque (J-33), ticks are not counted.
     pub fn limit(
         &mut self,
         torque: f64,
@@ -90,7 +91,7 @@ impl Saturation {
         braking: bool,
     ) -> (f64, bool) {
         let limit = limits.torque_max;
-        // Written so that NaN is beyond.
+        // With this comparison NaN is above the limit.
         let within = torque.abs() <= limit;
         self.saturated = !within;
         let overloaded = self.over.exceeds(self.saturated & !braking, over_ms_max);
@@ -104,24 +105,25 @@ impl Saturation {
     }
 }
 
-/// Time within which torques at both limits, twice each, are those of an unstable loop, ticks.
+/// Time within which a torque that reaches both limits, twice each, shows an unstable loop, ticks.
 const TURNS_MS: u32 = 200;
 
 /// Changes of a joint's torque from one limit to the other.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Turns {
-    /// Ticks in which the torque came to a limit from the other one: the last three, oldest first.
+    /// Ticks in which the torque reached one limit after the other: the last three, oldest first.
     at: [u32; 3],
-    /// Number of such ticks, three at most.
+    /// Number of entries in `at`, three at most.
     count: u8,
-    /// The last of them was at the upper limit.
+    /// In the last of these ticks the torque was at the upper limit.
     upper: bool,
 }
 
 remembered!(Turns { at, count, upper });
 
 impl Turns {
-    /// Takes a tick in which the torque is at a limit. Returns `true` if it has been at both limits, twice each, within [`TURNS_MS`].
+    /// Records a tick in which the torque is at a limit. Returns `true` if the torque has been at both limits, twice each, within
+    /// [`TURNS_MS`].
     pub fn hits(&mut self, upper: bool, tick: u32) -> bool {
         if self.count > 0 && self.upper == upper {
             return false;
@@ -134,12 +136,12 @@ impl Turns {
     }
 }
 
-/// Returns set values (position, velocity, acceleration) outside the limits, or a position `error` (rad, J-62), as joint errors. The
-/// position limit holds for positions that were `commanded`: an arm that is found beyond it is held at its position, because otherwise it
-/// could never be moved back. Rounding on the way between two points that the check of J-36 has passed is not an error.
+/// Returns a joint error for each set value (position, velocity, acceleration) outside its limits, and for a position `error` (rad, J-62)
+/// above its limit. The position limit applies only to `commanded` positions: an arm that is already outside is held at its position,
+/// because otherwise it could never be moved back. Rounding between two points that have passed the check of J-36 is not an error.
 pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, commanded: bool) -> u16 {
     let (position, velocity, acceleration) = set;
-    // Written so that NaN is outside.
+    // With these comparisons NaN is outside.
     let (low, high) = (limits.position_min - ROUNDING, limits.position_max + ROUNDING);
     let inside = (position >= low) & (position <= high);
     bit(inside | !commanded, joint_error::POSITION)
@@ -210,7 +212,7 @@ mod tests {
             assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, false));
             assert!(saturation.saturated);
         }
-        // A tick within the limit does not count, but does not restart the time.
+        // A tick within the limit is not counted, but does not restart the window.
         assert_eq!(saturation.limit(1.0, &l, 3, false), (1.0, false));
         assert!(!saturation.saturated);
         assert_eq!(saturation.limit(-INF, &l, 3, false), (-l.torque_max, true));
@@ -221,7 +223,7 @@ mod tests {
 
     #[test]
     fn j43_torque_at_its_limit_counts_within_any_100_ms_whichever_sign() {
-        // Ten in 100 ms are allowed, in any pattern and for ever; eleven are not.
+        // Ten ticks in 100 ms are allowed, in any pattern and for ever; eleven are not.
         for (period, allowed) in [(10, true), (9, false)] {
             let (l, mut saturation) = (limits(), Saturation::default());
             let mut good = true;
@@ -231,7 +233,7 @@ mod tests {
             }
             assert_eq!(good, allowed, "one tick of {period}");
         }
-        // In one go, then a pause.
+        // Ten ticks in succession, then a pause.
         let (l, mut saturation) = (limits(), Saturation::default());
         for k in 0..1_000 {
             let torque = if k % 100 < 10 { INF } else { 0.0 };
@@ -247,14 +249,14 @@ mod tests {
             assert!(saturation.saturated);
         }
         assert_eq!(saturation.limit(f64::NAN, &l, 10, true), (0.0, false));
-        // Ticks at the limit while braking do not count later.
+        // Ticks at the limit while braking are not counted later.
         for _ in 0..10 {
             assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, false));
         }
         assert_eq!(saturation.limit(INF, &l, 10, false), (l.torque_max, true));
     }
 
-    /// In ticks of these numbers the torque is at its upper (true) or its lower limit.
+    /// The torque is at its upper (`true`) or lower limit in the ticks with these numbers.
     #[test]
     fn j66_a_torque_that_was_at_both_limits_twice_each_within_200_ms_is_unstable() {
         let seen = |hits: &[(u32, bool)]| {
@@ -276,13 +278,13 @@ mod tests {
                 let commanded = saturation.limit(torque, &l, 10, false).0;
                 prop_assert!(commanded.abs() <= l.torque_max);
                 prop_assert!(commanded == torque || commanded == 0.0 || commanded.abs() == l.torque_max);
-                // Never against the computed torque: compared by sign, because 0·∞ is not a number.
+                // The commanded torque never opposes the computed torque. The signs are compared, because 0·∞ is NaN.
                 prop_assert!(torque.is_nan() || commanded == 0.0 || (commanded > 0.0) == (torque > 0.0));
             }
         }
     }
 
-    /// A value that the check of J-36 has passed, and rounding has moved as far as it may, is not an error in motion.
+    /// A value that has passed the check of J-36 is not an error in motion, even if rounding has changed it by the highest amount.
     #[test]
     fn j36_j43_what_rounding_may_add_is_no_error() {
         let l = limits();

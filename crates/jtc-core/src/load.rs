@@ -1,4 +1,4 @@
-//! The load that a joint carries and that the model lacks, as the integral of the position controller has found it.
+//! The load that a joint carries and that the model lacks. It is learned from the integral of the position controller.
 use crate::DT;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
@@ -9,21 +9,22 @@ const PERIOD: f64 = crate::JOINTS as f64;
 const TIME_S: f64 = 1.0;
 /// Highest load, as a share of the torque limit.
 const HIGHEST: f64 = 0.3;
-/// Difference of integral and load, as a share of the torque limit, beyond which it counts as a contact and the load does not change.
+/// Difference of integral and load, as a share of the torque limit. Above it the difference is attributed to a contact, and the load does
+/// not change.
 const APART: f64 = 0.1;
-/// Change of the integral, as a share of the torque limit, up to which the joint is held steadily.
+/// Change of the integral, as a share of the torque limit, up to which the joint is considered held steadily.
 const STEADY: f64 = 0.03;
-/// Time of steady holding after which the integral counts as the load, s.
+/// Time of steady holding after which the integral is taken as the load, s.
 const STEADY_S: f64 = 10.0;
 
 /// The load of a joint.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
-    /// N·m. Single precision, because the flight recorder keeps it.
+    /// Torque of the load, N·m. Single precision, because the flight recorder stores it.
     torque: f32,
     /// The joint has settled since it was enabled, or since its load was cleared.
     known: bool,
-    /// Integral at the beginning of steady holding, N·m, and observations since.
+    /// Integral at the beginning of steady holding, N·m, and number of observations since.
     steady: f32,
     observations: u16,
 }
@@ -31,12 +32,12 @@ pub(crate) struct Load {
 remembered!(Load { torque, known, steady, observations });
 
 impl Load {
-    /// Clears the load: the joint must find it again.
+    /// Clears the load, so that the joint must find it again.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// Returns the load, N·m; before the load is known, the torque that the `integral` (N·m) has found.
+    /// Returns the load, N·m. Before the load is known, returns the torque of the `integral` (N·m).
     pub fn torque(&self, integral: f64) -> f64 {
         if self.known { self.torque.into() } else { integral }
     }
@@ -46,7 +47,7 @@ impl Load {
         self.torque.into()
     }
 
-    /// Returns the part of a torque (N·m) that counts as a load without being observed.
+    /// Returns the part of a torque (N·m) that is accepted as a load without being observed.
     pub fn bounded(torque: f64, limits: &JointConfig) -> f64 {
         let highest = HIGHEST * limits.torque_max;
         torque.max(-highest).min(highest)
@@ -57,12 +58,13 @@ impl Load {
         self.known
     }
 
-    /// Sets a load that was found in another way: a load that was lowered has become this torque, N·m.
+    /// Sets a load that was found in another way, N·m: a load that was lowered has this torque now.
     pub fn set(&mut self, torque: f64) {
         *self = Self { torque: torque as f32, known: true, ..Self::default() };
     }
 
-    /// Observes the torque of the `integral` (N·m) of a joint that has `settled` since it was enabled; once in [`PERIOD`] ticks.
+    /// Observes the torque of the `integral` (N·m). `settled`: the joint has settled since it was enabled. Call this once in [`PERIOD`]
+    /// ticks.
     pub fn observe(&mut self, integral: f64, settled: bool, limits: &JointConfig) {
         if !settled {
             self.forget();
@@ -89,7 +91,7 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// A joint of 180 N·m.
+    /// A joint with a torque limit of 180 N·m.
     fn limits() -> JointConfig {
         Config::avena().joints[1]
     }
@@ -117,12 +119,12 @@ mod tests {
     fn j66_the_load_follows_the_integral_within_a_second_and_no_contact() {
         let mut load = Load::default();
         observe(&mut load, 10.0, 0.1);
-        // Within a tenth of the limit: 63 % of the way in a second.
+        // A difference within a tenth of the limit: the load reaches 63 % of it in a second.
         observe(&mut load, 20.0, 1.0);
         assert!((load.torque(0.0) - 16.3).abs() < 0.1, "{}", load.torque(0.0));
         observe(&mut load, 16.3, 5.0);
         let known = load.torque(0.0);
-        // Further away it is a contact, until it has been steady for ten seconds.
+        // A larger difference is a contact, until it has been steady for ten seconds.
         observe(&mut load, 40.0, 9.9);
         assert_eq!(load.torque(0.0), known);
         observe(&mut load, 40.0, 0.2);
@@ -139,7 +141,7 @@ mod tests {
         assert_eq!(load.torque(0.0), 0.0);
     }
 
-    /// A load that was lowered has been found to be more than the bound; it does not jump back.
+    /// A load that was lowered may be above the bound. It does not jump back to the bound.
     #[test]
     fn j70_a_load_that_was_lowered_is_kept() {
         let mut load = Load::default();

@@ -1,7 +1,7 @@
 //! The motion of the arm (J-40 to J-44): set values, the control law, its limits.
 //!
-//! Each part has its state and one step a tick; [`Motion`] connects them, and does to all of them what a change of the
-//! controller's state requires.
+//! Each part has its own state and runs one step per tick. [`Motion`] connects the parts, and applies a change of the controller's state to
+//! all of them.
 mod law;
 mod limiter;
 mod ramp;
@@ -36,10 +36,10 @@ pub(crate) use torque::JointTorque;
 #[cfg(test)]
 pub(crate) type Ramp = PathRamp;
 
-/// Time in which joints that are not pressed find what they carry, ms.
+/// Time in which joints without a contact find their loads, ms.
 const KNOWN_MS: u32 = 2_000;
 
-/// The parts of the motion.
+/// State of all parts of the motion.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Motion {
     pub set: SetValues,
@@ -53,7 +53,7 @@ pub(crate) struct Motion {
 remembered!(Motion { set, law, limiter, over_speed, ramp, hold_back });
 
 impl Motion {
-    /// Turns torque off: no joint is held, and no torque is remembered. Each part is reset in place, so that it is not built on the stack
+    /// Turns the torque off: no joint is held, and no torque is stored. Each part is reset in place, so that it is not built on the stack
     /// and copied.
     pub fn release(&mut self, nodes: &Nodes) {
         let Self { set, law, limiter, over_speed, ramp, hold_back } = self;
@@ -65,7 +65,7 @@ impl Motion {
         *hold_back = HoldBack::default();
     }
 
-    /// Begins the yield of joints from the next tick on (J-68), and of joints that lower their loads (J-70). The ramp has their inertia.
+    /// Makes joints yield from the next tick on (J-68), and other joints lower their loads (J-70). The inertia is taken from the ramp.
     pub fn begin_yields(&mut self, yields: &[bool; JOINTS], lowers: &[bool; JOINTS], config: &Config) {
         let inertia = self.ramp.inertia();
         for j in 0..JOINTS {
@@ -89,15 +89,15 @@ impl Motion {
         (0..JOINTS).all(|j| config.absent[j] || (self.set.catch[j].settled() && !self.law.yields(j)))
     }
 
-    /// Returns the joints at their torque limits, and the joints with position errors above half of their maximum.
+    /// Returns, for each joint, whether it is at its torque limit, and whether its position error is above half of the maximum.
     pub fn presses(&self, nodes: &Nodes, config: &Config) -> ([bool; JOINTS], [bool; JOINTS]) {
         let (due, q) = (self.set.due(config), nodes.positions());
         let lags = |j: usize| (due[j] - q[j]).abs() > 0.5 * config.joints[j].position_error_max;
         (self.limiter.saturated(), core::array::from_fn(|j| !self.law.yields(j) && lags(j)))
     }
 
-    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may be against the arm and is not
-    /// waited for; after [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the loads are not waited for either.
+    /// Returns `true` if the arm is held at rest and its loads are known. In a held stop a `contact` may press on the arm; its pressure is
+    /// not waited for. After [`KNOWN_MS`] of waiting in a held stop (`waits_ms`), the loads are not waited for either.
     pub fn may_be_taught(&self, config: &Config, contact: bool, waits_ms: u32) -> bool {
         let overdue = contact && waits_ms >= KNOWN_MS;
         self.set.all_holding()
@@ -105,15 +105,15 @@ impl Motion {
             && (overdue || self.law.knows_loads(&self.set.holding, config, contact))
     }
 
-    /// Runs a tick of Teaching: keeps the inertia for a ramp ready, because Teaching may end in the middle of a motion.
+    /// Runs one tick of Teaching. Keeps the inertia for a ramp up to date, because Teaching may end in the middle of a motion.
     pub fn keep_ramp(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         if self.law.taught.as_ref().is_some_and(Taught::is_turn_of_ramp) {
             self.ramp.begin(nodes, config, dynamics);
         }
     }
 
-    /// Ends Teaching: the arm comes to rest and is held there, and the integral takes over the load that Teaching carried. Moving joints
-    /// stop within `ramp_ms`, or later, up to `stop_ms`, if the torque limits require it (J-33).
+    /// Ends Teaching. The arm comes to rest and is held there, and the integral takes over the load that Teaching carried. Moving joints
+    /// stop within `ramp_ms`. If the torque limits require it, they take longer, up to `stop_ms` (J-33).
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let mut length_ms = f64::from(config.ramp_ms);
         if nodes.velocities().iter().any(|v| moves(*v)) {
@@ -131,7 +131,7 @@ impl Motion {
         self.law.latch(&latched);
     }
 
-    /// Runs a tick of HoldPos: steps the held position, or the jog.
+    /// Runs one tick of HoldPos: the position hold or the jog.
     pub fn hold(&mut self, config: &Config) {
         let Self { set, law, ramp, .. } = self;
         if set.jogging() {
@@ -141,7 +141,7 @@ impl Motion {
         }
     }
 
-    /// Runs a tick on the path or of the approach. `at` holds the full-speed values at the time of its clock (J-33).
+    /// Runs one tick on the path or of the approach. `at` holds the values for full speed at the time of the clock (J-33).
     pub fn follow(&mut self, at: &SetPoint, clock: &mut PathClock, config: &Config) {
         if self.hold_back.is_active() && !clock.halting() && !clock.above_pace() {
             self.ramp.hold_back(at, &self.law, clock, config);
@@ -151,8 +151,8 @@ impl Motion {
         self.set.follow(at, clock.rate, clock.slope);
     }
 
-    /// Runs a tick of the control law and of its limits. Returns the torques to command and the findings of the limits.
-    // A single function for the work of every tick: calls inside it would copy the torques back and forth.
+    /// Runs one tick of the control law and of its limits. Returns the torques to command and the violations of the limits.
+    // A single function does the work of every tick: calls inside it would copy the torques back and forth.
     #[inline(never)]
     pub fn control(&mut self, inputs: &LawInputs<'_>) -> Limited {
         let positions = inputs.nodes.positions();

@@ -1,13 +1,13 @@
-//! Measured over-speed of a joint under torque (J-35), which no check of the commanded values can see.
+//! Measured over-speed of a joint under torque (J-35), which no check of commanded values can detect.
 use crate::config::Config;
 use crate::nodes::Nodes;
 use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
-/// Time for which each joint has been too fast.
+/// Time for which each joint has been above its threshold.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OverSpeed {
-    /// Consecutive measurements above the threshold.
+    /// Consecutive measurements above the threshold, per joint.
     ticks: [u16; JOINTS],
 }
 
@@ -15,10 +15,10 @@ remembered!(OverSpeed { ticks });
 
 impl OverSpeed {
     /// Returns the joint errors of this tick: joints whose measured speed has been above [`Config::overspeed_factor`] times their limit for
-    /// [`Config::overspeed_ms`]. Only measurements that came in this tick count: an answer that is missing or was not accepted neither adds
-    /// to the time nor ends it. Joints that are not enabled have no torque to be taken away.
+    /// [`Config::overspeed_ms`]. Only measurements that came in this tick are evaluated: a missing or unusable answer neither adds to the
+    /// time nor ends it. Joints that are not enabled have no torque that could be taken away.
     pub fn watch(&mut self, nodes: &Nodes, config: &Config) -> [u16; JOINTS] {
-        // The velocity that the joint answered, not the one used in place of missing answers. Written so that NaN is too fast.
+        // Uses the velocity in the joint's answer, not a predicted one. NaN is above the threshold.
         let within = |j: usize| {
             let threshold = config.overspeed_factor * config.joints[j].velocity_max;
             nodes.node(j).report.velocity.abs() <= threshold
@@ -50,7 +50,7 @@ impl OverSpeed {
 mod tests {
     use super::*;
 
-    /// Returns `true` if every joint is too fast after this number of measurements of this multiple of its threshold.
+    /// Returns `true` if every joint has an error after this number of measurements at this multiple of its threshold.
     fn found(measurements: u16, times: f64, config: &Config) -> bool {
         let threshold = config.joints.map(|joint| config.overspeed_factor * joint.velocity_max);
         let nodes = Nodes::enabled_at([0.0; JOINTS], threshold.map(|threshold| times * threshold));
@@ -78,7 +78,7 @@ mod tests {
         }
     }
 
-    /// An over-speed that may not last is an error at once, but a joint that is slow has none.
+    /// If no time is allowed, an over-speed is an error at once, but a slow joint has no error.
     #[test]
     fn j35_no_time_at_all_is_a_setting_too() {
         let config = Config { overspeed_ms: 0, ..Config::avena() };

@@ -1,4 +1,4 @@
-//! Parameters that the host sends besides commands: model, gains and friction.
+//! Parameters that the host sends in addition to commands: model, gains and friction.
 use jtc_dynamics::ArmModel;
 
 use crate::JOINTS;
@@ -6,11 +6,11 @@ use crate::JOINTS;
 /// Gains of one joint (J-41).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PidGains {
-    /// N·m/rad.
+    /// Gain of the position error, N·m/rad.
     pub kp: f64,
-    /// N·m/(rad·s).
+    /// Gain of the integral of the error, N·m/(rad·s).
     pub ki: f64,
-    /// N·m·s/rad.
+    /// Gain of the derivative of the error, N·m·s/rad.
     pub kd: f64,
     /// Lower bound of the integral of the error, rad·s.
     pub int_min: f64,
@@ -21,11 +21,11 @@ pub struct PidGains {
 /// Friction table of one joint: rows are velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TableOf<T> {
-    /// rad/s, strictly increasing.
+    /// Velocities, rad/s, strictly increasing.
     pub velocity: [T; 20],
-    /// °C, strictly increasing.
+    /// Temperatures, °C, strictly increasing.
     pub temperature: [T; 20],
-    /// N·m, `[velocity][temperature]`.
+    /// Torques, N·m, `[velocity][temperature]`.
     pub torque: [[T; 20]; 20],
 }
 
@@ -33,7 +33,7 @@ pub struct TableOf<T> {
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)]
 pub enum Friction {
-    /// c0..c5 per joint, ascending; c4 = 0 means no temperature factor.
+    /// Coefficients c0..c5 of each joint, ascending. c4 = 0 means that there is no temperature factor.
     Polynomial([[f64; 6]; JOINTS]),
     /// A table for each joint.
     Table([TableOf<f32>; JOINTS]),
@@ -44,7 +44,7 @@ pub enum Friction {
 pub struct Parameters {
     /// Kinematics and masses.
     pub model: ArmModel,
-    /// Per joint.
+    /// Gains of each joint.
     pub pid: [PidGains; JOINTS],
     /// Friction compensation.
     pub friction: Friction,

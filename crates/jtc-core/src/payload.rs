@@ -1,5 +1,5 @@
-//! The payload on its way into the model (J-60): for half a second the control law computes with an arm between the one with the last
-//! payload and the one with the next, so that neither makes a step in torque.
+//! Blends a new payload into the model (J-60). For half a second the control law computes with an arm between the last payload and the next
+//! one, so that the change makes no step of the torque.
 use jtc_dynamics::{Dynamics, LinkInertias};
 
 use crate::JOINTS;
@@ -13,17 +13,17 @@ pub(crate) const BLEND_MS: u16 = 500;
 pub(crate) struct PayloadBlend {
     from: LinkInertias,
     to: LinkInertias,
-    /// Mass that has not come yet, kg; negative if mass goes.
+    /// Mass that has not been added yet, kg; negative if mass is removed.
     mass: f64,
     left_ms: u16,
 }
 
-/// State of the blend: its other end is the arm with its payload.
+/// State of the blend. It ends at the arm with its configured payload.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BlendState {
     left_ms: u16,
     mass: f64,
-    /// Numbers of the arm at the beginning of the blend, unless the blend has ended.
+    /// Parameters of the arm at the beginning of the blend; `None` if the blend has ended.
     from: Option<[[f64; 7]; JOINTS]>,
 }
 
@@ -39,7 +39,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Goes on from that state, with the dynamics of the arm and all of its payload.
+    /// Continues from that state, with the dynamics of the arm with its whole payload.
     pub fn restore(&mut self, state: &BlendState, dynamics: &mut Dynamics) {
         *self = Self::none(dynamics);
         if let Some(from) = &state.from {
@@ -49,7 +49,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Returns the arm at the present place of the blend.
+    /// Returns the arm at the present stage of the blend.
     fn between(&self) -> LinkInertias {
         self.from.toward(&self.to, 1.0 - f64::from(self.left_ms) * (1.0 / BLEND_MS as f64))
     }
@@ -60,8 +60,8 @@ impl PayloadBlend {
         Self { from: now, to: now, mass: 0.0, left_ms: 0 }
     }
 
-    /// Begins a blend from the arm `now`, which may be in a blend itself, to the arm with the `next` payload, which is `heavier` than the
-    /// last by this mass (kg).
+    /// Begins a blend from the arm `now`, which may be in a blend itself, to the arm with the `next` payload. `heavier`: mass of the next
+    /// payload minus mass of the last one, kg.
     pub fn begin(&mut self, now: &Dynamics, next: &Dynamics, heavier: f64) {
         let mass = self.mass + heavier;
         *self = Self { from: now.inertias(), to: next.inertias(), mass, left_ms: BLEND_MS };
@@ -72,7 +72,7 @@ impl PayloadBlend {
         (self.left_ms, self.mass) = (0, 0.0);
     }
 
-    /// Returns the mass that comes with the next tick of the blend, kg.
+    /// Returns the mass that the next tick of the blend adds, kg.
     pub fn next_mass(&self) -> f64 {
         self.mass / f64::from(self.left_ms.max(1))
     }
@@ -95,7 +95,7 @@ impl PayloadBlend {
         }
     }
 
-    /// Ends the blend at once, while the arm is not held by it.
+    /// Ends the blend at once, while the arm is not held.
     pub fn end(&mut self, dynamics: &mut Dynamics) {
         self.mass = 0.0;
         if core::mem::take(&mut self.left_ms) > 0 {
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
     use crate::{Config, Parameters};
 
-    /// Also if one payload follows another during the blend.
+    /// This is also true if another payload follows during the blend.
     #[test]
     fn j60_as_much_mass_comes_as_is_given() {
         let mut dynamics = Dynamics::new(&Parameters::avena().model, Config::avena().gravity);

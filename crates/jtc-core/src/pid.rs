@@ -8,9 +8,9 @@ const WINDOW: usize = 5;
 /// Inverse of the length of the window, 1/s.
 const RATE: f64 = 1.0 / (WINDOW as f64 * DT);
 
-/// Encoder steps of error at rest beyond which a held integral acts again: a joint that slips settles within that many.
+/// Position error at rest, in encoder steps, above which the integral acts again. A joint that slips settles within this distance.
 const RELEASE_STEPS: f64 = 4.0;
-/// Part of an encoder step that positions may be off by, being rounded on the bus.
+/// Error of positions that the bus rounds, in encoder steps.
 const ROUNDING: f64 = 0.01;
 
 /// The state of the controller.
@@ -20,18 +20,18 @@ pub struct Pid {
     integral: f64,
     /// The last errors, rad, oldest first.
     errors: [f64; WINDOW],
-    /// At rest and so near to the commanded position that the integral is held.
+    /// The joint is at rest and close to its commanded position, so the integral does not change.
     settled: bool,
 }
 
 /// The three parts of the torque, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PidTorque {
-    /// Kp·e.
+    /// Torque of the error, Kp·e.
     pub p: f64,
-    /// Ki·∫e.
+    /// Torque of the integral, Ki·∫e.
     pub i: f64,
-    /// Kd·ė.
+    /// Torque of the derivative, Kd·ė.
     pub d: f64,
 }
 
@@ -46,36 +46,36 @@ impl PidTorque {
 }
 
 impl Pid {
-    /// Resets the state; `error` (rad) counts as constant until now, so that the derivative starts at 0.
+    /// Resets the state. `error` (rad) is assumed to have been constant until now, so that the derivative starts at 0.
     pub fn reset(&mut self, error: f64) {
         *self = Self { integral: 0.0, errors: [error; WINDOW], settled: false };
     }
 
-    /// As [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral: bumpless transfer from a state that had
-    /// found it. An integral without gain or at its bounds takes over less.
+    /// Like [`reset`](Self::reset) at an error of 0, with `torque` (N·m) in the integral. This is the bumpless transfer from a state that
+    /// had found this torque. An integral without gain or at its bounds takes over less.
     pub fn take_over(&mut self, gains: &PidGains, torque: f64) {
         self.reset(0.0);
         self.keep(gains, torque);
     }
 
-    /// Puts a `torque` (N·m) into the integral, as far as these gains can hold it.
+    /// Sets the integral to a `torque` (N·m), as far as these gains can hold it.
     pub fn keep(&mut self, gains: &PidGains, torque: f64) {
         let integral = torque / gains.ki;
         self.integral =
             if integral.is_finite() { integral.max(gains.int_min).min(gains.int_max) } else { 0.0 };
     }
 
-    /// Shifts the commanded position by `way` (rad) without a motion: the derivative does not see it.
+    /// Shifts the commanded position by `way` (rad) without an effect on the derivative.
     pub fn shift(&mut self, way: f64) {
         self.errors = self.errors.map(|error| error + way);
     }
 
-    /// Runs one tick with the position error (rad). `saturated`: the torque is at its limit, so the integral is held. `encoder_step` (rad):
-    /// the joint is commanded at rest, and this is the resolution of its encoder; `None` in motion.
+    /// Runs one tick with the position error (rad). `saturated`: the torque is at its limit, so the integral does not change.
+    /// `encoder_step` (rad): resolution of the encoder if the joint is commanded at rest; `None` in motion.
     ///
-    /// At rest the integral is held from the tick in which the error is within one step until it exceeds [`RELEASE_STEPS`]. An integral
-    /// that continues below the resolution of the encoder breaks a joint with stiction away again and again (hunting), and so does an
-    /// integral that restarts at each toggle of the last bit.
+    /// At rest, the integral stops changing when the error is within one step, until the error exceeds [`RELEASE_STEPS`]. An integral that
+    /// continued below the resolution of the encoder would make a joint with stiction break away again and again (hunting). The same is
+    /// true for an integral that restarted at each change of the last bit.
     pub fn step(
         &mut self,
         gains: &PidGains,
@@ -87,7 +87,7 @@ impl Pid {
         self.settled = encoder_step.is_some_and(|step| error.abs() <= settled_within * step);
         let grown = self.integral + error * DT;
         let integral = if saturated || self.settled { self.integral } else { grown };
-        // Also while held: new gains may have brought narrower bounds.
+        // The bounds are also applied while the integral does not change, because new gains may have narrower bounds.
         self.integral = integral.max(gains.int_min).min(gains.int_max);
         let [oldest, a, b, c, d] = self.errors;
         self.errors = [a, b, c, d, error];
@@ -118,12 +118,12 @@ mod tests {
         pid.reset(0.0);
         let slope = 0.3;
         let mut d = 0.0;
-        // Longer than the window: errors older than five ticks are forgotten.
+        // More ticks than the window has: errors older than five ticks have no effect.
         for k in 1..=12 {
             d = pid.step(&GAINS, slope * f64::from(k) * DT, false, None).d;
         }
         assert!((d - GAINS.kd * slope).abs() < 1e-12);
-        // A step is spread over five ticks, none of them larger than Kd·step/(5 ms).
+        // The effect of a step is spread over five ticks. In each of them the torque is at most Kd·step/(5 ms).
         pid.reset(0.0);
         let first = pid.step(&GAINS, 0.01, false, None).d;
         assert!((first - GAINS.kd * 0.01 / 0.005).abs() < 1e-12);
@@ -151,7 +151,7 @@ mod tests {
             }
             pid.integral - before
         };
-        // In motion every error counts, at rest those beyond the resolution of the encoder.
+        // In motion every error changes the integral; at rest only errors above the resolution of the encoder do.
         assert!(run(&mut pid, 0.5, false) > 0.0);
         assert!(run(&mut pid, 2.0, true) > 0.0);
         assert_eq!(run(&mut pid, 1.0, true), 0.0);
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!((taken(GAINS, 24.0), taken(GAINS, -24.0)), (10.0 * 0.003, 10.0 * -0.002));
         let none = PidGains { ki: 0.0, ..wide };
         assert_eq!((taken(none, 24.0), taken(none, 0.0)), (0.0, 0.0));
-        // Nor is there anything for gains that come later.
+        // Gains that come later hold no torque either.
         for torque in [24.0, -24.0, 0.0] {
             let mut pid = Pid::default();
             pid.take_over(&none, torque);
@@ -199,7 +199,7 @@ mod tests {
         }
     }
 
-    /// Other gains hold the same torque, as far as their integral can, and see the same motion.
+    /// Other gains hold the same torque, as far as their integral can. The derivative is not affected.
     #[test]
     fn j71_the_integral_keeps_its_torque_under_other_gains() {
         let mut pid = Pid::default();

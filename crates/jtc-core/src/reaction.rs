@@ -1,4 +1,4 @@
-//! Reactions of the controller to its findings about a joint while it can still act (J-66), instead of taking the torque away.
+//! Reactions of the controller to findings about a joint while it can still act, instead of taking the torque away (J-66).
 //!
 //! | found | reaction |
 //! |---|---|
@@ -13,8 +13,8 @@
 //! | any other overloaded joint, at rest, or still in motion when a stop has taken its time | it lowers its load |
 //! | a limit of the path | the arm stops on its path, or its jog ends |
 //!
-//! The first row that applies to a joint wins. All but the first end in a held stop (J-69): the arm is held, the cause is shown, and
-//! nothing moves until the host clears it.
+//! The first row that applies to a joint is used. All rows except the first end in a held stop (J-69): the arm is held, the cause is shown,
+//! and nothing moves until the host clears it.
 use jtc_wire::{RawPoint, StopCause, StopKind};
 
 use crate::controller::Controller;
@@ -39,7 +39,8 @@ enum Reaction {
     Stop,
 }
 
-/// Returns the reaction to the findings of a joint, and its cause, also as joint errors. `again`: the joint was unstable a moment ago.
+/// Returns the reaction to the findings of a joint, its cause, and the joint errors of that cause. `again`: the joint was unstable a moment
+/// ago.
 fn reaction(
     found: &Found,
     mode: ControlMode,
@@ -59,7 +60,7 @@ fn reaction(
     } else if overloaded && !settled {
         Some((Reaction::Lower, StopKind::Overload, torque))
     } else if (pushed && !releases) || (overloaded && strained) {
-        // The push shows in the torque of the joint, or only in its speed.
+        // A push appears in the torque of the joint, or only in its speed.
         Some((Reaction::Yield, if strained { StopKind::Push } else { StopKind::Shove }, torque))
     } else if errors & joint_error::POSITION_ERROR != 0 {
         Some((Reaction::Yield, StopKind::PositionError, joint_error::POSITION_ERROR))
@@ -77,9 +78,9 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     pub(crate) fn react(&mut self, mode: ControlMode, found: &[Found; JOINTS]) -> [u16; JOINTS] {
         let (mut release, mut causes, mut first) = ([0; JOINTS], [0; JOINTS], None);
         let (mut yields, mut lowers) = ([false; JOINTS], [false; JOINTS]);
-        // Joints (a bit each) that do not stand their gains, and those of them whose loops are unstable (J-71).
+        // Joints (a bit each) that fail with their gains, and those of them whose loops are unstable (J-71).
         let (mut failed, mut unstable) = (0u8, 0u8);
-        // Counted, so that the compiler sees that the index is one of a joint.
+        // A loop over the index lets the compiler see that it is in range.
         for j in 0..JOINTS {
             let again = self.parameters.trial.again(j);
             // The torque of a joint that yields is bounded by construction.
@@ -115,7 +116,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             self.hold_stop(&causes, kind);
         }
         if yields != lowers {
-            // The begin of a stop has computed the inertia already: one mass matrix in a tick.
+            // If a stop has just begun, the inertia is already computed. A tick has time for one mass matrix.
             if self.braking_ms == before {
                 self.motion.ramp.begin(&self.nodes, &self.config, &self.parameters.dynamics);
             }
@@ -124,14 +125,14 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         release
     }
 
-    /// Uses gains that the controller has chosen: those before a trial that failed, or softer ones (J-66, J-71).
+    /// Uses gains that the controller has chosen: the gains before a trial that failed, or softer ones (J-66, J-71).
     fn use_other_gains(&mut self, gains: &[PidGains; JOINTS]) {
         self.parameters.pid = *gains;
         self.motion.change_gains(gains);
         self.extensions.forget_hash();
     }
 
-    /// Ends a trial when the arm is not held any more. Gains on trial have not held the arm, so it is not enabled again with them.
+    /// Ends a trial when the arm is no longer held. Gains on trial have not held the arm, so it is not enabled again with them.
     pub(crate) fn end_trial(&mut self) {
         let Some(gains) = self.parameters.trial.end() else { return };
         self.parameters.pid = gains;
@@ -139,7 +140,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.keep_cause(StopCause { kind: StopKind::Gains, ..StopCause::default() });
     }
 
-    /// Returns `true` if the controller still reacts: it is too early to clear the cause (J-69).
+    /// Returns `true` if the controller is still reacting, so that the cause must not be cleared yet (J-69).
     pub(crate) fn is_reacting(&self) -> bool {
         let moves = self.trajectory == TrajectoryState::Execute || self.motion.set.jogging();
         self.motion.law.is_yielding() || (self.errors.held_stop() && (moves || self.motion.set.is_led()))
@@ -209,7 +210,7 @@ mod tests {
             let taught = reaction(&found, ControlMode::Teach, false, false);
             assert_eq!(taught, expected.filter(|(reaction, ..)| *reaction == Release), "{found:?}");
             assert_eq!(found.is_any(), expected.is_some(), "{found:?}");
-            // With the reaction of the manual, torque alone releases, and does not count as a push before that.
+            // With the reaction of the manual, the torque alone releases the arm, and is not considered a push before that.
             let released = reaction(&found, mode, true, false);
             if found.overloaded {
                 assert_eq!(released, Some((Release, Overload, torque)), "{found:?}");

@@ -1,4 +1,4 @@
-//! The parameters received from the host: gains, model and friction. Each is accepted completely or not at all (J-06).
+//! Parameters received from the host: gains, model and friction. Each is accepted completely or not at all (J-06).
 mod floats;
 mod frames;
 
@@ -16,39 +16,39 @@ use crate::parameters::{PidGains, TableOf};
 use crate::payload::{BlendState, PayloadBlend};
 use crate::remembered::remembered;
 
-/// Floats of one joint's friction table; a tick checks or copies one joint.
+/// Floats in the friction table of one joint. A tick checks or copies the table of one joint.
 const TABLE_FLOATS: usize = 20 + 20 + 400;
 
 /// Placeholder for a table that was not received; not in use.
 const NO_TABLE: TableOf<f32> =
     TableOf { velocity: [0.0; 20], temperature: [0.0; 20], torque: [[0.0; 20]; 20] };
 
-/// Parameters in use, the defaults if the host has sent none, and a record of those that the host has sent.
+/// Parameters in use (the defaults if the host has sent none), and a record of those that the host has sent.
 #[derive(Clone, Debug)]
 pub(crate) struct ReceivedParameters {
     /// Parameters that were received, one bit each ([`missing_parameter`]).
     received: u8,
-    /// Parameters that were received since the start, also if they were withdrawn since.
+    /// Parameters that were received since the start, even if they have been withdrawn since.
     given: u8,
-    /// Model from which `dynamics` was made.
+    /// Model from which `dynamics` was computed.
     model: ArmModel,
     pub dynamics: Dynamics,
     payload: PayloadBlend,
     pub pid: [PidGains; JOINTS],
-    /// Inertia that the joints feel in the received model, and in a model that is being checked (J-71).
+    /// Inertia that the joints feel in the received model, and in the model that is being checked (J-71).
     felt: FeltInertia,
     looked_at: FeltInertia,
-    /// Gains that were given under torque.
+    /// Trial of gains that were received under torque.
     pub trial: Trial,
     polynomial: [[f64; 6]; JOINTS],
-    /// Zeros until they are received.
+    /// Zeros until tables are received.
     pub tables: [TableOf<f32>; JOINTS],
     pub friction_is_table: bool,
     /// Friction was received since the trajectory was checked.
     pub friction_is_new: bool,
 }
 
-/// State of the parameters without the numbers, which are the arm's.
+/// State of the parameters without their values, which are part of the arm.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceivedState {
     received: u8,
@@ -63,14 +63,14 @@ pub(crate) struct ReceivedState {
 remembered!(ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial });
 
 impl ReceivedParameters {
-    /// Returns the state of the parameters, without the numbers.
+    /// Returns the state of the parameters, without their values.
     pub fn state(&self) -> ReceivedState {
         let Self { received, given, friction_is_table, friction_is_new, felt, trial, .. } = *self;
         let payload = self.payload.state();
         ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial }
     }
 
-    /// Restores the state, with the payload of these settings.
+    /// Restores the state, with the payload in these settings.
     pub fn restore(&mut self, state: &ReceivedState, config: &Config) {
         let ReceivedState { received, given, friction_is_table, friction_is_new, payload, felt, trial } =
             *state;
@@ -81,12 +81,12 @@ impl ReceivedParameters {
         (self.friction_is_table, self.friction_is_new) = (friction_is_table, friction_is_new);
     }
 
-    /// Returns `true` for each of gains, model and polynomial that is the built-in one.
+    /// Returns for gains, model and polynomial whether each is the built-in one.
     pub fn built_in(&self) -> [bool; 3] {
         [self.pid == defaults::PID, self.model == defaults::MODEL, self.polynomial == defaults::POLYNOMIAL]
     }
 
-    /// Uses the built-in ones of those that are `true`.
+    /// Uses the built-in gains, model or polynomial where the value is `true`.
     pub fn use_built_in(&mut self, [pid, model, polynomial]: [bool; 3]) {
         if pid {
             self.pid = defaults::PID;
@@ -99,7 +99,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// Creates the parameters before any was received.
+    /// Creates the parameters in the state before any was received.
     pub fn new(config: &Config) -> Self {
         let dynamics = dynamics(&defaults::MODEL, config);
         Self {
@@ -129,18 +129,18 @@ impl ReceivedParameters {
         self.forget();
     }
 
-    /// Marks the parameters as not given by a host: they were loaded.
+    /// Marks the parameters as not sent by a host, because they were loaded.
     pub fn forget(&mut self) {
         (self.received, self.given) = (0, 0);
         (self.friction_is_table, self.friction_is_new) = (false, false);
     }
 
-    /// Returns the byte of the status: 1 = missing.
+    /// Returns the byte of the status: a bit is 1 if the parameter is missing.
     pub fn missing(&self) -> u8 {
         !self.received & (missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL)
     }
 
-    /// Returns `true` if each of them was received since the start, so that no number is a built-in one that no host has requested.
+    /// Returns `true` if each parameter was received since the start. Then no built-in value is in use that a host has not requested.
     pub fn all_given(&self) -> bool {
         self.given == missing_parameter::FRICTION | missing_parameter::PID | missing_parameter::MODEL
     }
@@ -162,67 +162,68 @@ impl ReceivedParameters {
         ControlParameters { dynamics, pid, polynomial, table: self.tables_in_use(), on_trial }
     }
 
-    /// Returns `true` if the arm can be held at `position` (rad), by the torque limits (J-06).
+    /// Returns `true` if the torque limits suffice to hold the arm at `position` (rad) (J-06).
     pub fn holdable(&self, position: &[f64; JOINTS], config: &Config) -> bool {
         holdable(&self.dynamics, position, config)
     }
 
-    /// Withdraws the model: the host must send it again.
+    /// Withdraws the model, so that the host must send it again.
     pub fn withdraw_model(&mut self) {
         self.received &= !missing_parameter::MODEL;
     }
 
-    /// Withdraws all parameters: the host must send them again.
+    /// Withdraws all parameters, so that the host must send them again.
     pub fn withdraw_all(&mut self) {
         self.received = 0;
     }
 
-    /// Computes with the gravity and the payload of these settings from now on.
+    /// Uses the gravity and the payload in these settings from now on.
     pub fn set_gravity(&mut self, config: &Config) {
         self.dynamics = dynamics(&self.model, config);
         self.payload.forget();
     }
 
-    /// Returns `true` if every joint can hold the payload of these settings at `at` (rad), or holds less of it than now (J-60). Undecided,
-    /// and `true`, before every position is known and the model given; it is checked again when Init ends.
+    /// Returns `true` if every joint can hold the payload in these settings at `at` (rad), or needs less torque than now (J-60). Also
+    /// returns `true` while it cannot be decided: before all positions are known and the model is received. It is checked again when Init
+    /// ends.
     pub fn carries(&self, at: Option<&[f64; JOINTS]>, config: &Config) -> bool {
         let Some(at) = at.filter(|_| self.missing() & missing_parameter::MODEL == 0) else { return true };
         let next = dynamics(&self.model, config).gravity_torque(at);
         let now = self.dynamics.gravity_torque(at);
-        // Written so that NaN is too much. A joint that is absent holds nothing (J-53).
+        // With this comparison NaN is too much. An absent joint holds nothing (J-53).
         let held =
             |j: usize| config.absent[j] || next[j].abs() <= config.joints[j].torque_max.max(now[j].abs());
         (0..JOINTS).all(held)
     }
 
-    /// Begins to bring the payload of these settings into the model, over half a second (J-60); it is `heavier` than the last one by this
-    /// mass (kg).
+    /// Begins to blend the payload in these settings into the model, over half a second (J-60). `heavier`: its mass minus the mass of the
+    /// last one, kg.
     pub fn change_payload(&mut self, config: &Config, heavier: f64) {
         self.payload.begin(&self.dynamics, &dynamics(&self.model, config), heavier);
     }
 
-    /// Runs a tick in which the arm is held or taught: the payload comes on.
+    /// Runs one tick of the payload blend. The arm is held or taught.
     pub fn blend_payload(&mut self) {
         self.payload.step(&mut self.dynamics);
     }
 
-    /// Ends the blend in a tick without torque: the payload counts completely.
+    /// Ends the blend in a tick without torque: the payload is added completely.
     pub fn end_blend(&mut self) {
         self.payload.end(&mut self.dynamics);
     }
 
-    /// Returns the mass that comes with the next [`blend_payload`](Self::blend_payload), kg.
+    /// Returns the mass that the next [`blend_payload`](Self::blend_payload) adds, kg.
     pub fn next_mass(&self) -> f64 {
         self.payload.next_mass()
     }
 
-    /// Returns the milliseconds until the payload is in the model; 0 if it is.
+    /// Returns the time until the payload is completely in the model, ms; 0 if it is.
     pub fn blend_left_ms(&self) -> u16 {
         self.payload.left_ms()
     }
 
-    /// Returns `true` if the parameters given since the start are within the bounds of these settings, too (J-06). For friction tables see
-    /// [`table_fits`](Self::table_fits).
+    /// Returns `true` if the parameters received since the start are also within the bounds in these settings (J-06). For friction tables
+    /// see [`table_fits`](Self::table_fits).
     pub fn fits(&self, config: &Config) -> bool {
         let bounds = &config.parameter_bounds;
         let has = |part: u8| self.given & part != 0;
@@ -235,13 +236,14 @@ impl ReceivedParameters {
             && (!has(missing_parameter::MODEL) || bounds.check_masses(&self.model).is_ok())
     }
 
-    /// Returns `true` if the friction table of the joint with this index is within the bounds, or tables are not in use.
+    /// Returns `true` if the friction table of the joint with this index is within the bounds. Also returns `true` if tables are not in
+    /// use.
     pub fn table_fits(&self, j: usize, config: &Config) -> bool {
         let table = self.tables_in_use().and_then(|tables| tables.get(j)).zip(config.joints.get(j));
         table.is_none_or(|(table, joint)| config.parameter_bounds.check_table(table, joint).is_ok())
     }
 
-    /// Checks gains against their bounds, and against the inertia of the joints (J-71), as far as the model is known.
+    /// Checks gains against their bounds and, if the model is known, against the inertia of the joints (J-71).
     pub fn check_pid(&self, gains: &[PidGains; JOINTS], config: &Config) -> Result<(), DataStatus> {
         for (gains, joint) in gains.iter().zip(&config.joints) {
             config.parameter_bounds.check_gains(gains, joint)?;
@@ -250,33 +252,33 @@ impl ReceivedParameters {
         borne.then_some(()).ok_or(DataStatus::IncorrectValue)
     }
 
-    /// Runs a tick under torque after gains were given. Returns the gains of this tick, while they come in. `held`: all joints have
-    /// settled, and none yields.
+    /// Runs one tick under torque after gains were received. Returns the gains of this tick while they are blended in. `held`: all joints
+    /// have settled, and none yields.
     #[inline(never)]
     pub fn try_gains(&mut self, held: bool) -> Option<[PidGains; JOINTS]> {
         self.trial.step(held);
         self.trial.blended(&self.pid)
     }
 
-    /// Returns `true` if the gains suit the model that was checked last, with the present settings.
+    /// Returns `true` if the joints of the model in use are heavy enough for the gains, with the present settings.
     pub fn gains_are_borne(&self, config: &Config) -> bool {
         self.felt.is_known() && self.felt.bears(&self.pid, config)
     }
 
-    /// The gains do not suit the model that was checked last, accepted or not.
+    /// Returns `true` if the joints of the model that was checked last, accepted or not, are too light for the gains.
     #[cfg(test)]
     pub fn gains_were_too_much(&self, config: &Config) -> bool {
         self.looked_at.is_known() && !self.looked_at.bears(&self.pid, config)
     }
 
-    /// Puts gains in use that have passed [`check_pid`](Self::check_pid).
+    /// Uses gains that have passed [`check_pid`](Self::check_pid).
     pub fn put_pid(&mut self, gains: &[PidGains; JOINTS]) {
         self.pid = *gains;
         self.receive(missing_parameter::PID);
     }
 
-    /// Looks at the inertia of a model with these settings, one pose in each slice (J-71). Then the model is refused if the gains that were
-    /// given need more inertia; otherwise it is `used`.
+    /// Computes the inertia of a model with these settings, one pose per slice (J-71). Then the model is refused if the received gains need
+    /// more inertia; otherwise `used` is called.
     fn look_at(
         &mut self,
         model: &ArmModel,
@@ -305,7 +307,7 @@ impl ReceivedParameters {
         outcome.into()
     }
 
-    /// Looks at the model in use with other settings, if these affect the inertia of its joints (J-71).
+    /// Computes the inertia of the model in use again, if other settings affect it (J-71).
     pub fn look_again(&mut self, progress: SliceProgress, config: &Config, before: &Config) -> SliceOutcome {
         let same = |j: usize| {
             config.joints[j].rotor_inertia == before.joints[j].rotor_inertia
@@ -323,7 +325,7 @@ impl ReceivedParameters {
         self.look_at(&model, progress, config, |_| Ok(()))
     }
 
-    /// Takes a model, in slices. `at`: measured positions (rad), once all are known.
+    /// Takes a model in slices. `at`: measured positions (rad), if all are known.
     pub fn set_model(
         &mut self,
         model: &ArmModel,
@@ -340,7 +342,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// Puts a model in use that has passed [`check_model`].
+    /// Uses a model that has passed [`check_model`].
     fn put_model(
         &mut self,
         model: &ArmModel,
@@ -348,7 +350,7 @@ impl ReceivedParameters {
         config: &Config,
     ) -> Result<(), DataStatus> {
         let dynamics = dynamics(model, config);
-        // Undecided before every position is known; it is checked again when Init ends.
+        // Before all positions are known this cannot be decided. It is checked again when Init ends.
         if at.is_some_and(|position| !holdable(&dynamics, position, config)) {
             return Err(DataStatus::IncorrectValue);
         }
@@ -369,12 +371,13 @@ impl ReceivedParameters {
         Ok(())
     }
 
-    /// Takes the default tables, in the same way.
+    /// Takes the default tables in the same way.
     pub fn take_default_tables(&mut self, progress: SliceProgress, config: &Config) -> SliceOutcome {
         self.take_tables(|j| Ok(*defaults::friction_table(j)), progress, config)
     }
 
-    /// Takes one joint's table in a tick: first all are checked, then all are copied, so that a refused table changes nothing.
+    /// Takes the table of one joint per tick. All tables are checked before the first one is copied, so that a refused table changes
+    /// nothing.
     fn take_tables(
         &mut self,
         table: impl Fn(usize) -> Result<TableOf<f32>, DataStatus>,
@@ -426,16 +429,16 @@ fn check_polynomials(polynomial: &[[f64; 6]; JOINTS], config: &Config) -> Result
     Ok(())
 }
 
-/// Returns the dynamics of a model with the gravity and the payload of these settings.
+/// Returns the dynamics of a model with the gravity and the payload in these settings.
 #[inline(never)]
 fn dynamics(model: &ArmModel, config: &Config) -> Dynamics {
     Dynamics::with_payload(model, config.gravity, &config.payload)
 }
 
-/// Returns `true` if an arm with these dynamics can be held at `position` (rad), by the torque limits (J-06).
+/// Returns `true` if the torque limits suffice to hold an arm with these dynamics at `position` (rad) (J-06).
 fn holdable(dynamics: &Dynamics, position: &[f64; JOINTS], config: &Config) -> bool {
     let gravity = dynamics.gravity_torque(position);
-    // Written so that NaN is too much. A joint that is absent holds nothing (J-53).
+    // With this comparison NaN is too much. An absent joint holds nothing (J-53).
     (0..JOINTS).all(|j| config.absent[j] || gravity[j].abs() <= config.joints[j].torque_max)
 }
 

@@ -1,14 +1,13 @@
-//! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that outlasts a reset.
+//! The flight recorder (J-56): the last seconds before an error, tick by tick, in memory that survives a reset.
 //!
-//! The recorder stores the *inputs* of each tick, as a rule in eight words, every [`SNAPSHOT_MS`] a *snapshot* of the state of the
-//! controller, and for each tick a check of the *outputs*. A [`Replay`] of the log through the controller gives everything that it
-//! computed: commanded and measured motion, torques in their parts, states, errors. The arm and the points of the trajectory are named by
-//! hash.
+//! The recorder stores the *inputs* of each tick, usually in eight words, and for each tick a check of the *outputs*. Every [`SNAPSHOT_MS`]
+//! it stores a *snapshot* of the state of the controller. A [`Replay`] of the log through the controller reproduces everything that it
+//! computed: commanded and measured motion, the parts of the torques, states, errors. The arm and the points of the trajectory are
+//! identified by their hashes.
 //!
-//! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared ([`Recorder::record`] executes that command, and
-//! those that read the log). The log is also kept when the device was reset because it failed. A log in which the controller never had
-//! torque gives way to a new one as soon as torque comes on: an error at the start of a day must not take the place of the one that
-//! matters.
+//! A log *stops* [`AFTER_ERROR_MS`] after the first error and is kept until it is cleared. [`Recorder::record`] executes the commands that
+//! clear and read the log. The log is also kept if the device was reset because of a failure. A log in which the controller never had
+//! torque is replaced by a new one when torque comes on, so that an error at the start of a day does not take the place of a relevant one.
 mod block;
 mod inputs;
 mod memory;
@@ -45,42 +44,42 @@ pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 pub const SNAPSHOT_MS: u16 = 500;
 /// Ticks that are recorded after the first error (J-56).
 pub const AFTER_ERROR_MS: u16 = 300;
-/// Ticks from one snapshot to the next after an input that a replay cannot repeat.
+/// Ticks until the next snapshot after an input that a replay cannot repeat.
 const EARLY_SNAPSHOT_MS: u16 = 250;
-/// Ticks for which recording pauses after a page was requested, so that the block being read is not overwritten.
+/// Ticks for which recording pauses after a page was requested, so that the block that is being read is not overwritten.
 const HELD_MS: u16 = 2_000;
 
-/// A request to the recorder that a host has sent.
+/// Request of a host to the recorder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LogRequest {
-    /// A page for this line, from a byte of a block on.
+    /// Sends a page to this line, from a byte of a block on.
     Page { line: usize, block: u32, offset: u16 },
-    /// Forget the log and begin a new one.
+    /// Discards the log and begins a new one.
     Clear,
 }
 
-/// The recorder. `P` is a piece of its memory: blocks that keep their contents over a reset and are not cached.
+/// The recorder. `P` is a piece of its memory: blocks that keep their contents during a reset and are not cached.
 ///
-/// The board makes one at its start with any content of the memory, and calls [`record`](Self::record) after every tick.
+/// The board creates one at its start, whatever the memory contains, and calls [`record`](Self::record) after every tick.
 pub struct Recorder<P, const N: usize> {
     writer: Writer<P, N>,
     reference: Reference,
     /// Check of the outputs since the last snapshot.
     chain: u32,
     since_snapshot: u16,
-    /// An input came that a replay cannot repeat: a snapshot is due.
+    /// A replay cannot repeat an input since the last snapshot, so a snapshot is due earlier.
     uncertain: bool,
-    /// In the last tick an error was latched.
+    /// An error was latched in the last tick.
     was_in_error: bool,
     /// Ticks left until the log stops.
     stops_in: Option<u16>,
-    /// Ticks left for which recording rests.
+    /// Ticks left for which recording pauses.
     held: u16,
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
-    /// Creates a recorder with this memory. A log in the memory is kept if that log was stopped, or if the device was reset because it
-    /// `failed`; otherwise a new log begins.
+    /// Creates a recorder with this memory. A log in the memory is kept if it had stopped, or if the device was reset because it `failed`.
+    /// Otherwise a new log begins.
     pub fn new(pieces: [P; N], failed: bool) -> Self {
         let mut writer = Writer::new(pieces);
         if writer.state == LogState::Recording {
@@ -118,13 +117,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         (oldest..end).filter_map(|block| self.writer.block(block))
     }
 
-    /// Returns the state of the recorder, or why it stopped.
+    /// Returns the state of the recorder, or the reason why it stopped.
     pub fn state(&self) -> LogState {
         self.writer.state
     }
 
-    /// Records a tick that the controller has just executed, and serves the requests of hosts to the recorder. The board calls this after
-    /// every tick. Some hundred instructions; every [`SNAPSHOT_MS`] some ten thousand.
+    /// Records a tick that the controller has just executed, and executes the requests of hosts to the recorder. The board calls this after
+    /// every tick. A call takes some hundred instructions; every [`SNAPSHOT_MS`] it takes some ten thousand.
     #[inline(never)]
     pub fn record<M>(&mut self, controller: &mut Controller<M>, inputs: &Inputs<'_>, outputs: &Outputs)
     where
@@ -132,7 +131,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     {
         controller.hash_arm();
         let errors = controller.errors.word();
-        // A held stop is not an error that ends a log (J-69): a worse one may follow.
+        // A held stop is not an error that ends a log (J-69), because a worse error may follow.
         let (in_error, torque) = (controller.errors.any(), controller.state.has_torque());
         let new_error = !core::mem::replace(&mut self.was_in_error, in_error) && in_error;
         if self.writer.state != LogState::Recording && torque && !self.writer.powered {
@@ -160,12 +159,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     {
         let torque = controller.state.has_torque();
         if torque && !self.writer.powered {
-            // An error before there was torque does not stop the log.
+            // An error before the first torque does not stop the log.
             self.stops_in = None;
             self.writer.set_powered();
         }
         if self.held > 0 {
-            // An error must not be missed.
+            // A new error ends the pause, so that it is recorded.
             self.held = if new_error { 0 } else { self.held - 1 };
             if self.held > 0 {
                 return;
@@ -173,7 +172,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
             self.writer.begin();
             self.snapshot(controller);
         } else if self.writer.is_empty() {
-            // Some ticks after the start the arm has its name.
+            // The hash of the arm is known some ticks after the start.
             if controller.extensions.hash.is_none() && !new_error {
                 return;
             }
@@ -203,7 +202,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         self.uncertain |= !self.reference.write(inputs, outputs.host_done, check, &mut self.writer);
         self.since_snapshot += 1;
         let due = if self.uncertain { EARLY_SNAPSHOT_MS } else { SNAPSHOT_MS };
-        // While the arm changes its hash is not known; that is over soon, unless a host sends parameters without end.
+        // While the arm changes, its hash is not known. This does not last long, unless a host sends parameters again and again.
         let named = controller.extensions.hash.is_some() || self.since_snapshot >= 2 * SNAPSHOT_MS;
         if self.since_snapshot >= due && named {
             self.snapshot(controller);
@@ -224,7 +223,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         (self.since_snapshot, self.uncertain) = (0, false);
     }
 
-    /// Forgets the log and begins a new one, as after a ClearLog.
+    /// Discards the log and begins a new one, as after a ClearLog.
     pub fn clear(&mut self) {
         self.writer.clear();
         (self.stops_in, self.held) = (None, 0);
@@ -240,7 +239,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
         };
         let reads = block != LOG_NO_BLOCK && !self.writer.is_empty();
         if self.writer.state == LogState::Recording && self.stops_in.is_none() && reads {
-            // The ticks after an error go first.
+            // The ticks after an error are more important, so recording does not pause then.
             self.held = HELD_MS;
         }
         let (oldest, end) = self.writer.range();
@@ -262,7 +261,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Recorder<P, N> {
     }
 }
 
-/// Mixes the outputs of a tick into the check of the ticks before it.
+/// Adds the outputs of a tick to the check of the ticks before it.
 fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outputs) -> u32 {
     let mix = |hash: u32, word: u32| (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
     let states = u32::from(errors) << 16
@@ -273,7 +272,7 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     let Some(frame) = &outputs.bus else { return hash };
     let hash = mix(hash, frame.id.into());
     match frame.data().first_chunk::<16>() {
-        // A Move: all of its torques, and the pump.
+        // For a Move, all of its torques and the pump are added.
         Some(bytes) => {
             bytes.as_chunks::<4>().0.iter().fold(hash, |hash, word| mix(hash, u32::from_le_bytes(*word)))
         }
@@ -281,7 +280,7 @@ fn chain<M>(chain: u32, controller: &Controller<M>, errors: u16, outputs: &Outpu
     }
 }
 
-/// Returns the part of the check that is recorded: enough, because each check contains all ticks before it.
+/// Returns the part of the check that is recorded. A part is sufficient, because each check covers all ticks before it.
 fn check(chain: u32) -> u16 {
     (chain >> 16) as u16
 }

@@ -1,17 +1,17 @@
-//! State that the controller keeps from tick to tick, as bits: written in a snapshot of the flight recorder (J-56), read by a replay.
+//! State that the controller keeps from tick to tick, as bits. The flight recorder writes it in a snapshot (J-56), and a replay reads it.
 //!
-//! [`remembered!`] lists the fields of a type. The list is checked by the compiler: a field that is added to the type and not to the list
-//! does not compile, so that no snapshot lacks it. Reading is total: bits that are not those of a snapshot give some value, and
-//! [`BitSource::is_damaged`] reports that.
+//! [`remembered!`] lists the fields of a type. The compiler checks the list: a field that is missing in the list is a compile error, so
+//! that every snapshot has it. Reading never fails: bits that are not from a snapshot give some value, and [`BitSource::is_damaged`]
+//! reports that.
 use jtc_bus::{JointReport, NodeState};
 use jtc_wire::{ControllerState, StopKind, TrajectoryState};
 
-/// Takes bits.
+/// Destination of bits.
 pub(crate) trait BitSink {
-    /// Appends the lowest `bits` (0 to 32) of `value`, which has none above them.
+    /// Appends the lowest `bits` (0 to 32) of `value`. The higher bits must be zero.
     fn put(&mut self, value: u32, bits: u32);
 
-    /// Appends 64 bits, or one bit if all are zero: numbers of joints at rest.
+    /// Appends 64 bits, or a single bit if all of them are zero, as for joints at rest.
     fn put_double(&mut self, value: u64) {
         self.put((value != 0).into(), 1);
         if value != 0 {
@@ -21,13 +21,13 @@ pub(crate) trait BitSink {
     }
 }
 
-/// Gives bits back in the order in which they were put.
+/// Source of bits, in the order in which they were written.
 pub(crate) trait BitSource {
-    /// Returns the next `bits` (0 to 32); zeros past the end.
+    /// Returns the next `bits` (0 to 32). Bits after the end are zero.
     fn take(&mut self, bits: u32) -> u32;
-    /// Reports that bits were read that cannot have been written.
+    /// Records that bits were read that cannot have been written.
     fn damage(&mut self);
-    /// Returns `true` if more was taken than there is, or bits that were never written.
+    /// Returns `true` if bits were read after the end, or bits that cannot have been written.
     fn is_damaged(&self) -> bool;
 }
 
@@ -111,7 +111,7 @@ impl Remembered for u128 {
 
 impl Remembered for usize {
     fn write<S: BitSink>(&self, to: &mut S) {
-        // No value here is larger.
+        // All values in this program fit.
         to.put(*self as u32, 32);
     }
 
@@ -121,7 +121,7 @@ impl Remembered for usize {
 }
 
 impl Remembered for f64 {
-    // Not inlined: a snapshot has hundreds of them.
+    // Not inlined, because a snapshot has hundreds of these values.
     #[inline(never)]
     fn write<S: BitSink>(&self, to: &mut S) {
         self.to_bits().write(to);
@@ -189,7 +189,7 @@ impl Remembered for NodeState {
     }
 }
 
-/// A byte of a closed list of codes.
+/// Implements [`Remembered`] for a code that is one byte with a fixed list of values.
 macro_rules! code {
     ($($type:ty),+) => {$(
         impl Remembered for $type {

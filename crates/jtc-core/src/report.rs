@@ -11,7 +11,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observed = Observed { tick: self.observed.tick + 1, torque: *torque };
     }
 
-    /// Returns the values that the last tick computed. This function collects them, not the tick, because a board needs few of them.
+    /// Returns the values that the last tick computed. This function collects them instead of the tick, because a board needs few of them.
     #[inline]
     pub fn telemetry(&self) -> Telemetry {
         Telemetry {
@@ -55,10 +55,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns `true` if a JtcStatus is due: at once for a response, else every period (J-04).
+    /// Returns `true` if a JtcStatus is due: at once for a response, otherwise once per period (J-04).
     pub(crate) fn status_due(&mut self, free: bool) -> bool {
         self.since_status_ms = self.since_status_ms.saturating_add(1);
-        // Computed also while the line is busy: the same work in every tick.
+        // This is also computed while the line is busy, so that every tick does the same work.
         let wanted = !self.records.is_empty() | (self.since_status_ms >= self.config.status_period_ms);
         let due = wanted && free;
         if due {

@@ -1,9 +1,9 @@
-//! Response records that wait for their status frame (J-04): a queue for each line of the host link.
+//! Response records that wait for their status frame (J-04), in a queue for each host line.
 use jtc_wire::Response;
 
-/// Highest number of records that wait on a line: with fewer, none is lost.
+/// Highest number of records that wait on a line. Up to this number no record is lost.
 pub const RECORDS_MAX: usize = 64;
-/// Lines to hosts.
+/// Number of host lines.
 pub const HOST_LINES: usize = 2;
 
 /// The records of one line, oldest first.
@@ -12,7 +12,7 @@ struct ResponseQueue {
     ring: [Response; RECORDS_MAX],
     first: usize,
     len: usize,
-    /// Place, counted from the oldest, of the one record that stands for all noise.
+    /// Index, from the oldest record, of the single record for all noise.
     noise: Option<usize>,
 }
 
@@ -25,10 +25,10 @@ impl ResponseQueue {
         &mut self.ring[(self.first + n) % RECORDS_MAX]
     }
 
-    /// Puts a record at the end. Returns `false` if this drops a record: the record of noise if the queue has one, else the oldest.
+    /// Appends a record. Returns `false` if this drops a record: the record of noise if the queue has one, otherwise the oldest.
     fn push(&mut self, response: Response, noise: bool) -> bool {
         if noise && self.noise.is_some() {
-            // The noise joins the record that waits.
+            // The record that already waits also stands for this noise.
             return true;
         }
         let full = self.len == RECORDS_MAX;
@@ -61,17 +61,17 @@ impl ResponseQueue {
         let response = *self.slot(0);
         self.first = (self.first + 1) % RECORDS_MAX;
         self.len -= 1;
-        // The record of noise moves up, or was removed.
+        // The record of noise moves up by one, or was removed.
         self.noise = self.noise.and_then(|place| place.checked_sub(1));
         Some(response)
     }
 }
 
-/// The records of all lines. A line with many records does not drop those of another line.
+/// The records of all lines. A full line does not drop records of another line.
 #[derive(Clone, Debug)]
 pub(crate) struct ResponseQueues {
     lines: [ResponseQueue; HOST_LINES],
-    /// Line whose turn it is.
+    /// Line that is served next.
     turn: usize,
     lost: u32,
 }
@@ -86,18 +86,18 @@ impl ResponseQueues {
         self.lines.iter().all(|queue| queue.len == 0)
     }
 
-    /// Returns the number of records lost since the start because too many waited.
+    /// Returns the number of records lost since the start because too many were waiting.
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Adds a record for `line`; `noise`: the bytes are not a frame.
+    /// Adds a record for `line`. `noise`: the received bytes are not a frame.
     pub fn push(&mut self, line: usize, response: Response, noise: bool) {
         let kept = self.lines.get_mut(line).is_some_and(|queue| queue.push(response, noise));
         self.lost = self.lost.saturating_add(u32::from(!kept));
     }
 
-    /// Returns the oldest record of a line and the line; the lines take turns.
+    /// Returns the oldest record of a line, with the line. The lines take turns.
     pub fn pop(&mut self) -> Option<(usize, Response)> {
         for _ in 0..HOST_LINES {
             let line = self.turn;
@@ -160,7 +160,7 @@ mod tests {
         assert_eq!(left.iter().filter(|(_, record)| *record == NOISE).count(), 2, "one a line");
         assert_eq!(left[0], (0, NOISE));
         assert_eq!((records.lost(), left.len()), (0, 7));
-        // The next noise is a new record.
+        // The next noise gets a new record.
         records.push(0, good(9), false);
         records.push(0, NOISE, true);
         assert_eq!(all(&mut records), [(0, good(9)), (0, NOISE)]);
@@ -173,13 +173,13 @@ mod tests {
         records.push(0, NOISE, true);
         records.push(0, good(63), false);
         assert_eq!(records.lost(), 1);
-        // Now 64 good ones wait: noise finds no room at all.
+        // Now 64 records of frames wait, so noise is not queued.
         records.push(0, NOISE, true);
         assert_eq!(records.lost(), 2);
         assert_eq!(all(&mut records), (0..64).map(|n| (0, good(n))).collect::<Vec<_>>());
     }
 
-    /// However long it runs: an index that grew without end would overflow.
+    /// The index must not grow without end, or it would overflow.
     #[test]
     fn j04_the_ring_stays_a_ring() {
         let mut queue = ResponseQueue::new();
@@ -190,7 +190,7 @@ mod tests {
         }
     }
 
-    /// The other records move up, for any place of the record of noise.
+    /// Wherever the record of noise is, the other records move up in order.
     #[test]
     fn j04_what_goes_for_another_leaves_the_others_in_order() {
         for place in [0, 1, 30, 62, 63] {

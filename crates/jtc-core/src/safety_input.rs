@@ -1,17 +1,17 @@
-//! The safety input (J-22): at 0 it takes the torque away, at once or after a stop.
+//! The safety input (J-22): a 0 takes the torque away, at once or after a stop.
 use jtc_wire::{ExecCommand, RawPoint};
 
 use crate::controller::Controller;
 use crate::io::Inputs;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// The time of a stop is over.
+/// Marks that the time for a stop is over.
 const OVER: u16 = u16::MAX;
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs a tick in which the safety input is 0, or has been. With `safety_input_ramp_ms` a commanded motion comes to rest first (stop
-    /// category 1 of IEC 60204-1), also if the input is 1 again meanwhile. The error is raised in every case, even if the torque has been
-    /// taken away by then.
+    /// Runs a tick in which the safety input is 0, or has been 0 before. With `safety_input_ramp_ms` a commanded motion comes to rest first
+    /// (stop category 1 of IEC 60204-1), even if the input returns to 1 meanwhile. The error is raised in every case, even if the torque
+    /// has already been taken away.
     #[cold]
     pub(crate) fn watch_safety_input(&mut self, inputs: &Inputs<'_>) {
         let ramp_ms = self.config.safety_input_ramp_ms;
@@ -39,7 +39,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Brings the moving arm to rest as by a Stop (J-33).
+    /// Brings the moving arm to rest like a Stop (J-33).
     fn come_to_rest(&mut self) {
         self.teaching = false;
         if self.trajectory == TrajectoryState::Execute {
@@ -48,8 +48,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.stop_jog();
     }
 
-    /// Returns `true` if the arm moves by command or is led, with the torque of every joint. If drives are not enabled yet, a joint yields,
-    /// or the arm moves for another reason, a stop would only keep the torque on.
+    /// Returns `true` if the arm moves by command or is led, and every joint has torque. If a drive is not enabled yet, a joint yields, or
+    /// the arm moves for another reason, a stop would only keep the torque on for longer.
     fn has_to_stop(&self) -> bool {
         let enabled = |j: usize| self.nodes.node(j).enabled() || self.config.absent.get(j) == Some(&true);
         let moves = match self.state {
@@ -61,7 +61,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         moves && !self.motion.law.is_yielding() && (0..JOINTS).all(enabled)
     }
 
-    /// Returns `true` if the arm is held at rest: nothing moves, and no motion is commanded.
+    /// Returns `true` if the arm is held at rest and no motion is commanded.
     fn stands_still(&self) -> bool {
         self.state == ControllerState::HoldPos
             && self.trajectory != TrajectoryState::Execute

@@ -1,4 +1,5 @@
-//! Settings that a host reads and changes (J-53): the table, and how a list of values is applied as a whole or not at all.
+//! Settings that a host reads and changes (J-53): the table of settings, and functions that apply a list of values completely or not at
+//! all.
 use jtc_dynamics::{Payload, PayloadError};
 use jtc_wire::SettingValue;
 
@@ -16,20 +17,20 @@ pub const SPEED: u8 = 128;
 /// Number of the tool speed limit (J-25).
 pub const TOOL_SPEED: u8 = 79;
 
-/// Numbers of the switch of an absent joint, and of the position of that joint in the model (J-53).
+/// Number of the setting that marks a joint as absent (J-53).
 pub const ABSENT: u8 = 16;
-/// See [`ABSENT`].
+/// Number of the setting for the position of an absent joint in the model (J-53).
 pub const ABSENT_POSITION: u8 = 17;
 
-/// Numbers of the payload (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
+/// Numbers of the payload settings (J-60): mass, centre of mass x y z, Ixx Ixy Ixz Iyy Iyz Izz.
 pub const PAYLOAD: core::ops::RangeInclusive<u8> = 144..=153;
 
-/// States in which a setting may be changed, besides Init and Error.
+/// States in which a setting may be changed, in addition to Init and Error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Live {
     /// Never. The setting is part of the arm: stored, and in its hash.
     No,
-    /// Never, as `No`, but the setting is not part of the arm.
+    /// Never, like `No`, but the setting is not part of the arm.
     Unpowered,
     /// In HoldPos, Teaching and Pause, but not while a motion runs. The setting is not part of the arm.
     Standing,
@@ -40,26 +41,26 @@ pub enum Live {
 /// Kind of a setting, and the place of its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// A number of each joint.
+    /// A number for each joint.
     Joint,
-    /// A number of each joint that is not a limit of the joint.
+    /// A number for each joint that is not one of its limits.
     Each,
-    /// A switch of each joint, 0 or 1.
+    /// A switch for each joint, 0 or 1.
     EachSwitch,
-    /// A number of the arm.
+    /// A number for the arm.
     Number,
-    /// A whole number of the arm.
+    /// A whole number for the arm.
     Whole,
-    /// A switch of the arm, 0 or 1.
+    /// A switch for the arm, 0 or 1.
     Switch,
 }
 
-/// A row of the table.
+/// Row of the table of settings.
 #[derive(Clone, Copy, Debug)]
 pub struct Setting {
-    /// Number on the wire.
+    /// Number in the wire format.
     pub number: u8,
-    /// Name in arm files, with its unit.
+    /// Name in arm files, including the unit.
     pub name: &'static str,
     /// Unit; empty if the setting has none.
     pub unit: &'static str,
@@ -67,7 +68,7 @@ pub struct Setting {
     pub low: f64,
     /// Highest value.
     pub high: f64,
-    /// Whole numbers only.
+    /// `true` if only whole numbers are allowed.
     pub whole: bool,
     /// States in which the setting may be changed.
     pub live: Live,
@@ -76,34 +77,34 @@ pub struct Setting {
     pub(crate) kind: Kind,
 }
 
-/// Reason why a value is not taken.
+/// Reason why a value is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SettingError {
-    /// The setting does not exist, or not for this joint.
+    /// The setting does not exist, or does not exist for this joint.
     Unknown {
         /// Number of the setting.
         setting: u8,
-        /// Joint from 1, 0: none.
+        /// Joint, from 1; 0 for a setting of the arm.
         joint: u8,
     },
-    /// Outside its range, not a number, or not a whole number.
+    /// The value is out of range, NaN, or not a whole number.
     Value {
-        /// Its row.
+        /// Name of the setting.
         name: &'static str,
-        /// Joint from 1, 0: none.
+        /// Joint, from 1; 0 for a setting of the arm.
         joint: u8,
         /// The value.
         value: f64,
-        /// Lowest.
+        /// Lowest allowed value.
         low: f64,
-        /// Highest.
+        /// Highest allowed value.
         high: f64,
     },
-    /// The settings together do not suit any arm.
+    /// The settings are not valid together.
     Config(ConfigError),
     /// The payload is not a valid body (J-60).
     Payload(PayloadError),
-    /// The payload is beyond the bounds of masses and inertias (J-06).
+    /// The payload exceeds the bounds of masses and inertias (J-06).
     Bounds(OutOfBounds),
 }
 
@@ -135,7 +136,7 @@ impl Setting {
         matches!(self.kind, Kind::Joint | Kind::Each | Kind::EachSwitch)
     }
 
-    /// Returns `true` if the setting belongs to the arm: it is stored with the arm, and in its hash.
+    /// Returns `true` if the setting is part of the arm: it is stored with the arm and included in its hash.
     pub const fn of_arm(&self) -> bool {
         matches!(self.live, Live::No)
     }
@@ -145,17 +146,17 @@ impl Setting {
         if self.of_joint() { JOINTS } else { 1 }
     }
 
-    /// Returns the value in `config`; `joint` from 1, 0 for a setting of the arm. `None` if the value does not exist.
+    /// Returns the value in `config`. `joint`: from 1; 0 for a setting of the arm. Returns `None` if there is no such value.
     pub fn get(&self, config: &Config, joint: u8) -> Option<f64> {
         table::get(config, self.number, self.index(joint)?)
     }
 
-    /// Returns the index of a joint from 1, 0 for a setting of the arm; `None` if the setting does not belong to that.
+    /// Returns the index of the value for a joint, from 1, or 0 for a setting of the arm. Returns `None` if the setting has no such value.
     fn index(&self, joint: u8) -> Option<usize> {
         if self.of_joint() { usize::from(joint).checked_sub(1) } else { (joint == 0).then_some(0) }
     }
 
-    /// Returns the values in `config`, from the one with this index on.
+    /// Returns the values in `config`, from index `first` on.
     fn values_from(&self, config: &Config, first: usize) -> impl Iterator<Item = SettingValue> + use<'_> {
         let (start, end) = if self.of_joint() { (1, JOINTS as u8) } else { (0, 0) };
         let values = core::array::from_fn::<f64, JOINTS, _>(|j| {
@@ -170,7 +171,7 @@ impl Setting {
 
     /// Changes the value in `config`.
     fn set(&self, config: &mut Config, joint: u8, value: f64) -> Result<(), SettingError> {
-        // Written so that NaN is refused; the cast is exact for every whole number in a range.
+        // The comparison also refuses NaN. The cast is exact for every whole number in a range.
         let taken = value >= self.low && value <= self.high && (!self.whole || value == value as i32 as f64);
         if !taken {
             let Self { name, low, high, .. } = *self;
@@ -191,13 +192,12 @@ pub fn named(name: &str) -> Option<&'static Setting> {
     TABLE.iter().find(|setting| setting.name == name)
 }
 
-/// Returns the number of values in the table; `arm_only`: those that belong to the arm.
+/// Returns the number of values in the table. `arm_only`: only those that are part of the arm.
 pub fn count(arm_only: bool) -> usize {
     TABLE.iter().filter(|setting| !arm_only || setting.of_arm()).map(Setting::count).sum()
 }
 
-/// Returns the values of a configuration in the order of the table, from the one with index `first` on; `arm_only`: those that belong to
-/// the arm.
+/// Returns the values of a configuration in the order of the table, from index `first` on. `arm_only`: only those that are part of the arm.
 pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<Item = SettingValue> {
     let mut skip = first;
     TABLE.iter().filter(move |setting| !arm_only || setting.of_arm()).flat_map(move |setting| {
@@ -207,10 +207,10 @@ pub fn values(config: &Config, first: usize, arm_only: bool) -> impl Iterator<It
     })
 }
 
-/// Puts one value into a configuration, without a check of the whole.
+/// Sets one value in a configuration, without a check of the whole configuration.
 ///
 /// # Errors
-/// Returns an error for a value that is not taken.
+/// Returns an error if the value is refused.
 pub fn apply(config: &mut Config, value: SettingValue) -> Result<(), SettingError> {
     let SettingValue { setting: number, joint, value } = value;
     setting(number).ok_or(SettingError::Unknown { setting: number, joint })?.set(config, joint, value)
@@ -226,11 +226,10 @@ pub fn payload_values(payload: &Payload) -> impl Iterator<Item = SettingValue> {
     })
 }
 
-/// Returns the configuration with these values in it.
+/// Returns a copy of the configuration with these values.
 ///
 /// # Errors
-/// Returns an error for the first value that is not taken, or for a configuration that is wrong as a whole. No change is made in part: the
-/// given configuration is not touched.
+/// Returns an error for the first value that is refused, or if the resulting configuration is not valid.
 pub fn with_values(
     config: &Config,
     values: impl Iterator<Item = SettingValue>,
@@ -240,7 +239,8 @@ pub fn with_values(
         apply(&mut next, value)?;
     }
     next.check().map_err(SettingError::Config)?;
-    // Principal moments are not worked out for a speed that changes in motion.
+    // The payload is checked only if it changes, because computing its principal moments takes too long for a change of the speed in
+    // motion.
     if next.payload != config.payload {
         next.payload.check().map_err(SettingError::Payload)?;
     }

@@ -1,8 +1,8 @@
-//! Two slots of flash that keep one image over any loss of power (J-54).
+//! Two flash slots that keep one image through any loss of power (J-54).
 //!
-//! An image, here a stored arm, is bytes of any meaning. An image is written to the slot that does not hold the newest image, so that the
-//! previous image stays complete until the new one is complete. A slot is a header of one flash word followed by the image, filled up to
-//! whole words:
+//! An image, here a stored arm, is a sequence of bytes that this module does not interpret. It is written to the slot that does not hold
+//! the newest image, so that the previous image stays complete until the new one is complete. A slot is a header of one flash word followed
+//! by the image, filled up to whole words:
 //!
 //! | bytes | what |
 //! |---|---|
@@ -15,11 +15,11 @@
 //! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words after them |
 //! | 32.. | the image; the rest of its last word is 0xFF |
 //!
-//! The header is written last: a slot whose writing was cut off has none. A word that was being programmed, and a sector that was
-//! being erased, may hold anything; the CRC shows it. All numbers are little-endian.
+//! The header is written last, so a slot whose writing was interrupted has no header. A word that was being programmed, or a sector that
+//! was being erased, may contain any data; the CRC detects this. All numbers are little-endian.
 //!
-//! This module has no hardware: [`Storing`] returns the next action, and the owner of the flash carries it out. A flash word can be
-//! programmed once after it was erased, and [`Storing`] requires no more.
+//! This module does not access hardware: [`Storing`] returns the next action, and the owner of the flash executes it. A flash word can be
+//! programmed once after it was erased, which is sufficient for [`Storing`].
 use core::cmp::Ordering;
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
@@ -28,15 +28,15 @@ pub use jtc_wire::IMAGE_MAX;
 
 /// Bytes that the flash of the STM32H7 programs at once.
 pub const WORD: usize = 32;
-/// Slots.
+/// Number of slots.
 pub const SLOTS: usize = 2;
 
-/// Unit that is programmed at once.
+/// Unit of programming.
 pub type Word = [u8; WORD];
 
 const MAGIC: [u8; 4] = *b"JTCA";
 const VERSION: u16 = 1;
-/// Content of erased flash, and filler after an image in its last word.
+/// Content of erased flash. It also fills the last word of an image.
 const ERASED: u8 = 0xFF;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -52,7 +52,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Creates the header of this image; `None` if the image is longer than [`IMAGE_MAX`].
+    /// Creates the header of this image. Returns `None` if the image is longer than [`IMAGE_MAX`].
     pub fn new(image: &[u8], sequence: u32) -> Option<Self> {
         let length = u32::try_from(image.len()).ok().filter(|_| image.len() <= IMAGE_MAX)?;
         let header = Self { length, sequence, crc: 0 };
@@ -63,14 +63,14 @@ impl Header {
         Some(Self { crc: digest.finalize(), ..header })
     }
 
-    /// Parses a word as a header, if it is one; [`Header::accepts`] decides if its slot is whole.
+    /// Parses a word as a header. [`Header::accepts`] decides whether its slot is complete.
     pub fn parse(word: &Word) -> Option<Self> {
         let field = |at: usize| Some(u32::from_le_bytes(*word.get(at..)?.first_chunk()?));
         let header = Self { length: field(8)?, sequence: field(12)?, crc: field(28)? };
         (header.length as usize <= IMAGE_MAX && header.emit() == *word).then_some(header)
     }
 
-    /// Returns its bytes.
+    /// Returns the bytes of the header.
     pub fn emit(&self) -> Word {
         let mut word = [0; WORD];
         let fields = self.checked_bytes().into_iter().chain(self.crc.to_le_bytes());
@@ -98,12 +98,12 @@ impl Header {
         self.sequence
     }
 
-    /// Returns the number of words of the slot, including this one.
+    /// Returns the number of words in the slot, including the header.
     pub fn words(&self) -> usize {
         1 + self.length().div_ceil(WORD)
     }
 
-    /// Returns the image if `rest`, which begins with all words after the header, matches the header.
+    /// Returns the image if `rest`, which begins with the words after the header, matches the header.
     pub fn accepts<'a>(&self, rest: &'a [u8]) -> Option<&'a [u8]> {
         let words = rest.get(..(self.words() - 1) * WORD)?;
         let mut digest = CRC.digest();
@@ -113,14 +113,14 @@ impl Header {
     }
 }
 
-/// Returns a word of an image, with its last word filled up.
+/// Returns a word of an image. The last word is filled up.
 fn padded(bytes: &[u8]) -> Word {
     let mut word = [ERASED; WORD];
     word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
     word
 }
 
-/// Returns `true` if an image is newer than another by their sequence numbers, which begin again after 2³² − 1.
+/// Returns `true` if image `a` is newer than image `b` by their sequence numbers, which wrap around after 2³² − 1.
 pub fn newer(a: u32, b: u32) -> bool {
     (a.wrapping_sub(b).cast_signed()).cmp(&0) == Ordering::Greater
 }
@@ -130,12 +130,12 @@ pub fn newer(a: u32, b: u32) -> bool {
 pub struct Slots([Option<u32>; SLOTS]);
 
 impl Slots {
-    /// Creates the slots as they were found.
+    /// Creates the slots from the sequence numbers that were found.
     pub const fn new(found: [Option<u32>; SLOTS]) -> Self {
         Self(found)
     }
 
-    /// Returns the slot of the newest image, with its sequence number; `None` if no slot is complete.
+    /// Returns the slot of the newest image, and its sequence number; `None` if no slot is complete.
     pub fn current(&self) -> Option<(usize, u32)> {
         match self.0 {
             [Some(a), Some(b)] if newer(b, a) => Some((1, b)),
@@ -145,7 +145,7 @@ impl Slots {
         }
     }
 
-    /// Returns the slot of the next image, and its sequence number: never the slot of the newest image.
+    /// Returns the slot for the next image, and its sequence number. It is never the slot of the newest image.
     pub fn next(&self) -> (usize, u32) {
         self.current().map_or((0, 1), |(slot, sequence)| (1 - slot, sequence.wrapping_add(1)))
     }
@@ -162,19 +162,19 @@ impl Slots {
 pub enum Action {
     /// Erase the slot.
     Erase {
-        /// Slot.
+        /// Number of the slot.
         slot: usize,
     },
-    /// Program a word, read it again and compare.
+    /// Program a word, read it back and compare.
     Program {
-        /// Slot.
+        /// Number of the slot.
         slot: usize,
-        /// Word in it; 0 is the header.
+        /// Index of the word in the slot; 0 is the header.
         word: usize,
         /// Content to program.
         bytes: Word,
     },
-    /// No action: the image is stored, and found from now on.
+    /// No action is left: the image is stored and can be found.
     Stored,
 }
 
@@ -203,12 +203,13 @@ pub enum Action {
 pub struct Storing {
     slot: usize,
     header: Header,
-    /// Actions that are done: the erasure, then a word each.
+    /// Number of completed actions: the erasure, then one per word.
     done: usize,
 }
 
 impl Storing {
-    /// Begins to store an image; `None` if it is longer than [`IMAGE_MAX`]. From here on the old content of its slot counts as lost.
+    /// Begins to store an image. Returns `None` if it is longer than [`IMAGE_MAX`]. From now on the old content of its slot is considered
+    /// lost.
     pub fn begin(slots: &mut Slots, image: &[u8]) -> Option<Self> {
         let (slot, sequence) = slots.next();
         let header = Header::new(image, sequence)?;
@@ -216,12 +217,12 @@ impl Storing {
         Some(Self { slot, header, done: 0 })
     }
 
-    /// Returns the action to do now; `image` is the one that the storing began with.
+    /// Returns the next action. `image` must be the image that was passed to [`begin`](Self::begin).
     pub fn action(&self, image: &[u8]) -> Action {
         let slot = self.slot;
         let Some(before) = self.done.checked_sub(1) else { return Action::Erase { slot } };
         let words = self.header.words();
-        // The words of the image, and when all of them are there, the header.
+        // First the words of the image, and after all of them the header.
         match before + 1 {
             word if word < words => {
                 let at = before * WORD;
@@ -232,17 +233,17 @@ impl Storing {
         }
     }
 
-    /// Marks the present action as done: a word was read again and is right.
+    /// Marks the present action as done. A word must have been read back and compared first.
     pub fn done(&mut self) {
         self.done = self.done.saturating_add(1).min(self.header.words() + 1);
     }
 
-    /// Returns the slot, and the sequence number that it gets.
+    /// Returns the slot, and the sequence number of the image in it.
     pub fn target(&self) -> (usize, u32) {
         (self.slot, self.header.sequence)
     }
 
-    /// Records the new image if every action is done; has no effect otherwise.
+    /// Records the new image if every action is done. Otherwise it has no effect.
     pub fn finish(&self, slots: &mut Slots) {
         if self.done > self.header.words() {
             slots.set(self.slot, Some(self.header.sequence));

@@ -1,10 +1,10 @@
-//! The soft end of a joint's range: a spring that pushes back a joint that a hand or a shove moves towards a position limit (J-25, J-68).
+//! The soft end of a joint's range: a spring that acts against a joint that a hand or a push moves towards a position limit (J-25, J-68).
 
-/// Distance from a position limit, rad, from which on the spring acts.
+/// Distance from a position limit at which the spring begins to act, rad.
 pub(crate) const SOFT_END: f64 = 0.1;
 
-/// Returns the depth (rad) of a joint at `position` inside the soft end of its `range` (lowest and highest position, rad): above zero at
-/// the high end, below zero at the low one.
+/// Returns the depth (rad) of a joint at `position` inside the soft end of its `range` (lowest and highest position, rad). It is positive
+/// at the upper end and negative at the lower end.
 pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     let (low, high) = range;
     let above = (position - (high - SOFT_END)).max(0.0);

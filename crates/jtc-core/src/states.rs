@@ -1,24 +1,24 @@
 //! The states of the controller, and the choice of the next one (J-20 to J-25). docs/protocol-jtc.md draws this function.
 use crate::ControllerState;
 
-/// Conditions of the next state.
+/// Conditions that choose the next state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Conditions {
     /// An error is latched (J-21).
     pub error: bool,
-    /// A joint is still being cleared: the cause of its error persists.
+    /// A joint is still being cleared, because the cause of its error persists.
     pub clearing: bool,
-    /// Every parameter was received and every node brought up (J-20).
+    /// Every parameter was received and every node was brought up (J-20).
     pub initialised: bool,
     /// The host has enabled teaching.
     pub teaching: bool,
-    /// The arm is held at rest, and its loads are known, or do not count (J-25); asked only when teaching is.
+    /// The arm is held at rest, and its loads are known or not needed (J-25). It is evaluated only if `teaching` is set.
     pub teachable: bool,
     /// A trajectory is being executed.
     pub execute: bool,
 }
 
-/// Returns the state that follows: the first of Error, Init, Teaching, Operate and HoldPos that applies.
+/// Returns the next state: the first of Error, Init, Teaching, Operate and HoldPos whose conditions hold.
 pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> ControllerState {
     let Conditions { error, clearing, initialised, teaching, teachable, execute } = *conditions;
     if error || (state == ControllerState::Error && clearing) {
@@ -26,7 +26,7 @@ pub(crate) fn next_state(state: ControllerState, conditions: &Conditions) -> Con
     } else if !initialised {
         ControllerState::Init
     } else if teaching && (state == ControllerState::Teaching || teachable) {
-        // An accepted teach request waits until every joint is held at rest: the loads of the arm are found only then (J-25).
+        // An accepted teach request waits until every joint is held at rest, because the loads of the arm are found only then (J-25).
         ControllerState::Teaching
     } else if execute {
         ControllerState::Operate

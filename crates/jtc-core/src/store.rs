@@ -1,4 +1,4 @@
-//! The trajectory store: acceptance of segments (J-30), and the points.
+//! The trajectory store: acceptance of segments (J-30), and memory of the points.
 use jtc_wire::{DataStatus, RawPoint, Segment};
 
 use crate::check::{Passed, SpeedRange, Violation};
@@ -6,31 +6,32 @@ use crate::interpolation::{SetPoint, Step};
 use crate::remembered::remembered;
 use crate::{JOINTS, POINTS_MAX, SEGMENT_POINTS_MAX, SEGMENTS_MAX};
 
-/// This share of a step before a point is at the point.
+/// If the time is less than this share of a step before a point, it is taken as the time of the point.
 const AT_POINT: f64 = 1e-9;
 
-/// Received part of the current trajectory. `M` is the memory of its points.
+/// Received part of the current trajectory. `M` is the memory for the points.
 #[derive(Clone, Debug)]
 pub(crate) struct Store<M> {
     points: M,
-    /// Points of the accepted segments.
+    /// Number of points in the accepted segments.
     received: usize,
-    /// Number of the next segment; equal to `segments` when the trajectory is complete.
+    /// Index of the next segment; equal to `segments` when the trajectory is complete.
     next_segment: u16,
     segments: u16,
     number: u16,
     /// Segment 0 came on a plain line.
     plain: bool,
-    /// A Stop has dropped the upload: its other segments are refused until a segment 0 comes.
+    /// A Stop has dropped the upload. Its other segments are refused until a segment 0 arrives.
     dropped: bool,
-    /// A Stop came during this upload, whose host survives no refused segment: it is completed and not executed.
+    /// A Stop came during this upload, whose host cannot handle a refused segment. The upload is completed but not executed.
     stopped: bool,
-    /// Violation that the check has found in an upload whose host survives no refused segment: the upload is completed and not executed.
+    /// Violation that the check has found in an upload whose host cannot handle a refused segment. The upload is completed but not
+    /// executed.
     refused: Option<Violation>,
     step: Step,
     /// State of the check after the accepted segments.
     passed: Passed,
-    /// Points in memory, also of a trajectory that was given up, and their hash.
+    /// Number of points in memory, including those of a discarded trajectory, and their hash.
     held: usize,
     hash: u32,
 }
@@ -53,7 +54,7 @@ pub(crate) struct StoreState {
 }
 
 impl StoreState {
-    /// Returns the ms between points.
+    /// Returns the time between points, ms.
     pub fn step_ms(&self) -> u16 {
         self.step_ms
     }
@@ -74,13 +75,13 @@ remembered!(StoreState {
     hash
 });
 
-/// Begins a hash of points, and mixes a word into it: a multiplication for each, so that copying a segment stays cheap.
+/// Start value of a hash of points. `mix` adds a word to the hash with one multiplication, so that copying a segment stays cheap.
 const HASH_BEGIN: u32 = 0x811C_9DC5;
 fn mix(hash: u32, word: u32) -> u32 {
     (hash.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
 }
 
-/// Returns the hash of points that follow others with this hash.
+/// Returns the hash of all points if `hash` is the hash of the points before `points`.
 fn hash_points(hash: u32, points: &[RawPoint]) -> u32 {
     points.iter().fold(hash, |hash, point| {
         let pairs =
@@ -111,7 +112,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Returns the number of points that fit: never more than the protocol allows, never more than the memory holds.
+    /// Returns the number of points that fit: the limit of the protocol, or of the memory if that is lower.
     fn capacity(&self) -> usize {
         self.points.as_ref().len().min(POINTS_MAX)
     }
@@ -122,18 +123,18 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.segments = 0;
     }
 
-    /// Returns `true` if all segments are here.
+    /// Returns `true` if all segments have been received.
     pub fn complete(&self) -> bool {
         self.segments > 0 && self.next_segment == self.segments
     }
 
-    /// Returns `true` if segments are here, and others are still to come.
+    /// Returns `true` if some segments have been received and others are missing.
     fn receiving(&self) -> bool {
         self.segments > 0 && self.next_segment < self.segments
     }
 
-    /// Drops an upload that is not complete, because of a Stop (J-30). An upload that was begun on a plain line, whose host would wait for
-    /// ever, is completed and not executed. Returns `true` if there was one.
+    /// Drops an incomplete upload because of a Stop (J-30). An upload that was begun on a plain line is completed but not executed, because
+    /// its host would wait for ever. Returns `true` if there was an incomplete upload.
     pub fn drop_upload(&mut self) -> bool {
         let receiving = self.receiving();
         if receiving && self.plain {
@@ -145,22 +146,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         receiving
     }
 
-    /// Returns `true` if a Stop came during the upload of this trajectory: it is not executed (J-30).
+    /// Returns `true` if a Stop came during the upload of this trajectory, so that it is not executed (J-30).
     pub fn stopped(&self) -> bool {
         self.stopped
     }
 
-    /// Returns `true` if the upload was begun on a plain line, whose host survives no refused segment (J-51).
+    /// Returns `true` if the upload was begun on a plain line, whose host cannot handle a refused segment (J-51).
     pub fn plain(&self) -> bool {
         self.plain
     }
 
-    /// Keeps the violation that the check has found in the upload that has been begun.
+    /// Stores the violation that the check has found in the present upload.
     pub fn refuse(&mut self, violation: Violation) {
         self.refused.get_or_insert(violation);
     }
 
-    /// Returns the violation that the check has found in this trajectory, which is not executed then (J-36).
+    /// Returns the violation that the check has found in this trajectory. Such a trajectory is not executed (J-36).
     pub fn refused(&self) -> Option<Violation> {
         self.refused
     }
@@ -170,7 +171,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.dropped = true;
     }
 
-    /// Returns `true` if the upload was dropped, and no other has been begun since.
+    /// Returns `true` if the upload was dropped and no other upload has been begun since.
     pub fn dropped(&self) -> bool {
         self.dropped
     }
@@ -181,7 +182,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.received.saturating_sub(1) as u32).saturating_mul(u32::from(self.step.ms))
     }
 
-    /// Checks that the segment may follow the received ones. Changes nothing.
+    /// Checks that the segment may follow the received ones. It changes nothing.
     pub fn check(&self, segment: &Segment<'_>) -> Result<(), DataStatus> {
         let first = segment.segment == 0;
         let before = if first { 0 } else { self.received };
@@ -209,8 +210,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         Ok(())
     }
 
-    /// Begins to copy a segment that was accepted. Segment 0 replaces the old trajectory; `plain`: its line is plain; `stopped`: a Stop
-    /// came before it had its turn.
+    /// Begins to copy an accepted segment. Segment 0 replaces the old trajectory. `plain`: its line is plain; `stopped`: a Stop came before
+    /// the turn of the segment.
     pub fn begin(&mut self, segment: &Segment<'_>, plain: bool, stopped: bool) {
         if segment.segment == 0 {
             self.clear();
@@ -222,7 +223,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Copies points `from..to` of the segment after those received; they count from `commit` on.
+    /// Copies points `from..to` of the segment after the received ones. They become valid with `commit`.
     pub fn copy(&mut self, segment: &Segment<'_>, from: usize, to: usize) {
         let slots = self.points.as_mut().get_mut(self.received + from..self.received + to).unwrap_or(&mut []);
         for (slot, point) in slots.iter_mut().zip(segment.points_from(from)) {
@@ -231,7 +232,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.hash = hash_points(self.hash, slots);
     }
 
-    /// Counts the segment, whose points are all copied; `passed` is the state of the check after all points so far.
+    /// Adds the segment after all its points have been copied. `passed` is the state of the check after all points so far.
     pub fn commit(&mut self, segment: &Segment<'_>, passed: Passed) {
         self.passed = passed;
         self.received = (self.received + segment.len()).min(self.capacity());
@@ -239,12 +240,12 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.held = self.received;
     }
 
-    /// Returns the hash of the points in memory and their number, also of a trajectory that was given up.
+    /// Returns the hash and the number of the points in memory, including those of a discarded trajectory.
     pub fn points_hash(&self) -> (u32, u32) {
         (self.hash, self.held as u32)
     }
 
-    /// Returns those points from number `first` on.
+    /// Returns the points in memory from number `first` on.
     pub fn held_points(&self, first: usize) -> &[RawPoint] {
         self.points.as_ref().get(first..self.held).unwrap_or(&[])
     }
@@ -283,7 +284,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Restores the state; the points are put separately.
+    /// Restores the state. The points are restored separately.
     pub fn restore(&mut self, state: &StoreState) {
         let StoreState {
             received,
@@ -306,7 +307,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         (self.held, self.hash) = (held.min(self.capacity()), hash);
     }
 
-    /// Puts points from number `first` on.
+    /// Stores points from number `first` on.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         for (slot, point) in self.points.as_mut().iter_mut().skip(first).zip(points) {
             *slot = *point;
@@ -324,7 +325,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         &self.passed.speeds
     }
 
-    /// Returns the ms between points.
+    /// Returns the time between points, ms.
     pub fn step_ms(&self) -> u16 {
         self.step.ms
     }
@@ -334,21 +335,22 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         self.points.as_ref().get(..self.received)?.first().map(RawPoint::position_rad)
     }
 
-    /// Returns the set values `time_ms` after point 0, with velocities and accelerations as at full speed. `None` without points.
+    /// Returns the set values at `time_ms` after point 0, with velocities and accelerations for full speed. Returns `None` without points.
     pub fn at(&self, time_ms: f64) -> Option<SetPoint> {
         let mut at = SetPoint::default();
         self.put(time_ms, &mut at).then_some(at)
     }
 
-    /// Like [`Self::at`], but replaces the set values in `at`; returns `false` without points.
+    /// Like [`Self::at`], but writes the set values to `at`. Returns `false` without points.
     #[inline]
     pub fn put(&self, time_ms: f64, at: &mut SetPoint) -> bool {
         let points = self.points.as_ref().get(..self.received).unwrap_or(&[]);
         let step_ms = f64::from(self.step.ms);
-        // The product may be rounded to below a point that the time has reached. `as` saturates: a negative or NaN time is point 0.
+        // The product may be rounded to a value just below a point that the time has reached. `as` saturates: a negative or NaN time gives
+        // point 0.
         let index = (time_ms * self.step.per_ms + AT_POINT) as usize;
         let Some(start) = points.get(index).or(points.last()) else { return false };
-        // Also at a point itself and at the last one, without any effect: the same work in every tick.
+        // This is also done exactly at a point and at the last one, where it has no effect, so that every tick does the same work.
         let (end, u) = match points.get(index + 1) {
             Some(end) => (end, (time_ms - index as f64 * step_ms).max(0.0) * self.step.per_ms),
             None => (start, 0.0),

@@ -1,9 +1,9 @@
-//! Torques that Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, part of the joints' own friction
-//! taken away, and soft ends.
+//! Torques that Teaching adds to gravity (J-25): the load found, damping, dry friction at standstill, compensation of part of the joints'
+//! own friction, and soft ends.
 //!
-//! A hand leads the arm. When the hand lets go, the arm must stay at its pose. From the torques that HoldPos had found, a mass at the
-//! flange is carried to other poses; the remaining torques fade as the arm is led ([`carried`]). Every motion is damped, and a joint that
-//! is too fast for the damping ends Teaching ([`joint`]).
+//! A hand leads the arm. When the hand lets go, the arm must stay in its pose. From the torques that HoldPos found, a mass at the flange is
+//! estimated and carried to other poses; the remaining torques fade while the arm is led ([`carried`]). Every motion is damped. A joint
+//! that is too fast for the damping ends Teaching ([`joint`]).
 mod carried;
 mod joint;
 
@@ -18,47 +18,49 @@ use carried::Carried;
 pub(crate) use joint::{LedJoint, TaughtTorque, too_fast};
 use joint::{TaughtJoint, rotor};
 
-/// Ticks of a round in which values that change slowly are computed, and ticks before the first round: the tick in which Teaching begins,
-/// one for the mass at the flange, one for the inertia of the whole arm, which a ramp needs, and one for that of each joint.
+/// Ticks of a round in which slowly changing values are computed, and ticks before the first round. These are the tick in which Teaching
+/// begins, one tick for the mass at the flange, one for the inertia of the whole arm, which a ramp needs, and one for the inertia of each
+/// joint.
 const TURNS: u8 = 76;
 const FIRST: u8 = 9;
-/// Ticks from one judgement of the load to the next, and that time in s.
+/// Ticks between two checks of the load, and that time in s.
 const JUDGED_MS: u8 = 12;
 const PERIOD: f64 = JUDGED_MS as f64 * DT;
-/// Torque of 1 kg at the flange, all joints together (N·m/kg): up to the first value nothing is attributed to a mass, from the second on
-/// all that fits. HoldPos cannot tell a load from static friction, and a little friction must not become a great mass elsewhere.
+/// Torque of 1 kg at the flange, summed over all joints (N·m/kg). Up to the first value no load is attributed to a mass, from the second
+/// value on the complete fit. HoldPos cannot distinguish a load from static friction, and a little friction must not become a large mass in
+/// another pose.
 const LOADS: (f64, f64) = (2.0, 6.0);
-/// Time after which a mass that drives the arm by itself counts as not there, ms, and time constant of the mass as it then goes, s.
+/// Time for which a mass must have driven the arm by itself before it is removed, ms, and time constant of the removal, s.
 const DRIVEN_MS: u16 = 1_000;
 const GOES_S: f64 = 1.5;
-/// Time after which a removed mass is added again if a joint sinks without it, ms, and time constant of this return, s.
+/// Time for which a joint must have sunk without a removed mass before the mass is added again, ms, and time constant of the return, s.
 const SINKS_MS: u16 = 100;
 const COMES_BACK_S: f64 = 0.5;
-/// Speed from which on a joint is led, rad/s, and distance of the fastest joint over which torque that no mass explains falls to a third,
-/// rad.
+/// Speed above which a joint is considered led, rad/s. Distance of the fastest joint over which torque that no mass explains falls to a
+/// third, rad.
 const LED: f64 = 0.02;
 const WAY: f64 = 0.3;
 
-/// Computation of a tick; the index is that of a joint.
+/// Computation that is done in a tick. An index is that of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
-    /// The first one: the loads that were found are carried.
+    /// First tick: all loads that were found are carried.
     Begin,
-    /// The mass at the flange that explains the loads.
+    /// Computes the mass at the flange that explains the loads.
     Mass,
-    /// The inertia of the whole arm, which belongs to the ramp and is computed there.
+    /// Leaves time for the inertia of the whole arm, which the ramp computes.
     Ramp,
     Inertia(usize),
-    /// Friction of a joint, and torque of 1 kg at the flange on the joints.
+    /// Computes the friction of a joint, and the torque of 1 kg at the flange on all joints.
     Friction(usize),
-    /// The judgement of the load from the motion.
+    /// Checks the load against the motion.
     Judge,
-    /// The torques of the joints.
+    /// Computes the torques of the joints.
     Joints,
 }
 
 impl Turn {
-    /// The turn of this number: each fourth computes what changes slowly.
+    /// Returns the turn with this number. In each round, every fourth turn computes a slowly changing value.
     fn of(number: u8) -> Self {
         let Some(turn) = number.checked_sub(FIRST) else {
             return match number {
@@ -83,30 +85,30 @@ impl Turn {
     }
 }
 
-/// State of Teaching. Single precision, because the flight recorder keeps it.
+/// State of Teaching. Single precision, because the flight recorder stores it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Taught {
     joints: [TaughtJoint; JOINTS],
     carried: [Carried; JOINTS],
-    /// Mass at the flange that the model lacks, kg; negative if the modelled arm is too heavy: the mass that was found, and the mass that
-    /// is carried.
+    /// Mass at the flange that the model lacks, kg: the mass that was found, and the mass that is carried. Negative if the modelled arm is
+    /// too heavy.
     found: f32,
     mass: f32,
     /// Torque of 1 kg at the flange on each joint, N·m.
     unit: [f32; JOINTS],
-    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk for want of the mass, ms.
+    /// Time for which the mass alone has explained the motion, and time for which a joint has sunk because the mass is missing, ms.
     driven_ms: u16,
     sinks_ms: u16,
     /// Excess of the flange speed over the tool speed limit, 0 to 1.
     haste: f32,
-    /// Tick counter: values that change slowly are computed in turns.
+    /// Tick counter, which selects the computation of a tick.
     turn: u8,
 }
 
 remembered!(Taught { joints, carried, found, mass, unit, driven_ms, sinks_ms, haste, turn });
 
 impl Taught {
-    /// Begins Teaching in an arm at rest at `q` (rad) that has found these loads (N·m).
+    /// Begins Teaching of an arm at rest at `q` (rad) that has found these loads (N·m).
     #[inline(never)]
     pub fn begin(q: &[f64; JOINTS], loads: &[f64; JOINTS], config: &Config) -> Self {
         let mut taught = Self::default();
@@ -118,7 +120,7 @@ impl Taught {
         taught
     }
 
-    /// Fits a mass at the flange to the loads that were found, by least squares over the joints of the arm at `q`, rad.
+    /// Fits a mass at the flange to the loads that were found, by least squares over the joints of the arm at `q` (rad).
     fn fit(&mut self, q: &[f64; JOINTS], dynamics: &Dynamics) {
         let unit = dynamics.flange_torque(q);
         let (mut load, mut moment) = (0.0, 0.0);
@@ -135,38 +137,39 @@ impl Taught {
         }
     }
 
-    /// Reduces the mass that was found by `mass` (kg) at the flange, which comes into the model with this tick (J-60), but not beyond zero.
-    /// More than that is a load that was not there when the mass was found.
+    /// Reduces the mass that was found by `mass` (kg) at the flange, which the model carries from this tick on (J-60). The mass does not
+    /// change its sign: any excess of `mass` was not there when the mass was found.
     pub fn give_way(&mut self, mass: f64) {
         let left =
             |of: f32| (f64::from(of) - mass).max(f64::from(of.min(0.0))).min(f64::from(of.max(0.0))) as f32;
         (self.found, self.mass) = (left(self.found), left(self.mass));
     }
 
-    /// Takes the answer of a joint in each tick, which is `late` by this time, ms: `fresh` if the joint has answered, with this `position`,
+    /// Evaluates the answer of a joint in each tick. `late`: delay of this tick, ms; `fresh`: the joint has answered, with this `position`,
     /// rad. Returns the speed that follows from its positions, rad/s.
     #[inline(always)]
     pub fn hear(&mut self, j: usize, fresh: bool, position: f64, late: u16) -> f32 {
         self.joints[j].hear(fresh, position, late)
     }
 
-    /// Returns `true` in the first tick.
+    /// Returns `true` in the first tick of Teaching.
     pub fn begins(&self) -> bool {
         Turn::of(self.turn) == Turn::Begin
     }
 
-    /// Returns `true` in the tick that computes no other value, so that it has time for the inertia of the whole arm.
+    /// Returns `true` in the tick that computes no other value, to leave time for the inertia of the whole arm.
     pub fn is_turn_of_ramp(&self) -> bool {
         Turn::of(self.turn) == Turn::Ramp
     }
 
-    /// Returns the torque that a joint carries in the first tick, N·m: all that was found. No part of it is attributed to a mass yet.
+    /// Returns the torque that a joint carries in the first tick, N·m: the whole load that was found. No part of it is attributed to a mass
+    /// yet.
     pub fn first_load(&self, j: usize) -> f64 {
         self.carried[j].rest.into()
     }
 
-    /// Computes the values that change slowly in turns, one in each tick. Returns `true` if this took too long to compute other values in
-    /// this tick. The very first tick only adds the load, because the torque would step without it.
+    /// Computes one of the slowly changing values, in turns. Returns `true` if this took too long to compute the torques of the joints in
+    /// this tick. The very first tick adds only the load, because the torque would step without it.
     #[inline(never)]
     pub fn look(
         &mut self,
@@ -211,13 +214,13 @@ impl Taught {
         }
     }
 
-    /// Returns the torque of the mass on a joint, N·m.
+    /// Returns the torque that the mass causes on a joint, N·m.
     #[inline(always)]
     fn by_mass(&self, j: usize) -> f64 {
         f64::from(self.mass) * f64::from(self.unit[j])
     }
 
-    /// Runs a tick of one joint.
+    /// Runs one tick of a joint.
     #[inline(always)]
     pub fn step(&mut self, j: usize, led: &LedJoint<'_>, config: &Config) -> TaughtTorque {
         let by_mass = self.by_mass(j);
@@ -227,7 +230,7 @@ impl Taught {
         torque
     }
 
-    /// Judges the load from the motion of the last [`JUDGED_MS`].
+    /// Checks the load against the motion of the last [`JUDGED_MS`].
     fn judge(&mut self, v: &[f64; JOINTS]) {
         let (mut driven, mut sinks, mut fastest) = (false, false, 0.0_f64);
         for j in 0..JOINTS {
@@ -253,7 +256,7 @@ impl Taught {
         }
     }
 
-    /// Returns the torque of the load and of the dry friction that holds a joint at `position` (rad), N·m.
+    /// Returns the torque that holds a joint at `position` (rad), N·m: the load and the dry friction.
     pub fn held(&self, j: usize, position: f64, limits: &JointConfig, config: &Config) -> f64 {
         self.carried[j].torque(self.by_mass(j)) + self.joints[j].dry_spring(position, limits, config)
     }

@@ -13,13 +13,13 @@ pub struct JointTelemetry {
     pub set_velocity: f64,
     /// Commanded acceleration, rad/s².
     pub set_acceleration: f64,
-    /// Position that was commanded for the time of the measurement, rad: the control law compares the measurement with it (J-62).
+    /// Position that was commanded for the time of the measurement, rad. The control law compares the measurement with it (J-62).
     pub due_position: f64,
     /// Measured position, rad.
     pub position: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
-    /// Position and velocity were measured for this tick; else they are predicted (J-63).
+    /// Position and velocity were measured for this tick; otherwise they are predicted (J-63).
     pub fresh: bool,
     /// Bearing temperature, °C.
     pub temperature: f64,
@@ -33,7 +33,7 @@ pub struct JointTelemetry {
     pub torque_d: f64,
     /// Friction compensation, N·m.
     pub torque_friction: f64,
-    /// Torque that blends out a step at a change of state, and payload and brake of teaching, N·m.
+    /// Torque that blends out a step at a change of state, and load and brake of Teaching, N·m.
     pub torque_other: f64,
     /// Torque commanded on the bus, N·m.
     pub torque: f64,
@@ -53,7 +53,7 @@ impl JointTelemetry {
 /// Telemetry of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
-    /// Ticks since boot.
+    /// Ticks since the start of the device.
     pub tick: u64,
     /// State in this tick.
     pub state: ControllerState,
@@ -65,18 +65,18 @@ pub struct Telemetry {
     pub braking: bool,
     /// Current error word.
     pub errors: u16,
-    /// Response records lost since boot because too many waited (J-04).
+    /// Number of response records lost since the start because too many were waiting (J-04).
     pub records_lost: u32,
-    /// Per joint.
+    /// Telemetry of each joint.
     pub joints: [JointTelemetry; JOINTS],
 }
 
-/// Values that a tick remembers for the telemetry alone.
+/// Values that a tick stores only for the telemetry.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Observed {
-    /// Ticks since boot.
+    /// Ticks since the start of the device.
     pub tick: u64,
-    /// Torques commanded, N·m.
+    /// Commanded torques, N·m.
     pub torque: [f64; JOINTS],
 }
 
@@ -86,7 +86,7 @@ remembered!(Observed { tick, torque });
 mod tests {
     use super::*;
 
-    /// Positive if the joint lags a motion upwards, like the position part of the torque.
+    /// The error is positive if the joint lags a motion upwards, like the proportional part of the torque.
     #[test]
     fn j41_the_position_error_is_commanded_minus_measured() {
         let joint = JointTelemetry { due_position: 0.5, position: 0.25, ..JointTelemetry::default() };

@@ -1,4 +1,4 @@
-//! The control tick, from top to bottom as docs/architecture.md lists it.
+//! The control tick, in the order of docs/architecture.md.
 use jtc_bus::Frame;
 use jtc_wire::{RawPoint, Response};
 
@@ -13,8 +13,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
-        // 1. Inputs. The error flags are formed before the commands of the host are executed: a clear in the tick in which a fault shows
-        // does not hide that fault. In Start no command is executed yet; the events are offered again.
+        // 1. Inputs. The error flags are formed before the commands of the host are executed, so that a clear cannot hide a fault that
+        //    appears in the same tick. In Start no command is executed yet; the events are offered again.
         self.take_answers(inputs);
         if !inputs.safety_input || self.safety_stop_ms.is_some() {
             self.watch_safety_input(inputs);
@@ -26,7 +26,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let host_done = if before == ControllerState::Start { 0 } else { self.serve_host(inputs) };
         self.watch_hosts(inputs, host_done);
 
-        // 2. The state that follows. An error that persists is raised again, because a host may have cleared it.
+        // 2. The next state. An error that persists is raised again, because a host may have cleared it.
         if !inputs.host.is_empty() {
             self.form_error_flags(inputs);
         }
@@ -43,17 +43,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.observe(&torque);
 
         // 6. Outputs for the board and the hosts.
-        // J-22: 0 in Start and while an internal error is latched.
+        // J-22: the output is 0 in Start and while an internal error is latched.
         let safety_output = self.state != ControllerState::Start && !self.errors.internal();
         let status = self.status_due(inputs.status_free);
         let record_line = if status { self.prepare_status() } else { None };
-        // J-50: a waiting status goes first.
+        // J-50: a waiting status is sent first.
         let answer_line = if inputs.status_free && !status { self.extensions.answers.send() } else { None };
         let store = core::mem::take(&mut self.extensions.store_requested);
         Outputs { bus: Some(bus), safety_output, status, record_line, answer_line, store, host_done }
     }
 
-    /// Takes the answers of the nodes, and checks that this tick is on time.
+    /// Evaluates the answers of the nodes, and checks that this tick is on time.
     fn take_answers(&mut self, inputs: &Inputs<'_>) {
         let found_moving = self.motion.set.next_tick();
         let commanded = &self.motion.set.commanded;
@@ -73,7 +73,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Errors from outside the control law; they latch (J-21).
+    /// Raises errors from outside the control law. They latch (J-21).
     fn form_error_flags(&mut self, inputs: &Inputs<'_>) {
         if self.safety_input_releases(inputs.safety_input) {
             self.errors.raise_emergency_input();
@@ -85,11 +85,11 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Does the work of the state. Returns torques within their limits, and the joint errors found on the way.
+    /// Does the work of the state. Returns torques within their limits, and the joint errors that were found.
     fn work(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         match self.state {
             ControllerState::Start | ControllerState::Init | ControllerState::Error => {
-                // Everything else was released when the state began.
+                // All other parts were reset when the state began.
                 self.motion.set.release(&self.nodes);
                 self.parameters.end_blend();
                 ([0.0; JOINTS], [0; JOINTS])
@@ -101,7 +101,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 
     fn hold(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A pending teach request times out: by then the operator no longer expects the arm to become compliant.
+        // A pending teach request times out, because the operator no longer expects the arm to become compliant.
         self.teaching_waits_ms = if self.teaching { self.teaching_waits_ms.saturating_add(1) } else { 0 };
         self.teaching &= self.teaching_waits_ms < self.config.enable_timeout_ms;
         if self.parameters.blend_left_ms() > 0 {
@@ -121,13 +121,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return self.rest();
         }
         if jogged {
-            // The jogged arm has come to rest.
+            // The arm has come to rest after the jog.
             self.motion.law.change_mode();
         }
         self.control(ControlMode::Hold)
     }
 
-    /// Runs a tick in which the arm comes to rest because a hand has led it.
+    /// Runs one tick in which the arm comes to rest after a hand has led it.
     fn rest(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         let mode = if self.motion.set.led_to_rest(&self.config) {
             self.motion.law.change_mode();
@@ -149,8 +149,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.control(ControlMode::Teach)
     }
 
-    /// Runs the control step in Operate. A separate function lets its instructions be counted; on the path their number is the same in
-    /// every tick.
+    /// Runs the control step in Operate. It is a separate function so that its instructions can be counted. On the path their number is the
+    /// same in every tick.
     #[inline(never)]
     fn operate(&mut self) -> ([f64; JOINTS], [u16; JOINTS]) {
         self.motion.latch(&self.nodes, &self.config);
@@ -161,9 +161,10 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Runs the control law and its limits. Returns the torques to command, and the errors that were not acted upon (J-66).
+    /// Runs the control law and its limits. Returns the torques to command, and the joint errors to which the controller has no other
+    /// reaction (J-66).
     pub(crate) fn control(&mut self, mode: ControlMode) -> ([f64; JOINTS], [u16; JOINTS]) {
-        // A joint beyond its over-speed limit is out of control. The only possible reaction takes its torque away.
+        // A joint above its over-speed limit is out of control. The only possible reaction is to take the torque away.
         let too_fast = self.motion.over_speed.watch(&self.nodes, &self.config);
         let braking = self.brake();
         let blended = if self.parameters.trial.runs() && mode != ControlMode::Teach {
@@ -182,7 +183,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         (limited.torque, core::array::from_fn(|j| too_fast[j] | errors[j]))
     }
 
-    /// Clears position errors in motion (J-43) for path positions outside the limits that the check of the trajectory has passed (J-36).
+    /// Ignores position errors in motion (J-43) if the check of the trajectory has accepted a path outside the limits (J-36).
     #[cold]
     fn tolerate_positions(&self, found: &mut [Found; JOINTS]) {
         let Some(first) = self.store.first() else { return };
@@ -210,17 +211,17 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         torque
     }
 
-    /// Returns the one frame of this tick (J-12).
+    /// Returns the frame of this tick (J-12).
     pub(crate) fn frame(&mut self, before: ControllerState, torque: [f64; JOINTS]) -> Frame {
-        // Drives keep their last torque: removing it has priority over everything else.
+        // Drives keep their last torque, so removing it has priority over all other frames.
         let new_error = self.state == ControllerState::Error && before != ControllerState::Error;
         let must_move = new_error || (before.has_torque() && !self.powered());
-        // J-61: up to here, torque means joint torque.
+        // J-61: up to here all torques are joint torques.
         let torque = core::array::from_fn(|j| torque[j] * self.config.joints[j].torque_gain);
         self.nodes.frame(&self.config, self.goal(), torque, self.pump, must_move)
     }
 
-    /// Puts the oldest record into a status; returns the line that it is for.
+    /// Puts the oldest record into a status. Returns the line of that record.
     fn prepare_status(&mut self) -> Option<usize> {
         let record = self.records.pop();
         let status = self.status(record.map_or(Response::NONE, |(_, record)| record));
@@ -234,8 +235,8 @@ mod tests {
     use super::*;
     use crate::Config;
 
-    /// An accepted teach request waits as long as enabling may take, and then times out: by then the operator no longer expects the arm to
-    /// become compliant.
+    /// An accepted teach request waits at most as long as enabling may take. Later the operator would not expect the arm to become
+    /// compliant.
     #[test]
     fn j25_teaching_waits_for_a_while_only() {
         let most = Config::avena().enable_timeout_ms;

@@ -1,12 +1,12 @@
-//! A joint that yields to a push (J-68), or lowers a load that its torque limit does not hold (J-70).
+//! A joint that yields to a push (J-68), or lowers a load that its torque limit cannot hold (J-70).
 //!
-//! The position controller answers a push with the whole torque limit within a few milliradians: the joint clamps any obstacle, and only
-//! the torque limit bounds its force. A joint that yields has a weak spring instead, whose other end is dragged along, and a damper. So the
-//! joint follows a hand with a share of its torque limit, and stops a shove with all of it. Meanwhile the model and the load that the
-//! integral had found continue to carry the arm.
+//! The position controller opposes a push with the whole torque limit within a few milliradians: the joint would clamp an obstacle, and
+//! only the torque limit would bound its force. A yielding joint has a weak spring instead, whose other end is dragged along, and a damper.
+//! So the joint follows a hand with a share of its torque limit, and stops a shove with all of it. Meanwhile the model and the load that
+//! the integral had found continue to carry the arm.
 //!
-//! A joint that lowers a load has no spring: the damper alone lets the load sink slowly, at any torque within the limit. The torque that
-//! the damper needs for that becomes part of the load, so a load that the limit does hold comes to rest.
+//! A joint that lowers a load has no spring. The damper alone lets the load sink slowly, at any torque within the limit. The torque that
+//! the damper needs becomes part of the load, so a load that the limit can hold comes to rest.
 use crate::limits::{JointConfig, within};
 use crate::pid::PidTorque;
 use crate::remembered::remembered;
@@ -21,84 +21,85 @@ use swing::Swing;
 const STRETCH: f64 = 0.02;
 /// Highest natural frequency of the spring with the inertia of the joint, 1/s.
 pub(crate) const SPRING_RATE: f64 = 30.0;
-/// Rate at which the damper of a load that is lowered reduces a speed, 1/s; of several, shared among them. Joints that are held move each
-/// other at the frequencies that a late speed leaves unstable, so the inertia that a joint feels is a third of that with the others fixed.
+/// Rate at which the damper of a lowered load reduces a speed, 1/s. If several joints lower loads, they share it. Held joints move each
+/// other at frequencies at which an old speed measurement makes the loop unstable, so a joint feels only a third of its inertia with the
+/// others fixed.
 const LOWERING_RATE: f64 = 40.0;
-/// Fraction of the remaining change that the damper and the spring make in a tick.
+/// Fraction of the remaining change by which the damper and the spring change in a tick.
 const SETTLES: f64 = 0.2;
 /// Like [`SETTLES`], for the brake.
 const BRAKE_SETTLES: f64 = 0.5;
-/// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them: a damper above
-/// 200 1/s would drive a joint to and fro, and joints that move each other lower that bound.
+/// Highest rate at which a damper reduces a speed, 1/s. Measured speeds are about 8 ms old, because the drives average them. A damper above
+/// 200 1/s would make a joint oscillate, and joints that move each other lower that bound.
 const DAMPING_RATE: f64 = 100.0;
-/// Speeds, in velocity limits, at which the brake of a joint begins, and at which it takes the whole torque limit; the brake acts if the
-/// damper does less. The second pair is for a joint that lowers a load. The rate at which the brake reduces a speed is bounded, too, 1/s:
-/// positions are about 4 ms old.
+/// Speeds, in velocity limits, at which the brake of a joint begins and at which it uses the whole torque limit. The brake acts if its
+/// torque is higher than the damper's. `BRAKES_LOWERED` is for a joint that lowers a load. `BRAKE_RATE` bounds the rate at which the brake
+/// reduces a speed, 1/s, because positions are about 4 ms old.
 const BRAKES: (f64, f64) = (0.2, 0.8);
 const BRAKES_LOWERED: (f64, f64) = (0.4, 1.0);
 const BRAKE_RATE: f64 = 250.0;
 /// Speed below which a joint that yields is calm, rad/s.
 const CALM: f64 = 0.05;
-/// Speed below which a load that is lowered is at rest, rad/s.
+/// Speed below which a lowered load is at rest, rad/s.
 const AT_REST: f64 = 0.02;
-/// Time for which a joint must be calm until it is held again, and time for which its load may seem to drive it meanwhile, ms.
+/// Time for which a joint must be calm before it is held again, and longest time for which its load may then have seemed to drive it, ms.
 const CALM_MS: u16 = 200;
 const DRIVEN_CALM_MS: u16 = 50;
-/// Minimum load of a joint by gravity, as a share of the torque limit, for a motion to count as sinking.
+/// Least torque of gravity and load on a joint, as a share of the torque limit, for a motion to be considered sinking.
 const LOADED: f64 = 0.05;
-/// Distance (rad) and time (ms) of sinking after which the joint counts as overloaded.
+/// Distance (rad) and time (ms) of sinking after which the joint is considered overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
 /// Time constant of the load while it takes over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
-/// Lowest and highest torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. A
-/// load that has driven the joint for [`DRIVEN_MS`] is not there: a person had leaned on the arm. The load goes with the time constant
-/// [`GOES_S`] (s), and comes back with [`COMES_BACK_S`] (s) if the joint sinks without it.
+/// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. If a
+/// load has driven the joint for [`DRIVEN_MS`], it does not exist: a person had leaned on the arm. The load fades with the time constant
+/// [`GOES_S`] (s), and returns with [`COMES_BACK_S`] (s) if the joint sinks without it.
 const DRIVEN: (f64, f64) = (0.5, 1.2);
-/// Speed above which a load counts as driving its joint, rad/s.
+/// Speed above which a load is considered to drive its joint, rad/s.
 const CREEPS: f64 = 0.002;
 const DRIVEN_MS: u16 = 300;
 const GOES_S: f64 = 1.0;
 const COMES_BACK_S: f64 = 0.3;
-/// Share of the torque limit up to which a lowered load is held by the position controller again: its encoder noise needs the rest.
+/// Share of the torque limit up to which the position controller holds a lowered load again. The rest is for encoder noise.
 const HOLDABLE: f64 = 0.95;
-/// Missing answers after which the spring does not act.
+/// Number of missing answers after which the spring does not act.
 const MISSING: u8 = 2;
-/// Number of yields of a joint; the last of them continues until the host clears it. Yields count together if each yield of the arm begins
-/// within [`AGAIN_MS`] of the one before.
+/// Number of yields after which a yield of the joint continues until the host clears it. Yields are counted together if each yield of the
+/// arm begins within [`AGAIN_MS`] after the one before.
 const TIMES: u8 = 3;
 /// See [`TIMES`].
 const AGAIN_MS: u16 = 10_000;
 
-/// A joint that yields.
+/// State of a joint that yields.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Yield {
     /// The joint lowers a load, without a spring (J-70).
     lowers: bool,
     /// The yield continues until the host clears it.
     stays: bool,
-    /// Position that the spring pulls to, rad.
+    /// Position to which the spring pulls, rad.
     set: f64,
-    /// Inertia that the joint moves, kg·m²: a lower bound.
+    /// Lower bound of the inertia that the joint moves, kg·m².
     inertia: f64,
-    /// Torque of the load that the model lacks, N·m, and its value at the beginning of the yield, or of lowering (`least`): `load` is never
-    /// taken back beyond that.
+    /// Torque of the load that the model lacks, N·m. `least`: its value at the beginning of the yield or of the lowering; a lowered load
+    /// never falls below it.
     load: f64,
     least: f64,
     /// Time for which the load has driven the joint, ms.
     driven_ms: u16,
-    /// N·m·s/rad.
+    /// Damping, N·m·s/rad.
     damping: f64,
-    /// Share of the brake that acts, and of the spring.
+    /// Acting shares of the brake and of the spring.
     braking: f64,
     grip: f64,
     swing: Swing,
-    /// The position controller can hold the load of the joint (`holdable`), or the host has decided that it must (`cleared`).
+    /// `holdable`: the position controller can hold the load of the joint. `cleared`: the host has decided that it must.
     holdable: bool,
     cleared: bool,
     calm_ms: u16,
-    /// Answers of the joint that are missing now.
+    /// Number of consecutive missing answers of the joint.
     missing: u8,
-    /// Distance (rad) and time (ms) in the direction in which gravity pulls.
+    /// Distance (rad) and time (ms) of sinking in the direction of gravity.
     sunk: f64,
     sinks_ms: u16,
 }
@@ -123,13 +124,13 @@ remembered!(Yield {
     sinks_ms,
 });
 
-/// Inputs of a yielding joint in a tick.
+/// Inputs of a yielding joint in one tick.
 pub(crate) struct Joint<'a> {
     /// Measured position, rad.
     pub position: f64,
     /// Measured velocity, rad/s.
     pub velocity: f64,
-    /// Velocity of the last 5 ms, rad/s.
+    /// Velocity over the last 5 ms, rad/s.
     pub young_velocity: f64,
     /// All values were measured for this tick.
     pub fresh: bool,
@@ -138,14 +139,14 @@ pub(crate) struct Joint<'a> {
     pub limits: &'a JointConfig,
     /// Lowest and highest position, rad.
     pub range: (f64, f64),
-    /// Most that spring and damper add for a slow push, as a share of the torque limit.
+    /// Highest torque of spring and damper against a slow push, as a share of the torque limit.
     pub share: f64,
-    /// Joints that lower their loads, this one among them.
+    /// Number of joints that lower their loads, including this one.
     pub lowering: u8,
 }
 
 impl Yield {
-    /// Begins the yield of a joint. `set`: the position that it was commanded to, rad; `load`: torque that the model lacks, N·m.
+    /// Begins the yield of a joint. `set`: commanded position, rad; `load`: torque that the model lacks, N·m.
     pub fn begin(lowers: bool, stays: bool, set: f64, inertia: f64, load: f64) -> Self {
         Self {
             lowers,
@@ -168,7 +169,7 @@ impl Yield {
         }
     }
 
-    /// Drags the end of the spring along with a joint at `position` (rad). Returns the new position of that end.
+    /// Drags the end of the spring along with a joint at `position` (rad). Returns the new position of the end.
     pub fn drag(&mut self, position: f64) -> f64 {
         self.set = self.set.max(position - STRETCH).min(position + STRETCH);
         self.set
@@ -184,7 +185,7 @@ impl Yield {
         self.is_calm() && (self.holdable || self.cleared) && !self.stays
     }
 
-    /// Ends the yield for the host. The yield continues until the joint is calm.
+    /// Ends the yield at the host's request, as soon as the joint is calm.
     pub fn clear(&mut self) {
         (self.stays, self.cleared) = (false, true);
     }
@@ -201,13 +202,13 @@ impl Yield {
         self.least = self.load;
     }
 
-    /// Returns `true` if the load has turned out to differ from the load that was found.
+    /// Returns `true` if the load may differ from the load that was found before the yield.
     pub fn has_learned(&self) -> bool {
         self.lowers || self.load != self.least
     }
 
-    /// Returns the torque that the position controller must carry when it takes over, N·m: the part of the load that the `spring` (N·m)
-    /// opposes acts no more, and the part of a doubted load that the spring carries goes on.
+    /// Returns the torque that the position controller must take over, N·m. The spring (`spring`, N·m) may have opposed a part of the load;
+    /// that part no longer acts. If the spring carried a part of a doubted load, the position controller continues to carry it.
     pub fn left(&self, spring: f64) -> f64 {
         if self.lowers {
             self.load
@@ -216,8 +217,8 @@ impl Yield {
         }
     }
 
-    /// Returns the torque that Teaching carries, N·m: of a doubted load only the part that the `spring` (N·m) leaves, because the rest may
-    /// not be there.
+    /// Returns the torque that Teaching carries, N·m. Of a doubted load this is only the part that the `spring` (N·m) has not opposed,
+    /// because the rest may not exist.
     pub fn taught_load(&self, spring: f64) -> f64 {
         if self.load.abs() < 0.5 * self.least.abs() { self.left(spring) } else { self.load }
     }
@@ -227,7 +228,7 @@ impl Yield {
         self.load
     }
 
-    /// Runs a tick. Returns spring, load and damper as the parts of a PID controller, N·m.
+    /// Runs one tick. Returns spring, load and damper as the parts of a PID torque, N·m.
     pub fn step(&mut self, joint: &Joint<'_>) -> PidTorque {
         let limit = joint.limits.torque_max;
         let most = joint.share * limit;
@@ -235,7 +236,7 @@ impl Yield {
         self.missing = if joint.fresh { 0 } else { self.missing.saturating_add(1) };
 
         let soft = self.swing.step(velocity);
-        // With `wanted` alone, a joint at half of its velocity limit is braked with all of its torque limit.
+        // With `wanted`, a joint at half of its velocity limit is braked with all of its torque limit.
         let wanted = 2.0 * (limit - most) / joint.limits.velocity_max;
         let damping = if self.lowers {
             LOWERING_RATE / f64::from(joint.lowering.max(1)) * self.inertia
@@ -243,7 +244,7 @@ impl Yield {
             wanted.min(soft * DAMPING_RATE * self.inertia)
         };
         self.damping += SETTLES * (damping - self.damping);
-        // Zero in the first tick: a torque that it begins with would be blended in.
+        // Zero in the first tick, because an initial torque would be blended in.
         let brakes = if self.lowers { BRAKES_LOWERED } else { BRAKES };
         let brake = soft * self.braking * self.grip * brake(joint, self.inertia, brakes);
         self.braking += BRAKE_SETTLES * (1.0 - self.braking);
@@ -254,7 +255,7 @@ impl Yield {
         let end = soft_end::spring(soft_end::depth(joint.position, joint.range), most);
         let pull = stiffness * (self.set - joint.position) + end;
         let spring = self.grip * pull.max(-most).min(most);
-        // Only for a shove do spring and damper together exceed the share.
+        // The sum of spring and damper exceeds the share only for a shove.
         let p = if self.lowers { 0.0 } else { within(spring, d, most) };
 
         let carried = joint.model + if self.lowers { self.least } else { self.load };
@@ -268,7 +269,7 @@ impl Yield {
         if !self.lowers {
             self.doubt(velocity, p + d);
         } else if loaded {
-            // Never beyond the limit. The torque at the beginning is not taken back from a joint that is lifted.
+            // The load never exceeds the limit. If the joint is lifted, the load does not fall below its initial torque.
             let learned = self.load + damper * DT / LEARNS_S;
             let learned = if carried > 0.0 { learned.max(self.least) } else { learned.min(self.least) };
             self.load = learned.max(-limit - joint.model).min(limit - joint.model);
@@ -283,7 +284,7 @@ impl Yield {
         PidTorque { p, i: self.load, d }
     }
 
-    /// Lets a load go that drives the joint by itself, against this `torque` (N·m) of spring and damper; the load comes back if the joint
+    /// Reduces a load that drives the joint by itself, against this `torque` (N·m) of spring and damper. The load returns if the joint
     /// sinks without it.
     fn doubt(&mut self, velocity: f64, torque: f64) {
         let (along, has) = (velocity * self.least.signum(), self.load.abs());
@@ -302,8 +303,8 @@ impl Yield {
     }
 }
 
-/// Returns the torque of a brake against a fast motion of a joint with this `inertia` (kg·m²), N·m: the measured speed is too old for the
-/// damper of a light joint to stop a shove.
+/// Returns the torque of a brake against a fast motion of a joint with this `inertia` (kg·m²), N·m. The damper of a light joint cannot stop
+/// a shove, because the measured speed is too old.
 fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     let JointConfig { torque_max, velocity_max, .. } = *joint.limits;
     let slope = (torque_max / ((to - from) * velocity_max)).min(BRAKE_RATE * inertia);
@@ -311,18 +312,18 @@ fn brake(joint: &Joint<'_>, inertia: f64, (from, to): (f64, f64)) -> f64 {
     if beyond > 0.0 { -(slope * beyond).min(torque_max) * joint.young_velocity.signum() } else { 0.0 }
 }
 
-/// Number of yields of each joint in the last seconds.
+/// Number of yields of each joint within the last seconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Yielded {
     times: [u8; JOINTS],
-    /// Ticks since a joint yielded.
+    /// Ticks since the last yield of a joint.
     since_ms: u16,
 }
 
 remembered!(Yielded { times, since_ms });
 
 impl Yielded {
-    /// Runs a tick.
+    /// Runs one tick.
     pub fn step(&mut self) {
         self.since_ms = self.since_ms.saturating_add(1).min(AGAIN_MS);
         if self.since_ms == AGAIN_MS {
@@ -330,7 +331,7 @@ impl Yielded {
         }
     }
 
-    /// Counts a yield of the joint. Returns `true` if the joint yields too often: its yield then continues until the host clears it.
+    /// Counts a yield of the joint. Returns `true` if the joint yields too often, so that its yield continues until the host clears it.
     pub fn count(&mut self, joint: usize) -> bool {
         self.since_ms = 0;
         let Some(times) = self.times.get_mut(joint) else { return false };

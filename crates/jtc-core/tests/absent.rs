@@ -1,4 +1,4 @@
-//! Absent joints (J-53): values that stand for them, refused commands, and a drive that answers nevertheless.
+//! Absent joints (J-53): their substitute values, refused commands, and a drive that answers although its joint is absent.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -18,7 +18,7 @@ fn set(rig: &mut Rig, values: &[(u8, usize, f64)]) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Flag and angle of each joint that is absent.
+/// Settings (absent flag and angle) of each joint that is absent.
 fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
     joints
         .iter()
@@ -26,7 +26,7 @@ fn absent(joints: &[(usize, f64)]) -> Vec<(u8, usize, f64)> {
         .collect()
 }
 
-/// Returns a bench without these joints: their nodes never answer.
+/// Returns a rig in which these joints are absent. Their nodes never answer.
 fn bench(joints: &[(usize, f64)]) -> Rig {
     bench_with(Config::avena(), joints)
 }
@@ -51,8 +51,7 @@ fn is_absent(rig: &Rig, j: usize) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(48) })]
 
-    /// With any set of absent joints, the others are brought up and held, with the torque that the model has for the
-    /// whole arm.
+    /// Whichever joints are absent, the other joints are brought up and held, with the torque that the model of the whole arm requires.
     #[test]
     fn j53_absent_joints_are_waited_for_nowhere(mask in 1u8..63, angles in prop::array::uniform6(-1.5..1.5f64)) {
         let joints: Vec<_> = ALL.into_iter().filter(|j| mask & (1 << j) != 0).map(|j| (j, angles[j])).collect();
@@ -73,7 +72,7 @@ proptest! {
                 prop_assert!((telemetry.joints[j].torque_model - gravity[j]).abs() < 1e-3, "joint {}", j + 1);
             }
         }
-        // Their nodes were never addressed.
+        // The nodes of absent joints never got a frame of their own.
         for request in &rig.sent {
             match request {
                 Request::Move { torque, .. } => {
@@ -102,7 +101,7 @@ fn j53_absent_is_set_in_init_and_error_only() {
         rig.move_along(&pieces(2, &[(1.0, 30), (0.0, 100), (-1.0, 30)]), 100);
         assert_eq!(set(&mut rig, &all), DataStatus::NotAllowed, "Operate");
         assert!(!is_absent(&rig, j));
-        // In Error, because a drive went silent.
+        // The same in Error, after a drive has stopped answering.
         rig.nodes[j].silent = true;
         rig.until(50, |r| r.state() == ControllerState::Error);
         assert_eq!(set(&mut rig, &all), DataStatus::NoError);
@@ -139,11 +138,11 @@ fn j53_absent_joints_forbid_motion_and_teaching_and_are_not_jogged() {
     }
 }
 
-/// Either the drive or the setting is wrong: the arm has no torque until this is corrected.
+/// Either the drive or the setting is wrong. The arm has no torque until this is corrected.
 #[test]
 fn j53_absent_joints_whose_drives_answer_are_an_error() {
     for j in ALL {
-        // From the start, and when the drive is connected later.
+        // The drive answers from the start, or is connected later.
         for later in [false, true] {
             let mut rig = if later {
                 let mut rig = bench(&[(j, 0.3)]);
@@ -158,14 +157,14 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
             };
             rig.until(10, |r| r.state() == ControllerState::Error);
             assert_ne!(rig.errors() & error::EXTERNAL_JOINTS, 0);
-            // Its state is shown, so that the operator sees which joint it is.
+            // The state of the drive is shown, so that the operator can see which joint it is.
             let shown = rig.status().joints.map(|joint| joint.state);
             assert_eq!(shown[j], rig.nodes[j].report.state);
             rig.clear(true, 0x7F);
             rig.run(500);
             assert_eq!(rig.state(), ControllerState::Error, "it answers still");
             assert!(rig.torque == [0.0; 6]);
-            // The joint is set present.
+            // The joint is no longer marked as absent.
             assert_eq!(set(&mut rig, &[(settings::ABSENT, j, 0.0)]), DataStatus::NoError);
             rig.run(50);
             rig.clear(true, 0x7F);
@@ -177,7 +176,7 @@ fn j53_absent_joints_whose_drives_answer_are_an_error() {
     }
 }
 
-/// The drive of an absent joint is disabled if it is enabled, for any cause.
+/// An enabled drive of an absent joint is disabled, whatever has enabled it.
 #[test]
 fn j53_absent_joints_are_disabled_where_they_are_enabled() {
     let mut rig = bench(&[(2, 0.0)]);
@@ -200,7 +199,7 @@ fn j53_absent_joints_hide_no_error_of_the_others() {
     }
 }
 
-/// While the only present node boots, no node acknowledges.
+/// While the only present node starts, no node acknowledges.
 #[test]
 fn j53_absent_joints_acknowledge_nothing() {
     let five: Vec<_> = (1..6).map(|j| (j, 0.0)).collect();
@@ -220,7 +219,7 @@ fn j53_absent_joints_acknowledge_nothing() {
     assert_eq!(resets.count(), 0, "what is not there is not reset");
 }
 
-/// Absent joints do not belong to the arm settings, and a payload is carried with them as without.
+/// The absent joints are not part of the arm's settings. A payload is carried whether joints are absent or not.
 #[test]
 fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     let mut rig = bench(&[(1, 0.9), (4, -0.3)]);
@@ -239,14 +238,14 @@ fn j53_j60_absent_joints_are_no_part_of_the_arm() {
     assert_eq!((q[1], q[4]), (0.9, -0.3));
 }
 
-/// A payload or a model is not refused because of a load that only an absent joint would hold.
+/// A payload or a model is not refused because of a load that only an absent joint would have to hold.
 #[test]
 fn j53_absent_joints_hold_nothing() {
     let payload = |mass: f64| {
         let payload = Payload { mass, ..Payload::NONE };
         settings::payload_values(&payload).flat_map(|value| value.emit()).collect::<Vec<u8>>()
     };
-    // Stretched out: joint 2 can hold little more than the arm itself.
+    // The arm is stretched out, so joint 2 can hold little more than the arm itself.
     for there in [true, false] {
         let mut rig = if there { Rig::new(Config::avena()) } else { bench(&[(1, 1.5)]) };
         if there {
@@ -258,7 +257,7 @@ fn j53_absent_joints_hold_nothing() {
         assert_eq!(rig.state(), ControllerState::HoldPos);
         let expected = if there { DataStatus::IncorrectValue } else { DataStatus::NoError };
         assert_eq!(rig.ask(FrameType::SetSettings, &payload(8.0)), expected);
-        // Also when the load is checked again, at the end of Init.
+        // The load is accepted again when it is checked at the end of Init.
         rig.press_stop(10);
         rig.clear(true, 0x7F);
         rig.run(3_000);

@@ -1,4 +1,4 @@
-//! The approach to the path and the departure from it: data of a motion must not be kept longer than they are valid.
+//! The approach to the path, and the departure from it. State that belongs to a motion must not remain after the motion.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, Payload, TrajectoryState, joint_error};
@@ -6,7 +6,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats, model_body, raw, segment_body};
 
-/// A motion at 0.1 rad/s at most, at rest at both ends.
+/// A motion with at most 0.1 rad/s, at rest at both ends.
 fn points() -> Vec<RawPoint> {
     (0..200)
         .map(|k| {
@@ -19,13 +19,13 @@ fn points() -> Vec<RawPoint> {
         .collect()
 }
 
-/// A pause whose end was not detected is over once the arm is taught, because a hand then moves the joints.
+/// If the end of a pause was not detected, the pause ends when the arm is taught, because a hand then moves the joints.
 #[test]
 fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     let mut rig = Rig::holding();
     rig.move_along(&points(), 500);
     rig.urgent(0, UrgentCommand::Pause);
-    // The arm still moves a little when the path stands.
+    // The arm still moves a little when path time is at rest.
     rig.nodes[1].report.velocity = 0.05;
     rig.until(600, |r| r.trajectory() == TrajectoryState::Pause);
     rig.run(2);
@@ -40,7 +40,7 @@ fn j33_the_end_of_a_pause_is_no_matter_of_teaching() {
     }
 }
 
-/// A Stop or a Pause means that the arm must be held, and also cancels a Teaching that waits for standstill.
+/// A Stop or a Pause requires that the arm is held. It therefore also cancels a teach request that waits for standstill.
 #[test]
 fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
     for command in [ExecCommand::Stop, ExecCommand::Pause] {
@@ -56,13 +56,13 @@ fn j33_j25_a_stop_or_a_pause_ends_teaching_and_one_that_is_waited_for() {
             rig.nodes[1].report.velocity = 0.0;
             rig.run(12_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{command:?} {taught_ms}");
-            // The second command has nothing to stop.
+            // The second command has no effect, because there is nothing to stop.
             assert_eq!(rig.exec(command), DataStatus::NotAllowed);
         }
     }
 }
 
-/// The operator who stops an arm may also press another key.
+/// An operator who stops an arm may press Pause as well.
 #[test]
 fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     for ms in [1, 20, 100, 180] {
@@ -77,7 +77,7 @@ fn j33_a_pause_while_a_stop_slows_the_arm_down_leaves_it_a_stop() {
     }
 }
 
-/// An arm that is touched after a pause is held; only path time that cannot be stopped is an error.
+/// If an arm is touched after a pause, it is held. Only path time that cannot be stopped is an error.
 #[test]
 fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     let mut rig = Rig::holding();
@@ -91,7 +91,7 @@ fn j33_an_arm_that_is_touched_after_a_pause_is_not_dropped() {
     );
 }
 
-/// The approach to the first point is faster than the path, and faster than the range of its friction table.
+/// The approach to the first point is faster than the path, and faster than the friction table allows.
 #[test]
 fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     let mut rig = Rig::new(Config::avena());
@@ -112,8 +112,8 @@ fn j36_the_way_to_the_first_point_is_not_judged_by_the_table() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// A Stop or a Pause on the approach: the arm slows down at once, and stands before it reaches the first point. The
-/// next Execute begins from there.
+/// A Stop or a Pause during the approach: the arm slows down at once and comes to rest before it reaches the first point. The next Execute
+/// begins from there.
 #[test]
 fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     for (command, trajectory) in
@@ -142,7 +142,7 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
             });
             let rest = set(&rig).0;
             assert!(ticks <= 230, "{start} after {after_ms} ms: {ticks} ms");
-            // As on a path that still gets faster, the ramp takes over first.
+            // The arm may still accelerate while the ramp begins, as on a path.
             assert!(fastest < speed.abs() + 0.4, "{start} after {after_ms} ms: {speed} {fastest} rad/s");
             assert!(0.0 < rest && rest <= at, "{start} after {after_ms} ms: {at} {rest} rad");
             assert!(at - rest < 0.13 * fastest + 1e-3, "{start} after {after_ms} ms: {at} {rest} rad");
@@ -156,9 +156,8 @@ fn j33_j34_a_stop_on_the_way_to_the_first_point_leaves_the_arm_beside_it() {
     }
 }
 
-/// A simulated arm with a load that the controller knows, in random poses, as far from the first point as is allowed:
-/// 0.02 rad, and 0.3 rad with a wide tolerance. No torque reaches its limit on the approach. If Execute is refused,
-/// little torque is left.
+/// A simulated arm with a load that the controller knows, in random poses, at the highest allowed distance from the first point: 0.02 rad,
+/// and 0.3 rad with a wide tolerance. During the approach no torque reaches its limit. If Execute is refused, little torque remains.
 #[test]
 fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     let seed = 13;
@@ -206,8 +205,8 @@ fn j34_an_approach_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of 500 refused; at most {:.0} % of a torque limit, {longest} ms", 100.0 * most);
 }
 
-/// A joint that stands at 98 % of its limit, and whose friction needs more than the margin, does not start: Execute is
-/// refused (8), as for an arm that stands elsewhere.
+/// A joint holds a position with 98 % of its limit, and its friction needs more than the margin. It does not start: Execute is refused (8),
+/// as for an arm at another position.
 #[test]
 fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     let holds = Parameters::avena().model;
@@ -219,7 +218,7 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
         let mut rig = Rig::held_at(config, pose);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
         let mut rest = RawPoint { position: pose.map(|q| raw(q, 3.141592)), ..RawPoint::default() };
-        // Upwards, against gravity.
+        // The motion goes upwards, against gravity.
         rest.position[1] -= raw(0.015, 3.141592);
         assert_eq!(
             rig.ask(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest; 10])),
@@ -232,8 +231,8 @@ fn j34_an_approach_for_which_too_little_torque_is_left_is_refused() {
     }
 }
 
-/// A path may begin outside a limit if the arm stands there (J-36). An arm that stands inside is not moved out to the
-/// path, for any start tolerance.
+/// A path may begin outside a limit if the arm is there (J-36). An arm inside the limits is not moved out to the path, however wide the
+/// start tolerance is.
 #[test]
 fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     for (at, first, tolerance, answer) in [
@@ -265,8 +264,8 @@ fn j34_j36_an_approach_leads_no_joint_out_of_its_range() {
     }
 }
 
-/// An arm that stands exactly at its paused point continues, with any torque margin. A friction table with torque at
-/// standstill once prevented that.
+/// An arm that is exactly at its paused point continues, whatever the torque margin is. A friction table with torque at standstill once
+/// prevented that.
 #[test]
 fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     let model = Parameters::avena().model;
@@ -303,7 +302,7 @@ fn j34_a_path_goes_on_where_it_was_paused_with_any_torque_left() {
     rig.until(6_000, |rig| rig.trajectory() == TrajectoryState::Finish);
 }
 
-/// An arm that stands at the first point sets out at once.
+/// An arm at the first point starts at once.
 #[test]
 fn j34_without_a_distance_there_is_no_approach() {
     for (aside, counts) in [(0, true), (1, false)] {
@@ -376,12 +375,12 @@ fn j16_an_execute_does_not_wait_for_ever() {
     assert_eq!((rig.trajectory(), rig.errors()), (TrajectoryState::Stop, 0));
 }
 
-/// J-06: a model that was sent before the positions are known is checked when they are.
+/// J-06: a model that is received before the positions are known is checked as soon as they are known.
 #[test]
 fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     let mut rig = Rig::new(Config::avena());
     let mut model = Parameters::avena().model;
-    // Millimetres instead of metres.
+    // The lengths are given in millimetres instead of metres.
     for joint in &mut model.joints {
         joint.xyz = joint.xyz.map(|x| 1000.0 * x);
     }
@@ -402,8 +401,8 @@ fn j06_a_model_of_an_arm_that_cannot_be_held_does_not_end_init() {
     rig.until(500, |r| r.state() == ControllerState::HoldPos);
 }
 
-/// Three times the friction of the model, at a torque limit with a small margin: the approach slows down until the
-/// torque suffices, and arrives.
+/// With three times the friction of the model, and a torque limit with a small margin, the approach slows down until the torque suffices,
+/// and reaches the point.
 #[test]
 fn j75_an_approach_that_takes_too_much_torque_is_held_back() {
     let pose = plant::POSES[0];

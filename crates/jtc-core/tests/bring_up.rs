@@ -24,7 +24,7 @@ fn joint_answer(position: f64, state: NodeState) -> Frame {
     Answer::Joint { node: JOINT as u8, report }.emit(SCALE)
 }
 
-/// The drive reports position 0 until it is configured, even if it also sends other answers in that tick.
+/// A drive reports position 0 until it is configured, even in the tick in which it accepts its configuration.
 #[test]
 fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     for move_first in [false, true] {
@@ -43,7 +43,7 @@ fn j16_the_position_does_not_count_in_the_tick_of_the_configuration() {
     }
 }
 
-/// An answer that was on its way when the node was reset does not count for the restarted node.
+/// An answer that was sent before the node was reset is ignored after the restart.
 #[test]
 fn j20_late_answers_after_a_reset_do_not_count() {
     let mut rig = Rig::holding();
@@ -73,7 +73,7 @@ fn j20_late_answers_after_a_reset_do_not_count() {
     assert!(rig.nodes[JOINT].configured);
 }
 
-/// Drives of one generation take their configuration in Init only.
+/// Drives of one generation accept their configuration only in Init.
 #[test]
 fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     let mut rig = Rig::new(Config::avena());
@@ -88,8 +88,7 @@ fn j20_a_ready_node_that_refuses_its_configuration_is_sent_to_init() {
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
 }
 
-/// The way from Error to HoldPos leads through joints in ReadyToOperate; a joint that is still enabled is not taken
-/// over.
+/// The controller leaves Error for HoldPos only when the joints are in ReadyToOperate. A joint that is still enabled is disabled first.
 #[test]
 fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     let mut rig = Rig::holding();
@@ -106,7 +105,7 @@ fn j21_error_is_not_left_for_hold_pos_while_a_joint_is_not_ready() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
 }
 
-/// A node that is on its way through 10, from Start to Init, has not reached the target yet.
+/// A node in state 10, the transition from Start to Init, has not reached Init yet.
 #[test]
 fn j21_a_clear_ends_in_init_and_not_on_the_way_there() {
     let mut rig = Rig::holding();
@@ -134,14 +133,14 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     let mut rig = Rig::holding();
     rig.safety_input = false;
     rig.run(50);
-    // The node has restarted: its configuration is lost.
+    // The node has restarted, so its configuration is lost.
     rig.nodes[JOINT].restart();
     let from = rig.sent.len();
     rig.run(500);
     assert_eq!(rig.state(), ControllerState::Error);
     assert!(!rig.sent[from..].iter().any(configures));
 
-    // In Init: it waits in ReadyToOperate without configuration, and has something to clear.
+    // In Init the node waits in ReadyToOperate without a configuration, and has an error to clear.
     let mut rig = Rig::new(Config::avena());
     rig.until(300, |r| r.nodes[JOINT].booting == 0 && r.nodes[JOINT].resets == 1);
     rig.nodes[JOINT].report.state = NodeState::READY;
@@ -158,10 +157,10 @@ fn j21_nodes_are_not_configured_in_error_nor_while_they_are_cleared() {
     assert!(rig.sent[from..].iter().any(|r| target_of(r) == Target::Init));
 }
 
-/// Occurred words report past errors, current words present ones.
+/// The occurred words report past errors, the current words present errors.
 #[test]
 fn j21_occurred_errors_are_not_reported_as_current() {
-    // A joint's own error, and a CAN timeout.
+    // An error of a joint, and a CAN timeout.
     let mut rig = Rig::holding_with(Config { torque_release: true, ..Config::avena() });
     rig.push(JOINT, 0.2);
     rig.run(50);
@@ -185,8 +184,8 @@ fn j21_occurred_errors_are_not_reported_as_current() {
     assert!(status.occurred != 0 && status.can_occurred != 0 && status.joints[JOINT].internal_occurred != 0);
 }
 
-/// The drive must go through Init to clear its error: if the last parameter comes in the very next frame, the arm is
-/// held only after that.
+/// The drive must go through Init to clear its error. If the last parameter arrives in the very next frame, the arm is held only after
+/// that.
 #[test]
 fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
     let mut rig = Rig::new(Config::avena());
@@ -212,12 +211,12 @@ fn j21_what_is_being_cleared_in_init_is_cleared_before_the_arm_is_held() {
 fn j20_boot_resets_every_node_once_and_brings_them_to_ready() {
     let mut rig = Rig::new(Config::avena());
     rig.run(500);
-    // Without parameters it stays in Init, with no joint enabled.
+    // Without parameters the controller stays in Init, and no joint is enabled.
     assert_eq!(rig.state(), ControllerState::Init);
     assert!(rig.nodes.iter().all(|n| n.resets == 1 && n.report.state == NodeState::READY && n.configured));
     let status = rig.status();
     assert_eq!((status.jtc_init, status.node_init), (0b111, 0));
-    // Each parameter clears its bit; then Init ends.
+    // Each parameter clears its bit. Then Init ends.
     for (t, left) in [
         (FrameType::PidParamUseDefault, 0b101),
         (FrameType::FrictionTableUseDefault, 0b100),
@@ -307,7 +306,7 @@ fn j16_enabling_has_a_time_limit() {
         (rig.state(), rig.errors()),
         (ControllerState::Error, error::EXTERNAL | error::EXTERNAL_JOINTS)
     );
-    // The default leaves time for the four seconds of motor alignment.
+    // The default leaves time for the motor alignment, which takes four seconds.
     assert_eq!(Config::avena().enable_timeout_ms, 10_000);
 }
 
@@ -325,7 +324,7 @@ fn j16_only_known_states_are_requested_and_positions_count_after_configuration()
         for j in 0..6 {
             let q = t.joints[j].position;
             assert!(q == 0.0 || (q - 0.1 * j as f64).abs() < 1e-6);
-            // The zero that is reported before configuration is never latched as a hold position.
+            // The position 0 that a drive reports before its configuration is never latched as hold position.
             if t.state == ControllerState::HoldPos {
                 assert!((t.joints[j].set_position - 0.1 * j as f64).abs() < 1e-6);
             }

@@ -1,4 +1,4 @@
-//! Enabling an arm that carries a load which its model lacks (J-43): every load within the torque limits is caught.
+//! Enabling an arm with a load that its model lacks (J-43): every load within the torque limits is caught.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -8,7 +8,7 @@ use jtc_wire::{ExecCommand, RawPoint};
 use plant::{LuGre, POSES, Plant, loaded};
 use rig::Rig;
 
-/// Friction from zero, which damps no swing, to that of the default arm.
+/// Friction from zero, which does not damp a swing, to the friction of the default arm.
 const FRICTIONS: [f64; 4] = [0.0, 0.1, 0.3, 1.0];
 
 fn friction(factor: f64) -> [LuGre; 6] {
@@ -28,7 +28,7 @@ struct Let {
     arm: Plant,
     rig: Rig,
     pose: [f64; 6],
-    /// Largest motion of a joint, rad, and ticks with torque at its limit.
+    /// Largest motion of a joint, rad, and number of torques at their limits.
     sag: f64,
     saturated: u32,
 }
@@ -59,7 +59,7 @@ impl Let {
         }
     }
 
-    /// Runs from the moment at which its joints are enabled.
+    /// Checks `ticks` ticks, beginning when the joints are enabled.
     fn caught(&mut self, ticks: usize) {
         while !self.enabled() {
             self.run(1);
@@ -83,7 +83,7 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
                 it.caught(3000);
                 let about = format!("{mass} kg at {pose:?}, friction times {factor}");
                 assert_eq!((it.rig.state(), it.rig.errors()), (ControllerState::HoldPos, 0), "{about}");
-                // The joints sag until P and the integral carry it; at the limit a little further.
+                // The joints sag until P and the integral carry the load. If the torque reaches its limit, they sag a little further.
                 let sag = if it.saturated > 10 { 0.02 } else { 0.01 };
                 assert!(it.sag < sag, "{about}: {} rad", it.sag);
                 let from = it.arm.q;
@@ -97,14 +97,14 @@ fn j43_an_unknown_payload_that_the_torque_limits_hold_is_caught() {
     assert!(most > 0.93 && fought >= 6, "no load was near the limit: {most}, {fought}");
 }
 
-/// Without brakes, and joint 2 moves when it is enabled, nearly as fast as it may.
+/// Without brakes, joint 2 moves when it is enabled, nearly as fast as allowed.
 #[test]
 fn j43_an_unknown_payload_is_caught_in_motion() {
     for velocity in [-0.2, 0.2] {
         let mut it = Let::new(Config::avena(), 2.5, POSES[1], 0.1);
         it.arm.brakes = false;
         while !it.enabled() {
-            // Hands hold it back.
+            // Hands hold the arm back.
             (it.arm.q, it.arm.v) = (POSES[1], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
             it.run(1);
         }
@@ -140,8 +140,8 @@ fn j43_a_load_that_the_torque_limits_do_not_hold_is_an_error_soon() {
     assert!(cases > 20, "{cases}");
 }
 
-/// The time for a catch ends one second after a joint was enabled; a load that comes later is an error of J-43 again.
-/// The time is a setting.
+/// The time for a catch ends one second after a joint was enabled. A load that is added later is an error of J-43 again. The time is a
+/// setting.
 #[test]
 fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     for (catch_ms_max, after) in [(1_000, 1_000), (300, 300), (0, 0)] {
@@ -156,7 +156,7 @@ fn j43_a_load_that_comes_later_is_an_error_after_its_time() {
     }
 }
 
-/// An Execute that waits for a joint waits until its load is caught, too.
+/// An Execute that waits for a joint also waits until its load is caught.
 #[test]
 fn j34_an_execute_waits_until_the_load_is_caught() {
     let mut it = Let::new(Config::avena(), 2.6, POSES[1], 0.1);

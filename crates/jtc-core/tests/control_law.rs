@@ -41,7 +41,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     let points: Vec<_> = (0..100i16)
         .map(|i| RawPoint {
             position: [i; 6],
-            // Up and down again: the motion must end at rest.
+            // The velocity rises and falls again, because the motion must end at rest.
             velocity: [50 * i.min(99 - i), 0, 30 * i.min(99 - i), 0, 0, 0],
             acceleration: [300, 0, 200, 0, 0, 100],
         })
@@ -50,7 +50,7 @@ fn j40_holds_with_gravity_and_follows_with_velocity_acceleration_and_rotor() {
     rig.move_along(&points, 105);
     let t = rig.controller.telemetry();
     let (q, qd, qdd) = (
-        // J-62: the measured position, moved on by the motion that was commanded since the measurement.
+        // J-62: the measured position plus the motion that was commanded since the measurement.
         t.joints.map(|j| j.position + (j.set_position - j.due_position)),
         t.joints.map(|j| j.set_velocity),
         t.joints.map(|j| j.set_acceleration),
@@ -71,7 +71,7 @@ fn j40_gravity_is_a_setting() {
     for j in 0..6 {
         assert!((model(&down)[j] + model(&up)[j]).abs() < 1e-9);
     }
-    // At zero the arm is stretched along the vertical: only gravity across it loads joint 1.
+    // At position zero the arm is stretched vertically. Only a horizontal gravity loads joint 1.
     assert!(model(&down)[1].abs() < 1.0);
     assert!(model(&sideways)[1].abs() > 50.0);
 }
@@ -97,7 +97,7 @@ fn j41_no_derivative_kick_when_holding_begins() {
 fn j43_an_error_zeroes_the_torque_of_the_same_tick() {
     let config = Config { torque_release: true, torque_over_ms: 0, catch_ms_max: 0, ..Config::avena() };
     let mut rig = Rig::holding_with(config);
-    rig.push(5, 0.02); // 80 N·m wanted, 40 N·m allowed
+    rig.push(5, 0.02); // 80 N·m computed, 40 N·m allowed
     rig.run(2);
     assert_eq!(rig.state(), ControllerState::Error);
     assert_eq!(rig.status().joints[5].internal, joint_error::TORQUE);
@@ -125,7 +125,7 @@ fn j43_the_torque_saturates_at_its_limit_for_a_while_at_most_and_j41_holds_the_i
 
 #[test]
 fn j42_polynomial_order_and_lengths() {
-    // Highest index first on the wire: c3, c2, c1, c0.
+    // The wire format has the highest index first: c3, c2, c1, c0.
     let mut rig = Rig::holding();
     let four = floats((0..6).flat_map(|_| [0.0, 0.0, 0.0, 5.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &four), DataStatus::NoError);
@@ -136,7 +136,7 @@ fn j42_polynomial_order_and_lengths() {
     for j in &rig.controller.telemetry().joints {
         assert!((j.torque_friction - 5.0).abs() < 1e-9, "Coulomb friction only: {}", j.torque_friction);
     }
-    // Six: c5..c0, and 25 °C is c5, so the factor is 1.
+    // Six coefficients: c5..c0. c5 is 25 °C, so the factor is 1.
     let mut rig = Rig::holding();
     let six = floats((0..6).flat_map(|_| [25.0, -0.02, 0.0, 0.0, 10.0, 2.0]));
     assert_eq!(rig.ask(FrameType::FrictionPolynomial, &six), DataStatus::NoError);
@@ -151,7 +151,7 @@ fn j42_polynomial_order_and_lengths() {
 fn j44_no_torque_step_at_any_switch() {
     let mut rig = Rig::holding();
     rig.follow = false;
-    // A lasting error, so that the PID controller has torque to carry over.
+    // A permanent error, so that the PID controller has torque to carry over.
     for j in 0..6 {
         rig.nodes[j].report.position = 0.0003;
     }
@@ -161,7 +161,7 @@ fn j44_no_torque_step_at_any_switch() {
     let points: Vec<_> = (0..60).map(|_| rest(0)).collect();
     rig.upload(&points, 10);
     rig.send(FrameType::TrajSetExecStatus, &[3]);
-    // Slack: integral and the blend of 100 ms.
+    // The slack is for the integral and for the blend of 100 ms.
     run_without_steps(&mut rig, 1200, 1.5);
     assert_eq!(rig.trajectory(), TrajectoryState::Finish);
     rig.send(FrameType::TeachingModeEnable, &[]);
@@ -182,7 +182,7 @@ fn j25_teaching_compensates_gravity_and_damps_what_moves() {
     rig.run(150);
     rig.run(100);
     assert_eq!(torques(&rig), model(&rig), "nothing but the model");
-    // The joint has more friction of its own than Teaching adds; Teaching compensates half of the Coulomb part.
+    // The joint has more friction of its own than Teaching adds. Teaching compensates half of the Coulomb part.
     rig.nodes[2].report.velocity = 0.2;
     rig.run(3);
     let t = rig.controller.telemetry().joints[2];
@@ -214,7 +214,7 @@ fn j25_leaving_teaching_in_motion_comes_to_rest() {
 
 #[test]
 fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
-    // The rig's joint moves without torque, so the controller must not run into a torque limit.
+    // The joint of the rig moves without torque, so the torque limit must not be reached.
     let mut config = Config::avena();
     config.joints[1].torque_max = 360.0;
     let limits = config.joints[1];
@@ -241,7 +241,7 @@ fn j25_coming_to_rest_is_smooth_and_stays_inside_both_limits() {
                 let t = rig.controller.telemetry().joints[1];
                 assert!(side * (limit - t.set_position) >= 0.0, "{} beyond {limit}", t.set_position);
                 assert!((t.set_velocity - last.set_velocity).abs() < 0.01, "{last:?} {t:?}");
-                // J-40: gravity and what decelerates the joint.
+                // J-40: gravity, and the torque that decelerates the joint.
                 let now = rig.controller.telemetry().joints;
                 let q = now.map(|j| j.position + (j.set_position - j.due_position));
                 let (v, a) = (now.map(|j| j.set_velocity), now.map(|j| j.set_acceleration));
@@ -275,7 +275,7 @@ fn j06_refused_parameters_change_nothing() {
         .collect();
     table[5 * 440 + 7] = table[5 * 440 + 6];
     assert_eq!(rig.ask(FrameType::FrictionTable, &floats(table.clone())), DataStatus::IncorrectValue);
-    // Bodies of zeros: masses of links 1..5 are zero.
+    // All values are zero, so the masses of links 1..5 are zero.
     assert_eq!(rig.ask(FrameType::ArmModel, &vec![0; 532]), DataStatus::IncorrectValue);
     let status = rig.status();
     assert_eq!((status.jtc_init, status.friction_type), (0b111, 0));

@@ -1,4 +1,4 @@
-//! A measurement is older than the command of the same tick, and is compared with the set value of its own time (J-62).
+//! A measurement is older than the command of the same tick. It is compared with the set value of its own time (J-62).
 use crate::{plant, rig};
 
 use std::collections::VecDeque;
@@ -11,11 +11,11 @@ use proptest::prelude::*;
 use rig::{Rig, floats, pieces, put};
 
 const DT: f64 = 1e-3;
-/// Largest setting.
+/// Highest delay setting.
 const DELAY_MAX: u8 = 7;
 
 fn delayed(ticks: u8) -> Config {
-    // The deviation that a wrong delay causes in an exact motion must not count as a push.
+    // The deviation that a wrong delay causes in an exact motion must not be considered a push.
     let mut config = Config { delay_ticks: ticks, torque_release: true, ..Config::avena() };
     if ticks > 3 {
         // With the longest delays the gains need heavier joints (J-71).
@@ -52,7 +52,7 @@ struct LateArm {
 }
 
 impl LateArm {
-    /// Creates the arm of the model, without friction: the remaining deviation is caused by late measurements.
+    /// Creates an arm that equals the model, without friction, so that the remaining deviation comes from late measurements.
     fn holding(late: u8, config: Config) -> Self {
         let arm = Plant::new(&Parameters::avena().model, [LuGre::NONE; 6], [0.0; 6]);
         let mut rig = Rig::new(config);
@@ -74,8 +74,8 @@ impl LateArm {
         self.arm.tick_seen_at(&mut self.rig, &self.past[self.late - 1]);
     }
 
-    /// Executes `points`; returns the RMS over the motion of commanded minus true position and of the commanded
-    /// velocity, per joint.
+    /// Executes `points`. Returns for each joint the RMS of the difference between commanded and true position, and the RMS of the
+    /// commanded velocity.
     fn follow(&mut self, points: &[RawPoint]) -> [(f64, f64); 6] {
         self.rig.upload(points, 10);
         self.rig.send(FrameType::TrajSetExecStatus, &[ExecCommand::Execute as u8]);
@@ -105,8 +105,8 @@ impl LateArm {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() })]
 
-    /// A delay setting that is wrong by some ticks makes the arm deviate by its motion in these ticks; the right
-    /// setting leaves a small part of that.
+    /// If the delay setting is wrong by some ticks, the arm deviates by its motion in these ticks. With the right setting only a small part
+    /// of that remains.
     #[test]
     fn j62_the_true_position_follows_best_with_the_delay_that_the_answers_have(
         late in 1..=4u8,
@@ -127,8 +127,8 @@ proptest! {
     }
 }
 
-/// An arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. Its
-/// answers are two ticks old or more.
+/// An arm that is exactly at its commanded position in each tick, or at the position to which a hand leads it. Its answers are at least two
+/// ticks old.
 struct ExactArm {
     rig: Rig,
     here: [f64; 6],
@@ -139,11 +139,11 @@ impl ExactArm {
     fn holding(late: u8) -> Self {
         let mut rig = Rig::holding_with(delayed(late));
         rig.follow = false;
-        // The controller sees an answer of now in the next tick; the answer reflects the command of the last tick.
+        // The controller receives an answer of this tick in the next tick. The answer reflects the command of the last tick.
         Self { rig, here: [0.0; 6], past: vec![[0.0; 6]; usize::from(late) - 2].into() }
     }
 
-    /// Runs a tick, in which a hand leads a taught arm at this velocity (rad/s).
+    /// Runs one tick, in which a hand leads a taught arm at this velocity (rad/s).
     fn tick(&mut self, led: f64) -> [JointTelemetry; 6] {
         self.past.push_front(self.here);
         let seen = self.past.pop_back().expect("as many as before");
@@ -161,7 +161,7 @@ impl ExactArm {
         now
     }
 
-    /// Runs ticks until `done`; checks that the PID controller gives no torque in any of them.
+    /// Runs ticks until `done`. Checks that the PID controller gives no torque in any of them.
     fn run(&mut self, what: &str, led: f64, mut done: impl FnMut(&Rig) -> bool) {
         for tick in 0..5_000 {
             if done(&self.rig) {
@@ -175,7 +175,7 @@ impl ExactArm {
                     "an arm that is led is where it is to be: {joint:?}"
                 );
                 let pid = [joint.torque_p, joint.torque_i, joint.torque_d];
-                // Velocities come over the bus in steps of 61 µrad/s.
+                // The bus carries velocities in steps of 61 µrad/s.
                 let quiet = pid.iter().all(|part| part.abs() < 0.05);
                 assert!(quiet, "{what}, tick {tick}, joint {}: {pid:?}, {joint:?}", j + 1);
             }
@@ -184,7 +184,7 @@ impl ExactArm {
         panic!("{what}: it goes on for ever: {:?}", self.rig.controller.telemetry());
     }
 
-    /// Sends a command and runs until its effect.
+    /// Sends a command and runs until it has taken effect.
     fn command(&mut self, what: &str, frame: FrameType, body: &[u8], done: fn(&Rig) -> bool) {
         self.rig.send(frame, body);
         let mut ticks = 0;
@@ -195,8 +195,7 @@ impl ExactArm {
     }
 }
 
-/// At every begin, continuation and end of a motion, an arm that follows exactly gets no torque from the PID
-/// controller.
+/// Whenever a motion begins, continues or ends, an arm that follows exactly gets no torque from the PID controller.
 #[test]
 fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
     const EXEC: FrameType = FrameType::TrajSetExecStatus;
@@ -223,7 +222,7 @@ fn j44_j62_an_arm_that_follows_exactly_has_no_pid_torque_at_any_change() {
             });
             arm.rig.send(FrameType::TeachingModeDisable, &[]);
             arm.run("teaching ends", led, held);
-            // The joint moved on; the arm comes to rest from there.
+            // The joint has moved on, and comes to rest from there.
             let from = arm.here[0];
             for _ in 0..400 {
                 arm.tick(0.0);
@@ -239,7 +238,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
     const JOINT: usize = 1;
     for (late, velocity) in [(2, 0.6), (3, -0.4), (5, 1.1), (DELAY_MAX, -1.2)] {
         let mut arm = ExactArm::holding(late);
-        // A drive is slow to be enabled, and meanwhile the joint begins to fall.
+        // A drive is slow to enable, and the joint begins to fall meanwhile.
         arm.rig.nodes[JOINT].slow_enable = true;
         arm.rig.press_stop(1);
         arm.rig.clear(true, 0x7F);
@@ -255,7 +254,7 @@ fn j62_a_joint_that_falls_when_it_is_enabled_has_no_pid_torque_if_it_follows() {
         }
         arm.rig.nodes[JOINT].report.velocity = velocity;
         arm.rig.nodes[JOINT].report.state = jtc_bus::NodeState::ENABLED;
-        // The joint continues until its answer has come.
+        // The joint continues its motion until its answer has arrived.
         for _ in 0..900 {
             arm.past.push_front(arm.here);
             let seen = arm.past.pop_back().expect("as many as before");
@@ -278,7 +277,7 @@ fn steady() -> Vec<RawPoint> {
     pieces(0, &[(5.0, 20), (0.0, 50), (-5.0, 20)])
 }
 
-/// A joint at this speed moves a millirad per tick.
+/// At this speed a joint moves by 1 mrad per tick.
 #[test]
 fn j43_j62_the_position_error_is_that_of_the_same_time() {
     for late in 2..=DELAY_MAX {
@@ -305,8 +304,7 @@ fn j43_j62_the_position_error_is_that_of_the_same_time() {
     }
 }
 
-/// The reported position error is the one on which the law acts: with a delay, the error of that number of ticks
-/// before.
+/// The reported position error is the one that the control law uses. With a delay it belongs to a time that number of ticks ago.
 #[test]
 fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     for delay in 0..=DELAY_MAX {
@@ -333,8 +331,7 @@ fn j62_the_error_that_is_reported_is_the_one_that_acts() {
     }
 }
 
-/// Without a delay the law is that of J-40 and J-41 to the last bit: the set value of this tick, and the measured
-/// position.
+/// Without a delay the control law is that of J-40 and J-41 bit for bit: it compares the set value of this tick with the measured position.
 #[test]
 fn j62_without_a_delay_the_present_set_value_is_compared() {
     let config = delayed(0);
@@ -361,9 +358,8 @@ fn j62_without_a_delay_the_present_set_value_is_compared() {
     assert!(moved > 0.2, "{moved} rad/s");
 }
 
-/// The prediction for a lost measurement equals the measurement: for an arm that follows exactly, the PID controller
-/// has nothing left to do, at any time of the loss in a motion with corners of the velocity, and for any age of the
-/// answers.
+/// The prediction for a lost measurement equals the measurement. For an arm that follows exactly, the PID controller gives no torque,
+/// whenever the loss occurs in a motion with corners of the velocity, and however old the answers are.
 #[test]
 fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
     for late in [2, 4, DELAY_MAX] {
@@ -379,13 +375,13 @@ fn j62_j63_a_lost_measurement_is_predicted_for_its_own_time() {
             }
             assert_eq!((arm.rig.trajectory(), arm.rig.errors()), (TrajectoryState::Finish, 0));
         }
-        // The prediction uses the rate of the last 5 ms, in which a corner was; 4 ms after the corner.
+        // The prediction uses the rate of the last 5 ms, which contain a corner until 4 ms after it.
         assert!(worst < 1.25e-4, "{late} ticks late: {worst} rad");
     }
 }
 
-/// If measurements are lost while a position hold begins in motion, the prediction continues as usual: the beginning
-/// motion of the set values does not change the true motion.
+/// If measurements are lost while position hold begins during a motion, the prediction continues as usual, because the restarted set values
+/// do not change the true motion.
 #[test]
 fn j63_a_loss_over_the_end_of_teaching_makes_no_step() {
     for late in [2, 5] {

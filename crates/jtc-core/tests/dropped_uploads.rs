@@ -1,5 +1,5 @@
-//! A Stop during an upload drops it: no part of it is executed, and jogging, teaching and the next upload are possible
-//! (J-30, J-58).
+//! A Stop during an upload drops it. No part of the upload is executed, and jogging, teaching and the next upload are possible (J-30,
+//! J-58).
 use crate::rig;
 
 use jtc_core::{ControllerState, TrajectoryState};
@@ -8,7 +8,7 @@ use rig::{Rig, floats, rest, segment_body};
 
 use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed};
 
-/// Segments of the upload that a Stop drops.
+/// Number of segments of the upload that a Stop drops.
 const SEGMENTS: u16 = 4;
 
 fn segment(number: u16, segment: u16, points: usize) -> Vec<u8> {
@@ -25,11 +25,11 @@ fn stops(rig: &Rig) -> Vec<DataStatus> {
     rig.records().iter().filter(stop).map(|record| record.data).collect()
 }
 
-/// Checks that jogging, teaching and, with `upload`, the next upload are possible after the Stop.
+/// Checks that jogging and teaching are possible after the Stop and, with `upload`, the next upload as well.
 fn all_is_free(rig: &mut Rig, upload: bool) {
     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed, "nothing to execute");
     if upload {
-        // With other points: no part of the earlier upload is left in it.
+        // The next upload has other points, and must not contain any point of the earlier one.
         let points: Vec<RawPoint> = vec![rest(0); 60];
         rig.upload(&points, 10);
         assert_eq!(rig.exec(ExecCommand::Execute), NoError);
@@ -65,7 +65,7 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
                     (rig.state(), rig.trajectory()),
                     (ControllerState::HoldPos, TrajectoryState::Null)
                 );
-                // A client that continues gets an error for each segment, and no part of the upload is ever executed.
+                // A client that continues the upload gets an error for each segment, and no part of the upload is ever executed.
                 for n in received..SEGMENTS {
                     assert_eq!(rig.ask(FrameType::Trajectory, &segment(7, n, 30)), NotAllowed, "segment {n}");
                     assert_eq!(rig.exec(ExecCommand::Execute), NotAllowed);
@@ -76,7 +76,7 @@ fn j30_a_stop_between_two_segments_drops_the_upload() {
     }
 }
 
-/// Segments that wait or are being executed, with a Stop in any tick.
+/// A Stop arrives in any tick while segments wait or are being processed.
 #[test]
 fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     for begun in 0..3 {
@@ -106,7 +106,7 @@ fn j30_a_stop_in_the_middle_of_a_segment_drops_it_with_the_upload() {
     }
 }
 
-/// Segment 0 of an upload was received before the Stop, but was not handled yet: the earlier trajectory stays.
+/// Segment 0 of an upload was received before the Stop, but not processed yet. The earlier trajectory stays.
 #[test]
 fn j30_a_stop_drops_an_upload_that_waits_and_keeps_what_is_there() {
     let mut rig = Rig::holding();
@@ -162,17 +162,17 @@ fn j30_a_pause_drops_no_upload() {
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
 }
 
-/// A host on a plain line does not survive a refused segment. Therefore its upload is completed, but the Stop still
-/// acts: the trajectory is not executed.
+/// A host on a plain line cannot handle a refused segment. Therefore its upload is completed, but the Stop still takes effect: the
+/// trajectory is not executed.
 #[test]
 fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
-    // The Stop: its line, the segment whose record comes after it, and the ticks of that segment before it.
+    // The Stop varies in its line, in the segment that is being processed, and in the ticks since that segment was sent.
     for line in [0, 1] {
         for at in 0..SEGMENTS {
             for ticks in [0, 1, 5, 19, 23] {
                 let case = format!("line {line}, segment {at}, {ticks} ms");
                 let mut rig = Rig::holding();
-                // The earlier trajectory no longer counts.
+                // The earlier trajectory can no longer be executed.
                 rig.upload(&[rest(0); 60], 10);
                 rig.plain = true;
                 rig.statuses.clear();
@@ -205,13 +205,13 @@ fn j30_an_upload_on_a_plain_line_is_completed_after_a_stop_and_not_executed() {
     }
 }
 
-/// The counterpart: only a Stop during the upload prevents a plain host from executing.
+/// The opposite case: only a Stop during the upload prevents the trajectory of a plain host from being executed.
 #[test]
 fn j30_an_upload_on_a_plain_line_without_a_stop_is_executed() {
     for command in [None, Some(UrgentCommand::Pause), Some(UrgentCommand::Stop)] {
         let mut rig = Rig::holding();
         rig.plain = true;
-        // Before it or, for a Pause, in its middle.
+        // The command comes before the upload; a Pause also comes during the upload.
         if let Some(command) = command {
             rig.urgent(1, command);
             rig.run(3);
@@ -242,7 +242,7 @@ fn j30_an_upload_of_a_client_that_knows_extensions_is_dropped_on_a_line_that_bec
     );
 }
 
-/// An incomplete upload does not block jogging, and an upload that is completed during a jog is complete.
+/// An incomplete upload does not block jogging, and an upload may be completed during a jog.
 #[test]
 fn j58_joints_are_jogged_during_an_upload() {
     for plain in [true, false] {
@@ -254,7 +254,7 @@ fn j58_joints_are_jogged_during_an_upload() {
             assert_eq!(jog(&mut rig), NoError, "after segment {n}");
             rig.run(100);
         }
-        // J-51: the data status that the upload's segment 0 decided.
+        // J-51: segment 0 of the upload decides which data status is reported.
         let refused = if plain { IncorrectValue } else { NotAllowed };
         assert_eq!(rig.exec(ExecCommand::Execute), refused, "not while joints are jogged");
         // A Stop ends the jog and drops the upload.
@@ -267,7 +267,7 @@ fn j58_joints_are_jogged_during_an_upload() {
     }
 }
 
-/// The record of an earlier Stop on the line does not hide a later one: the segment 0 between them is older than the second.
+/// The record of an earlier Stop on the line does not hide a later Stop. Segment 0 between them was sent before the second Stop.
 #[test]
 fn j30_each_of_several_stops_drops_the_upload_before_it() {
     for frames_first in 0..2 {
@@ -278,7 +278,7 @@ fn j30_each_of_several_stops_drops_the_upload_before_it() {
                         format!("{frames_first} long frames, {stops_first} Stops, line {line}, {ticks} ms");
                     let mut rig = Rig::holding();
                     rig.statuses.clear();
-                    // The frame takes some ticks, during which the others wait.
+                    // This frame takes some ticks, during which the other frames wait.
                     (0..frames_first).for_each(|_| rig.send(FrameType::FrictionTableUseDefault, &[]));
                     (0..stops_first).for_each(|_| rig.urgent(0, UrgentCommand::Stop));
                     rig.send(FrameType::Trajectory, &segment(7, 0, 10));

@@ -32,7 +32,7 @@ fn j06_a_bound_of_the_gains_is_allowed_and_nothing_beyond() {
     assert!(check(PidGains { int_min: 0.2, int_max: 0.1, ..none }).is_err());
 }
 
-/// Bounds that leave out zero put a torque on a joint at rest: Ki times the one nearer to zero.
+/// Bounds that exclude zero put a torque on a joint at rest: Ki times the bound that is nearer to zero.
 #[test]
 fn j06_an_integral_forces_a_quarter_of_the_torque_limit_at_most() {
     for (int_min, int_max, ki) in [(2.0, 9.0, 12.5), (-9.0, -2.0, 12.5), (-1.0, 9.0, 50_000.0)] {
@@ -58,7 +58,7 @@ fn one_torque(velocity: f32, torque: f32) -> Result<(), OutOfBounds> {
 
 #[test]
 fn j06_friction_is_bounded_by_where_it_is() {
-    // At rest, up to half of the velocity limit, and above; against the motion is positive in both directions.
+    // Three ranges: at rest, up to half of the velocity limit, and above. A torque against the motion is positive in both directions.
     for (speed, low, high) in
         [(0.0, -25.0, 25.0), (0.125, -5.0, 100.0), (0.75, -5.0, 100.0), (0.875, -150.0, 150.0)]
     {
@@ -105,7 +105,8 @@ fn j06_a_polynomial_is_bounded_up_to_the_velocity_limit() {
             let c3 = most * 100.0 / (fastest * fastest * fastest);
             BOUNDS.check_polynomial(&[0.0, 0.0, 0.0, sign * c3, 0.0, 0.0], &joint()).map_err(|e| e.velocity)
         };
-        // Against the motion it reaches the bound of high speeds last, along the motion that of slow ones.
+        // A torque against the motion reaches the bound for high speeds first at the highest speed; a torque along the motion reaches the
+        // bound for slow speeds.
         let most = if sign > 0.0 { 1.5 } else { 0.05 * 8.0 };
         assert_eq!(cubic(0.999 * most), Ok(()));
         assert_eq!(cubic(1.001 * most), Err(Some(if sign > 0.0 { fastest } else { 0.5 * fastest })));
@@ -135,19 +136,19 @@ fn j06_what_is_refused_is_told_with_its_value() {
     }
 }
 
-/// Between standstill and a sixteenth of the velocity limit are as many speeds as above.
+/// Between standstill and a sixteenth of the velocity limit, the check uses as many speeds as above it.
 #[test]
 fn j06_a_polynomial_is_looked_at_where_arms_move_slowly() {
     let sixteenth = joint().velocity_max / 16.0;
     for (reached, found) in [(0.5, 1.0), (2.5, 3.0), (14.5, 15.0)] {
-        // The bound of slow speeds, 100 N·m, is reached after `reached` steps; a sixteenth of the velocity limit has sixteen.
+        // The bound for slow speeds, 100 N·m, is reached after `reached` steps; a sixteenth of the velocity limit has sixteen steps.
         let c1 = 100.0 / (sixteenth * reached / 16.0);
         let refused = BOUNDS.check_polynomial(&[0.0, c1, 0.0, 0.0, 0.0, 0.0], &joint());
         assert_eq!(refused.map_err(|e| e.velocity), Err(Some(sixteenth * found / 16.0)), "{reached}");
     }
 }
 
-/// A row of a table is named before what follows from it at standstill.
+/// A row that is out of bounds is reported before the torque that the table gives at standstill.
 #[test]
 fn j06_of_a_table_the_first_row_in_motion_is_named() {
     let table = TableOf {

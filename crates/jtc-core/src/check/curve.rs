@@ -1,6 +1,6 @@
 //! Polynomials in Bernstein form: a curve over 0..1 lies within the hull of its control points (Farin 2002).
 
-/// Halvings of one curve on the way to its extremum: each takes the hull about four times closer to the curve.
+/// Highest number of successive halvings of one curve. Each halving brings the hull about four times closer to the curve.
 const DEPTH: usize = 6;
 
 /// Place at which a curve leaves its bounds.
@@ -8,21 +8,21 @@ const DEPTH: usize = 6;
 pub(super) struct Leaves {
     /// Place in the interval, 0..1.
     pub at: f64,
-    /// The curve's value there or, if the halvings did not suffice, the value that it cannot be shown to keep below.
+    /// Value of the curve there. If the halvings did not suffice, the value of a control point that may lie outside the curve.
     pub value: f64,
     /// The bound.
     pub bound: f64,
 }
 
 /// Returns the first place found at which the curve leaves `low..=high`. The place is exact at the ends of the curve and at its halving
-/// points; if the `halvings` are used up, the hull decides, so that no curve passes that leaves the bounds.
+/// points. If the `halvings` are used up, the hull is checked instead, so that a curve that leaves the bounds never passes.
 pub(super) fn leaves<const N: usize>(
     curve: [f64; N],
     low: f64,
     high: f64,
     halvings: &mut u8,
 ) -> Option<Leaves> {
-    // Pieces yet to be looked at, from the rear of the interval to its front.
+    // Pieces that are not checked yet, from the end of the interval to its start.
     let mut stack = [(curve, 0.0, 1.0); DEPTH + 1];
     let mut waiting = 1;
     while waiting > 0 {
@@ -38,7 +38,7 @@ pub(super) fn leaves<const N: usize>(
         if on_the_curve.is_some() {
             return on_the_curve;
         }
-        // A piece at the full depth has no room on the stack.
+        // A piece at the full depth does not fit on the stack.
         let (Some(left), true) = (halvings.checked_sub(1), waiting + 1 < stack.len()) else {
             return Some(Leaves { at: start + 0.5 * width, value, bound });
         };
@@ -74,7 +74,7 @@ pub(super) fn bound_crossed(value: f64, low: f64, high: f64) -> Option<f64> {
     }
 }
 
-/// De Casteljau's halves of a curve.
+/// Splits a curve into two halves (De Casteljau).
 fn halve<const N: usize>(curve: [f64; N]) -> ([f64; N], [f64; N]) {
     let (mut front, mut rear) = (curve, curve);
     for level in 1..N {
@@ -94,7 +94,7 @@ fn halve<const N: usize>(curve: [f64; N]) -> ([f64; N], [f64; N]) {
 mod tests {
     use super::*;
 
-    /// A parabola with its top, 0, at this place.
+    /// A parabola with its maximum, 0, at this place.
     fn parabola(top: f64) -> [f64; 3] {
         [-top * top, top - top * top, -(1.0 - top) * (1.0 - top)]
     }
@@ -110,14 +110,14 @@ mod tests {
         }
     }
 
-    /// Otherwise a piece would be left out, and with it its effect.
+    /// Otherwise a piece would be skipped, and a violation in it would be missed.
     #[test]
     fn j36_at_the_full_depth_the_hull_decides() {
-        // Above 1 up to 0.006, less than half of the smallest piece.
+        // The curve is above 1 from 0 to 0.006, which is less than half of the smallest piece.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 255).expect("it leaves its bounds");
         assert_eq!((found.at, found.bound), (1.0 / 128.0, 1.0));
         assert!(found.value > 1.0 && found.value < 1.0001, "{found:?}");
-        // The halvings of all curves together are used up before.
+        // The shared number of halvings is used up before the full depth.
         let found = leaves([1.0, 1.003, 0.0], -10.0, 1.0, &mut 2).expect("it may leave them");
         assert_eq!((found.at, found.bound), (1.0 / 8.0, 1.0));
     }
@@ -127,7 +127,7 @@ mod tests {
         for (curve, named) in [
             ([0.0, 3.0, -2.0, 0.0], (3.0, 1.0)),
             ([0.0, 2.0, -3.0, 0.0], (-3.0, -1.0)),
-            // Alike: the upper one.
+            // Equal distances: the upper bound is reported.
             ([0.0, 2.0, -2.0, 0.0], (2.0, 1.0)),
         ] {
             let found = leaves(curve, -1.0, 1.0, &mut 0);

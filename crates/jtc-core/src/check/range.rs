@@ -1,13 +1,13 @@
 //! Positions of a joint that a path may have (J-36).
 //!
-//! Two allowances are added to the position limits. Rounding to the wire moves a path that ends exactly on a limit a little beyond it,
-//! which is not a fault of the path: that is the tolerance. A joint that stands outside a limit may be moved back inside: it may begin
-//! there, and comes no further out up to its first point inside.
+//! Two allowances are added to the position limits. The first is the tolerance: rounding to the wire format moves a path that ends exactly
+//! on a limit slightly beyond it, which is not a fault of the path. The second is for a joint outside a limit. Such a joint may start
+//! there. Until it is back inside, it must not move further out.
 use super::{POSITION_STEP, VELOCITY_STEP};
 use crate::config::{Config, WORKING_AREA};
 
-/// Way (rad) in the middle of the quintic between two points that are a second apart, for 1 rad/s more in the first one and less in the
-/// second one: 5/16.
+/// Distance (rad) in the middle of the quintic between two points 1 s apart, if the first velocity is 1 rad/s higher and the second one 1
+/// rad/s lower: 5/16.
 const WAY_OF_VELOCITY: f64 = 0.3125;
 
 /// Positions of one joint that a path may have (J-36), rad.
@@ -17,17 +17,17 @@ pub struct PathRange {
     limits: (f64, f64),
     /// The limits with their tolerance, inside the working area.
     tolerated: (f64, f64),
-    /// Addition to a position between two points by rounding to the wire.
+    /// Amount by which rounding to the wire format may increase a position between two points.
     tolerance: f64,
     /// Half of the working area; infinite while the drives do not keep to it.
     area: f64,
-    /// Highest distance of the first point outside the limits.
+    /// Highest distance of the first point from the limits.
     start: f64,
 }
 
 impl PathRange {
     /// Returns the range of the joint with index `joint`, for a trajectory whose points are `step_ms` apart. The tolerance is one int16
-    /// step of the position (96 µrad), plus the addition of one step of the velocity to the quintic between two points.
+    /// step of the position (96 µrad), plus the effect of one step of the velocity on the quintic between two points.
     pub fn of(config: &Config, joint: usize, step_ms: u16) -> Self {
         let (low, high) = config.position_range(joint);
         let tolerance = POSITION_STEP + WAY_OF_VELOCITY * f64::from(step_ms) / 1000.0 * VELOCITY_STEP;
@@ -47,7 +47,7 @@ impl PathRange {
         position.max(low).min(high)
     }
 
-    /// Returns the limits with their tolerance: the range of a joint that is inside.
+    /// Returns the limits with their tolerance, which are the range of a joint that is inside.
     pub fn tolerated(&self) -> (f64, f64) {
         self.tolerated
     }
@@ -64,24 +64,25 @@ impl PathRange {
         position >= low && position <= high
     }
 
-    /// Returns the range of the first point: up to the start tolerance outside the limits, and inside the working area.
+    /// Returns the range of the first point: it may be outside the limits by the start tolerance, but must be inside the working area.
     pub fn of_first(&self) -> (f64, f64) {
         ((self.tolerated.0 - self.start).max(-self.area), (self.tolerated.1 + self.start).min(self.area))
     }
 
-    /// Returns the range of a whole path whose first point is at `first`; the range from inside if a path cannot begin there.
+    /// Returns the range of a whole path whose first point is at `first`. If a path cannot begin there, returns the range of a path that
+    /// begins inside.
     pub fn of_path(&self, first: f64) -> (f64, f64) {
         let (low, high) = self.of_first();
         let comes_in = !self.limits_contain(first) && first >= low && first <= high;
         if comes_in { self.between(first) } else { self.tolerated }
     }
 
-    /// Returns the range of the point that follows one at `before`, of a joint that is coming inside.
+    /// Returns the range of the point after a point at `before`, for a joint that is moving back inside.
     pub(super) fn of_next(&self, before: f64) -> (f64, f64) {
         (self.tolerated.0.min(before), self.tolerated.1.max(before))
     }
 
-    /// Returns the range of the interval between a point at `before` and the next one, of a joint that is coming inside.
+    /// Returns the range of the interval between a point at `before` and the next one, for a joint that is moving back inside.
     pub(super) fn between(&self, before: f64) -> (f64, f64) {
         let ((low, high), area) = (self.tolerated, self.area.max(before.abs()));
         if self.is_below(before) {
@@ -91,7 +92,7 @@ impl PathRange {
         }
     }
 
-    /// Returns the range of the speed of the position there, rad/s: inwards, plus `slack` for rounding to the wire.
+    /// Returns the range of the derivative of the position in that interval, rad/s: inwards, plus `slack` for rounding to the wire format.
     pub(super) fn inward(&self, before: f64, slack: f64) -> (f64, f64) {
         if self.is_below(before) { (-slack, f64::INFINITY) } else { (f64::NEG_INFINITY, slack) }
     }
@@ -102,7 +103,7 @@ impl PathRange {
         position - low < high - position
     }
 
-    /// Returns the limit that `position` is nearer to, or beyond.
+    /// Returns the limit that `position` is closest to or has passed.
     pub fn limit_at(&self, position: f64) -> f64 {
         let (low, high) = self.limits;
         if self.is_below(position) { low } else { high }

@@ -7,14 +7,14 @@ use crate::{JOINTS, TrajectoryState};
 /// Phase of the controller in Operate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Phase {
-    /// Waits until every joint is enabled; `elapsed_ms`: time waited so far, ms.
+    /// Waits until every joint is enabled. `elapsed_ms`: time waited so far, ms.
     Waiting { elapsed_ms: u32 },
-    /// The approach: from the held position to the first point, or to the point at which the path was paused, in `length_ms`. Its time runs
-    /// on a clock of its own; `leave`: the state that follows at standstill.
+    /// The approach from the held position to the first point, or to the point at which the path was paused, in `length_ms`. The approach
+    /// has its own clock. `leave`: the state that follows at standstill.
     Approaching { from: [f64; JOINTS], length_ms: f64, clock: PathClock, leave: Option<TrajectoryState> },
     /// At point 0, which the next tick commands.
     AtStart,
-    /// On the path; `leave`: the state that follows at standstill.
+    /// On the path. `leave`: the state that follows at standstill.
     Running { leave: Option<TrajectoryState> },
 }
 
@@ -56,10 +56,10 @@ impl Remembered for Phase {
 }
 
 impl Phase {
-    /// Begin of an execution, before any wait.
+    /// Start of an execution, before any wait.
     pub const BEGIN: Self = Self::Waiting { elapsed_ms: 0 };
 
-    /// Creates an approach from the held position, for this time.
+    /// Creates an approach from the held position that takes `length_ms`.
     pub fn approach(from: [f64; JOINTS], length_ms: f64) -> Self {
         Self::Approaching { from, length_ms, clock: PathClock::start(1.0), leave: None }
     }
@@ -87,7 +87,7 @@ impl Phase {
         }
     }
 
-    /// Returns the rate of the time in which the arm moves: of the approach, or of the path.
+    /// Returns the rate of the time in which the arm moves: the time of the approach or of the path.
     pub fn rate(&self, path: &PathClock) -> f64 {
         match self {
             Self::Approaching { clock, .. } => clock.rate,
@@ -95,7 +95,7 @@ impl Phase {
         }
     }
 
-    /// Returns the state that an accepted Pause or Stop leads to.
+    /// Returns the state that follows an accepted Pause or Stop.
     pub fn leave(&self) -> Option<TrajectoryState> {
         match self {
             Self::Approaching { leave, .. } | Self::Running { leave } => *leave,

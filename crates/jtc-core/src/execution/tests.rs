@@ -17,7 +17,7 @@ fn begin_approach(controller: &mut Controller<[RawPoint; 4]>, position: [f64; JO
     controller.phase = controller.approach_to(&point).expect("an approach");
 }
 
-/// Braking excuses errors (J-43) only as long as the arm moves.
+/// While a pause or stop brakes, errors (J-43) are suppressed only as long as the arm moves.
 #[test]
 fn j33_braking_ends_where_the_arm_stands() {
     let mut stands = braking(ControllerState::HoldPos, TrajectoryState::Pause);
@@ -57,7 +57,7 @@ fn j34_after_a_stop_the_path_begins_anew() {
     }
 }
 
-/// On the path, with a Pause accepted `ms` ago.
+/// A controller on the path that accepted a Pause `ms` ago.
 fn pausing(ms: u16) -> Controller<[RawPoint; 4]> {
     let mut controller = braking(ControllerState::Operate, TrajectoryState::Execute);
     controller.phase = Phase::Running { leave: Some(TrajectoryState::Pause) };
@@ -72,7 +72,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     for (trajectory, ms, goes_on, error) in [
         (TrajectoryState::Execute, most - 1, true, 0),
         (TrajectoryState::Execute, most, false, joint_error::TORQUE),
-        // An arm that is held, and moved by something else.
+        // An arm that is held, but is moved from outside.
         (TrajectoryState::Pause, most - 1, true, 0),
         (TrajectoryState::Pause, most, false, 0),
     ] {
@@ -87,7 +87,7 @@ fn j33_a_path_that_cannot_be_stopped_is_an_error_of_the_joints_that_move() {
     assert!(!controller.errors.any(), "it stands");
 }
 
-/// The end of a motion may be too slow for torque to stop it.
+/// The end of a motion may be so slow that the controller ignores it.
 #[test]
 fn j33_an_arm_that_stands_when_its_time_is_over_has_stopped() {
     let most = Config::avena().stop_ms;
@@ -142,7 +142,7 @@ fn j33_j66_what_a_pause_or_stop_on_its_way_leads_to() {
     assert_eq!((Phase::BEGIN.leave(), Phase::AtStart.leave()), (None, None));
 }
 
-/// On the path of four points that are 100 ms apart, at this time, slowing down.
+/// A controller on a path of four points, 100 ms apart, at this time and slowing down.
 fn halting_at(time: f64) -> Controller<[RawPoint; 4]> {
     let mut controller = pausing(5);
     let mut body = [0; 8 + 4 * 36];
@@ -192,7 +192,7 @@ fn j34_an_approach_takes_the_time_of_the_ramp() {
     }
 }
 
-/// On the approach to point 0 from this far, a Stop or Pause comes after `after_ms`.
+/// A Stop or Pause arrives `after_ms` after the start of an approach to point 0 from this distance.
 #[test]
 fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point() {
     for (way, after_ms) in [(0.02, 1), (0.02, 60), (0.02, 150), (-0.3, 60), (0.49, 60), (0.49, 250)] {
@@ -220,11 +220,11 @@ fn j33_a_stop_in_the_approach_brakes_at_once_and_leaves_the_arm_beside_the_point
             assert_eq!((controller.trajectory, velocity), (trajectory, 0.0), "{way} {after_ms}");
             assert!(ticks <= 220, "{way} after {after_ms} ms: {ticks} ms");
             let moved = (at - rest) * way.signum();
-            // At most the remaining distance, and at most the stopping distance of a path that still gets faster for half of the ramp.
+            // At most the remaining distance, and at most the stopping distance of a path that still accelerates for half of the ramp.
             let most = (0.15 * (speed.abs() + 0.1 * 12.0)).min(at.abs() + 1e-12);
             assert!((0.0..=most).contains(&moved), "{way} after {after_ms} ms: {moved} of {most} rad");
             assert_eq!(controller.clock.time, 0.0, "the index stays");
-            // Joints that are not on their way have not moved.
+            // Joints that have no distance to go have not moved.
             assert_eq!(controller.motion.set.point.position[1..], [0.0; JOINTS - 1]);
         }
     }
@@ -242,7 +242,7 @@ fn j33_a_stop_before_the_approach_moves_nothing() {
     );
 }
 
-/// The approach is a ramp long, or as long as the joint that has the furthest to go for its limits needs.
+/// An approach takes the time of a ramp, or the time that the joint with the longest distance needs within its limits.
 #[test]
 fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     for (way, velocity_max, acceleration_max) in
@@ -258,7 +258,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
             continue;
         };
         let length = length_ms / 1_000.0;
-        // Its velocity and its acceleration, seen at a thousand places.
+        // Its velocity and acceleration are sampled at a thousand places.
         let at = |u: f64| way * u * u * u * (10.0 + u * (6.0 * u - 15.0));
         let step = 1e-3;
         let (mut fastest, mut hardest) = (0.0f64, 0.0f64);
@@ -277,7 +277,7 @@ fn j34_an_approach_keeps_to_velocity_and_acceleration_limits() {
     }
 }
 
-/// A finished path is not a motion to hold back: a jog that is overloaded ends.
+/// A finished path cannot be held back. A jog that is overloaded ends.
 #[test]
 fn j75_only_a_motion_that_goes_on_is_held_back() {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);

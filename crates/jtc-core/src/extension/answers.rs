@@ -1,4 +1,4 @@
-//! Answers to extension requests: a frame that waits on each line (J-50).
+//! Answers to extension requests: one answer can wait on each line (J-50).
 use jtc_wire::{ANSWER_MAX, Answer};
 
 use crate::HOST_LINES;
@@ -6,7 +6,7 @@ use crate::HOST_LINES;
 /// Answer on one line.
 #[derive(Clone, Debug)]
 struct Line {
-    /// Bytes that wait.
+    /// Length of the waiting answer.
     len: usize,
     frame: [u8; ANSWER_MAX],
 }
@@ -17,7 +17,7 @@ pub(crate) struct Answers {
     lines: [Line; HOST_LINES],
     /// The line whose frame was sent last.
     sent: usize,
-    /// Bytes of that frame.
+    /// Length of that frame.
     sent_len: usize,
 }
 
@@ -27,7 +27,7 @@ impl Answers {
         Self { lines, sent: 0, sent_len: 0 }
     }
 
-    /// Returns `true` if an answer on this line has not been sent.
+    /// Returns `true` if an answer on this line has not been sent yet.
     pub fn waits(&self, line: usize) -> bool {
         self.lines.get(line).is_some_and(|line| line.len > 0)
     }
@@ -39,7 +39,7 @@ impl Answers {
         }
     }
 
-    /// Returns the line whose answer must be sent now; the lines take turns.
+    /// Returns the line whose answer must be sent now. The lines take turns.
     pub fn send(&mut self) -> Option<usize> {
         for offset in 1..=HOST_LINES {
             let n = (self.sent + offset) % HOST_LINES;
@@ -51,7 +51,7 @@ impl Answers {
         None
     }
 
-    /// Returns the frame of that line.
+    /// Returns the frame that was sent last.
     pub fn frame(&self) -> &[u8] {
         self.lines.get(self.sent).and_then(|line| line.frame.get(..self.sent_len)).unwrap_or(&[])
     }

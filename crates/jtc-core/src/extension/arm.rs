@@ -1,4 +1,4 @@
-//! The arm as a unit (J-52, J-54): loaded, read, hashed, stored.
+//! The arm as a unit (J-52, J-54): loading, reading, hashing and storing it.
 use jtc_wire::{Answer, ArmImage, DataStatus, FrictionImage, Hash, PAGE_BYTES, RawPoint, StoreState};
 
 use super::Extensions;
@@ -13,20 +13,20 @@ use crate::settings;
 pub(super) const IMAGE_PER_TICK: usize = 256;
 
 impl Extensions {
-    /// Forgets the hash, because the arm in use has changed.
+    /// Clears the hash, because the arm in use has changed.
     pub fn forget_hash(&mut self) {
         (self.hash, self.hashed) = (None, (0, Hash::new()));
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Loads the stored arm (J-54). Its settings and its name are in use from now on, and the UseDefault frames select it; the parameters
-    /// stay missing. The board calls this before the first tick. Returns `false` if this controller does not accept the image. The settings
-    /// then do not change, and the UseDefault frames are refused until an arm is stored.
+    /// Loads the stored arm (J-54). Its settings and its name are in use from now on, and the UseDefault frames select it. The parameters
+    /// still have to be requested. The board calls this before the first tick. Returns `false` if this controller does not accept the
+    /// image. The settings then do not change, and the UseDefault frames are refused until an arm is stored.
     pub fn load_arm(&mut self, image: &[u8]) -> bool {
         let arm = ArmImage::parse(image);
         let config = arm.and_then(|arm| settings::with_values(&self.config, arm.settings.iter()).ok());
-        // The numbers are written directly into the parameters, not tried on the stack, which is as small as possible.
+        // The values are written directly into the parameters. A trial copy would need too much of the small stack.
         let loaded = arm.zip(config).is_some_and(|(arm, config)| {
             let taken = takes(&mut self.parameters, &arm, &config);
             if taken {
@@ -57,7 +57,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         let before = core::mem::replace(&mut self.extensions.store, state);
         self.extensions.sequence = sequence;
         if before == StoreState::Busy && state == StoreState::Failed {
-            // After the next start it would be another arm: until then no arm is stored.
+            // The next start would use another arm, so no arm is stored until then.
             self.extensions.stored.clear();
             self.extensions.unusable = true;
         }
@@ -91,7 +91,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.extensions.answers.put(line, &Answer::Arm { offset, total, bytes });
     }
 
-    /// Stores the arm (J-54): first the arm in use becomes the one that the UseDefault frames mean, then the board writes it.
+    /// Stores the arm (J-54). First the UseDefault frames select the arm in use, then the board writes it.
     pub(super) fn store_arm(&mut self) -> SliceOutcome {
         let offset = match self.slice_progress {
             SliceProgress::Image(offset) => offset,
@@ -121,13 +121,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
     }
 }
 
-/// Takes gains, model and friction of an arm; returns `false` if these settings do not take them.
+/// Takes gains, model and friction of an arm. Returns `false` if they are not valid with these settings.
 fn takes(parameters: &mut ReceivedParameters, arm: &ArmImage<'_>, config: &Config) -> bool {
     let friction = match arm.friction {
         FrictionImage::Polynomial(floats) => parameters.take_polynomial(&floats, config).is_ok(),
         FrictionImage::Table(floats) => {
             let mut progress = SliceProgress::Begin;
-            // Twelve slices are all of it.
+            // A whole table needs twelve slices.
             (0..16).any(|_| match parameters.take_table(&floats, progress, config) {
                 SliceOutcome::Unfinished(next) => {
                     progress = next;

@@ -1,4 +1,4 @@
-//! The arm in use as an image: the arm as a unit, for reading it back, hashing and storing it (J-52, J-54).
+//! The arm in use as an image, for reading it back, hashing it and storing it (J-52, J-54).
 use jtc_wire::field::image as field;
 use jtc_wire::{ArmImage, Hash, IMAGE_MAX, NAME_LEN, Name, VALUE_LEN};
 
@@ -20,7 +20,7 @@ impl ImageSource<'_> {
         field::FRICTION + if table { field::TABLE_LEN } else { field::POLYNOMIAL_LEN }
     }
 
-    /// Returns the offset of the name: the bytes before it decide how the arm moves.
+    /// Returns the offset of the name. Only the bytes before it affect the motion of the arm.
     fn name(&self) -> usize {
         self.settings() + VALUE_LEN * settings::count(true)
     }
@@ -30,7 +30,7 @@ impl ImageSource<'_> {
         self.name() + NAME_LEN
     }
 
-    /// Reads the image from byte `offset` on; returns the number of bytes.
+    /// Reads the image from byte `offset` on. Returns the number of bytes that were read.
     pub fn read(&self, offset: usize, out: &mut [u8]) -> usize {
         let (settings, name) = (self.settings(), self.name());
         let mut at = offset;
@@ -59,7 +59,7 @@ impl ImageSource<'_> {
         [a, b, c, d, field::VERSION, self.parameters.friction_is_table.into(), high, low]
     }
 
-    /// Returns number `i` of gains, model and friction.
+    /// Returns value number `i` of gains, model and friction.
     fn float(&self, i: usize) -> f32 {
         const MODEL: usize = (field::MODEL.start - field::PID.start) / 4;
         const FRICTION: usize = (field::FRICTION - field::PID.start) / 4;
@@ -79,13 +79,13 @@ impl ImageSource<'_> {
         (offset + read, hash.update(slice.get(..read).unwrap_or(&[])))
     }
 
-    /// Returns `true` if all bytes that count were hashed.
+    /// Returns `true` if `offset` is past the hashed part, which is everything before the name.
     pub fn hashed(&self, offset: usize) -> bool {
         offset >= self.name()
     }
 }
 
-/// Bytes that are being written.
+/// Bytes that are written into a buffer.
 struct Output<'a> {
     out: &'a mut [u8],
     filled: usize,
@@ -96,7 +96,7 @@ impl Output<'_> {
         self.filled < self.out.len()
     }
 
-    /// Writes as much of `bytes` from `from` on as fits; returns the number of bytes.
+    /// Writes the part of `bytes` after `from`, as far as the buffer has space. Returns the number of bytes that were written.
     fn part(&mut self, bytes: &[u8], from: usize) -> usize {
         let room = self.out.get_mut(self.filled..).unwrap_or(&mut []);
         let rest = bytes.get(from..).unwrap_or(&[]);
@@ -141,7 +141,7 @@ impl StoredArm {
         self.len = 0;
     }
 
-    /// Takes another image in its place; an image that is too long leaves none.
+    /// Stores another image instead. If the image is too long, no arm is stored.
     pub fn set(&mut self, image: &[u8]) {
         self.len = match self.bytes.get_mut(..image.len()) {
             Some(place) => {
@@ -152,7 +152,8 @@ impl StoredArm {
         };
     }
 
-    /// Takes a part of the arm in use; returns the offset of the next part. Until all parts are here no arm is stored.
+    /// Stores a part of the arm in use. Returns the offset of the next part. Until all parts are stored, [`Self::is_there`] returns
+    /// `false`.
     pub fn write(&mut self, source: &ImageSource<'_>, offset: usize, count: usize) -> usize {
         self.len = 0;
         let end = (offset + count).min(IMAGE_MAX);
@@ -160,7 +161,7 @@ impl StoredArm {
         offset + read
     }
 
-    /// All `len` bytes are here.
+    /// Marks the image as complete: all `len` bytes are stored.
     pub fn finish(&mut self, len: usize) {
         self.len = len.min(IMAGE_MAX);
     }

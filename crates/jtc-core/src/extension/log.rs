@@ -3,13 +3,13 @@ use jtc_wire::{Answer, Hash, PAGE_POINTS, POINT_LEN, Points, RawPoint};
 
 use crate::controller::Controller;
 
-/// Returns the hash of a firmware's version and revision, the name of the firmware in a log (FNV-1a, 64 bits).
+/// Returns the hash of a firmware's version and revision, which identifies the firmware in a log (FNV-1a, 64 bits).
 pub fn firmware_hash(version: &str, revision: &str) -> u64 {
     Hash::new().update(version.as_bytes()).update(&[0]).update(revision.as_bytes()).value()
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Answers with the points in memory, also of a trajectory that was given up (J-56).
+    /// Answers with the points in memory, including those of a trajectory that was discarded (J-56).
     pub(super) fn get_points(&mut self, line: usize, first: u16) {
         let held = self.store.held_points(first.into());
         let mut bytes = [[0; POINT_LEN]; PAGE_POINTS];

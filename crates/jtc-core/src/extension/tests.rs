@@ -1,4 +1,4 @@
-//! The extensions from the outside: frames in, statuses and answers out (J-50 to J-61).
+//! The extensions as a host sees them: frames in, statuses and answers out (J-50 to J-61).
 extern crate std;
 use std::boxed::Box;
 use std::vec;
@@ -49,12 +49,12 @@ impl Bench {
         outputs
     }
 
-    /// Sends a frame on a line and runs until its record; returns its data status.
+    /// Sends a frame on a line and runs until its record is sent. Returns the data status of the record.
     fn send(&mut self, line: usize, bytes: &[u8]) -> DataStatus {
         self.send_as(false, line, bytes)
     }
 
-    /// Sends a frame on a line that is plain or not.
+    /// Sends a frame on a line, which may be plain.
     fn send_as(&mut self, plain: bool, line: usize, bytes: &[u8]) -> DataStatus {
         let frame = FrameRef::new_checked(bytes).expect("a good frame");
         let host = [HostEvent { line, overtaken: false, plain, event: LinkEvent::Frame(frame) }];
@@ -95,7 +95,7 @@ impl Bench {
         assert_eq!(self.asks_for_defaults(), [DataStatus::NoError; 3]);
     }
 
-    /// Sends the three UseDefault frames, and returns how each was taken.
+    /// Sends the three UseDefault frames. Returns the data status of each.
     fn asks_for_defaults(&mut self) -> [DataStatus; 3] {
         let frames = [
             fixed::FRICTION_POLYNOMIAL_USE_DEFAULT,
@@ -131,7 +131,7 @@ impl Bench {
         self.controller.nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
     }
 
-    /// Executes a command at once, in a state that the nodes on the bus do not have.
+    /// Executes a command at once, in a state for which the nodes on the bus are not prepared.
     fn at_once(&mut self, command: Command<'_>) -> DataStatus {
         match self.controller.carry_out_extension(0, command) {
             SliceOutcome::Done => DataStatus::NoError,
@@ -156,7 +156,7 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
         let info = bench.info(line);
         assert_eq!((info.version, info.missing), (1, 7));
     }
-    // A request without an answer still has its record.
+    // A request without an answer still gets a record.
     assert_eq!(bench.send(0, &fixed::set_name(&Name::cut("seven"))), DataStatus::NoError);
     bench.run(500);
     assert!(bench.answers.is_empty());
@@ -167,13 +167,13 @@ fn j50_nothing_but_statuses_is_sent_before_a_request_and_then_on_its_line_only()
 fn j51_on_a_plain_line_no_data_status_is_above_6() {
     let mut bench = Bench::new();
     for line in [0, 1] {
-        // Execute without a trajectory, and in Init a request that needs another state.
+        // Execute without a trajectory, and a request in Init that needs another state.
         for frame in [&fixed::EXECUTE[..], &fixed::TEACHING_MODE_ENABLE] {
             assert_eq!(bench.send_as(true, line, frame), DataStatus::IncorrectValue);
             assert_eq!(bench.send_as(false, line, frame), DataStatus::NotAllowed);
         }
     }
-    // The others are the same on each line.
+    // All other data statuses are equal on each line.
     for data in DataStatus::ALL {
         let plain = crate::host::in_plain_words(data);
         assert!(plain as u8 <= 6 && (plain == data || data as u8 > 6), "{data:?}: {plain:?}");
@@ -215,7 +215,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     let image = bench.image();
     assert_eq!(Hash::of_image(&image), first);
     assert!(ArmImage::parse(&image).is_some());
-    // Neither the name nor the speed override is part of it; each setting of the arm is.
+    // The hash does not include the name or the speed override. It includes each setting of the arm.
     bench.send(0, &fixed::set_name(&Name::cut("another")));
     assert_eq!(bench.set(128, 0, 0.5), DataStatus::NoError);
     assert_eq!(bench.info(0).hash, first);
@@ -233,7 +233,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
         assert_eq!(bench.set(value.setting, value.joint, value.value), DataStatus::NoError, "{}", row.name);
         assert_eq!(bench.info(0).hash, first, "{}", row.name);
     }
-    // Gains, friction of either kind, model.
+    // Gains, friction of both kinds, model.
     let mut gains = vec![0; 126];
     jtc_wire::pid_param(&mut gains, &[[900.0, 1.0, 2.0, -3.0, 3.0]; JOINTS]).expect("it fits");
     assert_eq!(bench.send(0, &gains), DataStatus::NoError);
@@ -246,7 +246,7 @@ fn j52_the_hash_is_that_of_the_image_and_of_all_that_decides_how_the_arm_moves()
     assert_eq!(Hash::of_image(&bench.image()), table);
 }
 
-/// A request is refused while an answer waits, so that no answer is lost.
+/// A request is refused while an earlier answer waits, so that no answer is lost.
 #[test]
 fn j50_a_second_request_waits_for_the_first_answer() {
     let mut bench = Bench::new();

@@ -25,7 +25,7 @@ fn j71_the_poses_are_within_the_limits_and_apart() {
         }
         assert!(poses[..n].iter().all(|other| other != pose), "pose {n}");
     }
-    // The poses fill the range of the first joint evenly: a quarter of them in each quarter.
+    // The poses fill the range of the first joint evenly: each quarter of the range has a quarter of the poses.
     let (low, high) = config.position_range(0);
     for quarter in 0..4 {
         let inside = |q: f64| ((q - low) / (high - low) * 4.0) as i32 == quarter;
@@ -41,7 +41,7 @@ fn j71_the_default_arm_feels_what_is_said() {
 }
 
 proptest! {
-    /// In a pose between those that are looked at a joint feels little less.
+    /// In a pose that is not among the computed ones, a joint feels little less inertia.
     #[test]
     fn j71_a_joint_feels_little_less_in_other_poses(shares in prop::array::uniform6(0.0..1.0f64)) {
         let (model, config) = (Parameters::avena().model, Config::avena());
@@ -66,11 +66,11 @@ fn j71_the_arm_bears_its_gains_and_not_twice_as_much() {
     let mut nan = given();
     nan[3].kd = f64::NAN;
     assert!(!felt.bears(&nan, &config));
-    // A longer delay asks for more of it.
+    // A longer delay requires more inertia.
     assert!(!felt.bears(&given(), &Config { delay_ticks: 7, ..config.clone() }));
 }
 
-/// Without a rotor inertia, that of the known drives counts.
+/// If no rotor inertia is configured, the rotor inertia of the known drives is used.
 #[test]
 fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
     let model = Parameters::avena().model;
@@ -87,7 +87,7 @@ fn j71_a_drive_without_a_rotor_has_that_of_the_known_drives() {
 fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
     let limits = Config::avena().joints[1];
     let gains = PidGains { kp: 1_000.0, ki: 100.0, kd: 10.0, int_min: -1.0, int_max: 1.0 };
-    // A quarter of 0.09 rad times 1 000 N·m/rad is what the position may hold.
+    // The position error may hold a quarter of 0.09 rad times 1 000 N·m/rad.
     for (gains, i, holds) in [
         (gains, 100.0, true),
         (gains, 122.0, true),
@@ -103,7 +103,8 @@ fn j71_gains_that_let_a_held_joint_fall_do_not_hold_on() {
 }
 
 proptest! {
-    /// Gains come in without a step, after any gains: no gain changes by more than a two-hundredth of the way in a millisecond.
+    /// New gains are blended in without a step, whatever the gains before: in a millisecond a gain changes by at most 1/200 of the
+    /// difference.
     #[test]
     fn j71_gains_come_in_over_half_a_second(factors in prop::array::uniform3(0.05..1.5f64), again_ms in 0..900u16) {
         let [before, second, third] = factors.map(scaled);
@@ -133,7 +134,7 @@ proptest! {
         prop_assert_eq!(last, third);
     }
 
-    /// Softer gains need less inertia than those that they follow, and damp what the delay of Kp takes twice over.
+    /// Softer gains need less inertia than the gains before them. Their damping is twice the amount that the delay of Kp uses up.
     #[test]
     fn j66_softer_gains_are_stable_where_the_others_were_borne(kp in 1.0..50_000.0f64, kd in 0.0..500.0f64, delay in 0..8u8) {
         let own = PidGains { kp, ki: 1000.0, kd, ..given()[0] };
@@ -145,7 +146,7 @@ proptest! {
     }
 }
 
-/// Returns the gains of an arm that fails after `ms`, with an unstable loop of joint 2 or otherwise.
+/// Returns the gains of an arm that fails after `ms`. `unstable`: the loop of joint 2 is unstable.
 fn after(ms: u16, unstable: bool) -> Option<(StopKind, [PidGains; JOINTS])> {
     let mut trial = Trial::default();
     trial.begin(&scaled(0.5), &given());
@@ -171,7 +172,7 @@ fn j66_j71_gains_that_fail_are_taken_back() {
     assert_eq!((softer[0], softer[2]), (given()[0], given()[2]), "the others keep theirs");
 }
 
-/// Gains on trial have not held the arm, so the gains that held it before are used again.
+/// Gains on trial have not held the arm yet. Therefore the gains that held it before are restored.
 #[test]
 fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     for (ms, back) in [(100, 0.5), (2_000, 1.2)] {
@@ -184,7 +185,7 @@ fn j71_of_several_gains_in_a_row_the_last_that_held_come_back() {
     }
 }
 
-/// A host gives the gains again that held: they need no trial.
+/// A host sends the gains again that held the arm before: they need no trial.
 #[test]
 fn j71_gains_that_held_are_not_on_trial() {
     let mut trial = Trial::default();
@@ -197,7 +198,7 @@ fn j71_gains_that_held_are_not_on_trial() {
     assert_eq!(trial.end(), Some(scaled(1.2)));
 }
 
-/// Only time in which all joints are held says something about gains.
+/// Only time in which all joints are held is part of the trial.
 #[test]
 fn j71_a_trial_waits_for_joints_that_are_not_held() {
     let mut trial = Trial::default();
@@ -208,7 +209,7 @@ fn j71_a_trial_waits_for_joints_that_are_not_held() {
     assert!(!trial.is_on());
 }
 
-/// Joints that fail are held with the gains before at once; the others go over.
+/// Joints that fail get the gains before at once; the other joints blend into them.
 #[test]
 fn j71_gains_come_back_at_once_where_they_failed() {
     let mut trial = Trial::default();

@@ -1,10 +1,10 @@
-//! Priority of Stop and Pause, which act before earlier frames have had their turn (J-04).
+//! Priority of Stop and Pause, which take effect before earlier frames are executed (J-04).
 use jtc_wire::{DataStatus, ExecCommand, UrgentCommand};
 
 use crate::TrajectoryState;
 use crate::remembered::remembered;
 
-/// State of the urgent commands of a line whose frames have not had their turn.
+/// State of the urgent commands of a line, until it is the turn of their frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Overtaking {
     /// Stops and Pauses that were accepted and have no record yet.
@@ -12,22 +12,22 @@ pub(crate) struct Overtaking {
     pub(super) pauses: u8,
     /// The Stops and Pauses have cancelled an Execute.
     pub(super) cancelled: bool,
-    /// A Stop has arrived on either line, accepted or not: an upload that was begun before it is dropped (J-30). Holds until the first
-    /// event that was received after it; the record of an earlier Stop does not end it.
+    /// A Stop has arrived on either line, accepted or not, so an upload that was begun before it is dropped (J-30). The flag is cleared by
+    /// the first event that was received after the Stop; the record of an earlier Stop does not clear it.
     pub(super) stopped: bool,
 }
 
 remembered!(Overtaking { stops, pauses, cancelled, stopped });
 
 impl Overtaking {
-    /// Counts urgent commands that were accepted.
+    /// Adds the number of urgent commands that were accepted.
     pub fn accept(&mut self, command: UrgentCommand, count: u8) {
         let accepted = self.accepted(command);
         *accepted = accepted.saturating_add(count);
     }
 
-    /// Returns the data status of an execution command that an urgent one has overtaken. A Stop or a Pause has acted: it was accepted, or
-    /// it has cancelled an Execute, and the `trajectory` is in the commanded state.
+    /// Returns the data status of an execution command that an urgent command has overtaken. A Stop or a Pause is reported as accepted in
+    /// two cases: it was accepted, or it has cancelled an Execute and the `trajectory` is in the commanded state.
     pub fn overtaken(&mut self, exec: ExecCommand, trajectory: TrajectoryState) -> Result<(), DataStatus> {
         let Some(command) = UrgentCommand::from_exec(exec) else {
             self.cancelled = true;

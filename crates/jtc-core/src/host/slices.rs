@@ -1,22 +1,22 @@
-//! Frames that are too long for one tick: progress of such a frame, and outcome of a slice of it (J-06).
+//! Frames that are too long for one tick: progress of such a frame, and outcome of one slice (J-06).
 use jtc_wire::DataStatus;
 
-/// Progress of a long frame, a slice in each tick.
+/// Progress of a long frame, of which each tick executes a slice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum SliceProgress {
     #[default]
     Begin,
-    /// Points checked.
+    /// Number of points that have been checked.
     PointCheck(usize),
-    /// Points copied.
+    /// Number of points that have been copied.
     PointCopy(usize),
-    /// Joints whose table is checked.
+    /// Number of joints whose table has been checked.
     TableCheck(usize),
-    /// Joints whose table is copied.
+    /// Number of joints whose table has been copied.
     TableCopy(usize),
-    /// Poses in which the inertia of the joints was computed.
+    /// Number of poses in which the inertia of the joints has been computed.
     Pose(usize),
-    /// Bytes of the arm image that are written.
+    /// Number of bytes of the arm image that have been written.
     Image(usize),
 }
 

@@ -1,4 +1,4 @@
-//! Segments of a trajectory: accepted (J-30), checked and copied in slices (J-36).
+//! Segments of a trajectory: acceptance (J-30), and checking and copying in slices (J-36).
 use jtc_wire::{Command, DataStatus, ExecCommand, RawPoint, Segment};
 
 use super::slices::{SliceOutcome, SliceProgress};
@@ -8,24 +8,25 @@ use crate::io::HostEvent;
 use crate::remembered::remembered;
 use crate::{ControllerState, TrajectoryState};
 
-/// Maximum number of ticks for the check of a segment (J-36), and ticks for copying it: with the record, less than 40 ms.
+/// Maximum number of ticks for checking a segment (J-36), and for copying it. Together with the record this is less than 40 ms.
 const CHECK_TICKS: usize = 28;
 const COPY_TICKS: usize = 10;
-/// Points of a short segment checked and copied in one tick.
+/// Points that are checked, and points that are copied, in one tick for a short segment.
 const CHECKED_PER_TICK: usize = 16;
 const COPIED_PER_TICK: usize = 64;
 
-/// State of a line for the last upload that was begun on it.
+/// State of the last upload that was begun on a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LineUpload {
-    /// Its segment 0 came on a plain line (J-51). `None` before the first, and after the Execute of one that did not.
+    /// Segment 0 of the upload came on a plain line (J-51). `None` before the first upload, and after the Execute of an upload that came on
+    /// another kind of line.
     plain: Option<bool>,
 }
 
 remembered!(LineUpload { plain });
 
 impl LineUpload {
-    /// Returns `true` if the record of a `command` has plain words, as decided by the segment 0 of its upload.
+    /// Returns `true` if the record of `command` may contain only data statuses up to 6. For commands of an upload, its segment 0 decides.
     pub fn in_plain_words(&mut self, command: &Command<'_>, plain: bool) -> bool {
         match command {
             Command::Trajectory(segment) if segment.segment == 0 => *self.plain.insert(plain),
@@ -36,33 +37,34 @@ impl LineUpload {
         }
     }
 
-    /// Notes that a trajectory is executed. Another client that executes it again has not shown yet if it knows the extensions.
+    /// Records that a trajectory is executed. If another client executes it again, it is not known yet whether that client uses the
+    /// extensions.
     pub fn executed(&mut self) {
         self.plain = self.plain.filter(|plain| *plain);
     }
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Takes a segment (J-30, J-36): all points are checked before the first is copied, so that a refused segment changes nothing.
+    /// Takes a segment (J-30, J-36). All points are checked before the first one is copied, so that a refused segment changes nothing.
     pub(super) fn take_segment(&mut self, segment: &Segment<'_>, received: &HostEvent<'_>) -> SliceOutcome {
         let first = segment.segment == 0;
         if self.state == ControllerState::Operate && first && received.plain {
-            // The host repeats the segment until it is accepted, and forwards no Stop meanwhile. The segment is refused in the tick of this
-            // Stop.
+            // The host repeats the segment until it is accepted, and sends no Stop meanwhile. Therefore the segment acts as a Stop, and is
+            // refused in this tick.
             self.execute(ExecCommand::Stop).ok();
         }
         if self.state != ControllerState::HoldPos {
-            // Also in the middle of a segment: the change of state has cleared the trajectory.
+            // This may also happen in the middle of a segment: the change of state has cleared the trajectory.
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // The segment is older than a Stop that has acted.
+        // The segment was sent before a Stop that has taken effect.
         let stopped =
             received.overtaken && self.overtaking.get(received.line).is_some_and(|before| before.stopped);
         if first && !received.plain && stopped {
             self.store.refuse_rest();
             return SliceOutcome::Refused(DataStatus::NotAllowed);
         }
-        // Also in the middle of a segment.
+        // This may also happen in the middle of a segment.
         let begun = !first || matches!(self.slice_progress, SliceProgress::PointCopy(_));
         if begun && self.store.dropped() {
             return SliceOutcome::Refused(DataStatus::NotAllowed);
@@ -75,7 +77,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
                 Ok(()) => {
                     self.begin_check(segment);
                     match self.store.refused().filter(|_| !first) {
-                        // A single violation is enough, and the first one is kept.
+                        // The first violation is sufficient, and is kept.
                         Some(violation) => self.take_refused(segment, violation, stopped),
                         None => self.check_points(segment, 0, received.plain, stopped),
                     }
@@ -84,7 +86,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Begins the check: segment 0 begins a trajectory, other segments continue after the received ones.
+    /// Begins the check. Segment 0 begins a trajectory; other segments continue after the points received so far.
     fn begin_check(&mut self, segment: &Segment<'_>) {
         let tables = self.parameters.tables_in_use();
         let check = TrajectoryCheck::new(&self.config, segment.step_time, tables);
@@ -122,8 +124,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Takes a segment of a trajectory that breaks J-36, whose host, on a plain line, survives no refused segment: the trajectory is not
-    /// executed.
+    /// Takes a segment of a trajectory that violates J-36 from a host on a plain line, because such a host cannot handle a refused segment.
+    /// The trajectory will not be executed.
     fn take_refused(&mut self, segment: &Segment<'_>, violation: Violation, stopped: bool) -> SliceOutcome {
         let outcome = self.begin_copy(segment, true, stopped);
         self.violation = Some(violation);

@@ -15,23 +15,25 @@ use crate::teach::{LedJoint, Taught};
 use crate::yielding::{Joint, Yield, Yielded};
 use crate::{JOINTS, friction, gains, joint_error};
 
-/// Speed, rad/s, below which the torque that the integral finds in motion may be an error of the friction model. No load is learned from
+/// Speed in rad/s below which the torque that the integral finds in motion may be an error of the friction model. No load is learned from
 /// such a torque.
 const CREEPS: f64 = 0.05;
 
-/// Share of a torque limit below which friction of the joint holds the torque that is missing besides the load found.
+/// Share of the torque limit that the friction of a joint can hold. If less torque than this is missing in addition to the load found, the
+/// load is considered found.
 const LITTLE: f64 = 0.04;
 
-/// Control mode: the parts of the control law that act.
+/// Control mode: determines which parts of the control law act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ControlMode {
     /// Gravity and PID.
     Hold,
     /// Gravity, PID, friction, and inertia at the commanded velocity and acceleration.
     Follow,
-    /// As `Follow`, while the arm approaches the path. The limits of the path do not apply: the approach begins at the measured position.
+    /// Like `Follow`, while the arm approaches the path. The limits of the path do not apply, because the approach begins at the measured
+    /// position.
     Approach,
-    /// An arm that a hand has led comes to rest and is held: as `Hold`, with friction and inertia at the commanded velocity and
+    /// An arm that a hand has led comes to rest and is held. Like `Hold`, with friction and inertia at the commanded velocity and
     /// acceleration.
     Rest,
     /// Gravity, and the torques that let a hand lead the arm (J-25).
@@ -55,7 +57,7 @@ impl ControlMode {
     }
 }
 
-/// Longest time in which the integral gives back the torque that it had found for a payload that is now configured, ms.
+/// Longest time in which the integral gives back the torque that it had found for a payload after that payload was configured, ms.
 const UNWINDS_MS: u16 = 3_000;
 
 /// Inputs of a tick of the control law.
@@ -74,7 +76,7 @@ pub(crate) struct ControlParameters<'a> {
     pub pid: &'a [PidGains; JOINTS],
     pub polynomial: &'a [[f64; 6]; JOINTS],
     pub table: Option<&'a [TableOf<f32>; JOINTS]>,
-    /// The gains are on trial: the law looks for swings (J-71).
+    /// The gains are on trial, so the law monitors the joints for swings (J-71).
     pub on_trial: bool,
 }
 
@@ -84,17 +86,17 @@ pub(crate) struct ControlLaw {
     pid: [Pid; JOINTS],
     /// Torque of the last tick.
     pub torque: [JointTorque; JOINTS],
-    /// State of Teaching, which is kept neither outside of Teaching nor by the flight recorder.
+    /// State of Teaching. It exists only in Teaching, and the flight recorder does not store it.
     pub(super) taught: Option<Taught>,
     transfer: Transfer,
     /// Joints that yield (J-68, J-70).
     yields: [Option<Yield>; JOINTS],
     yielded: Yielded,
-    /// Load that each joint carries and the model lacks.
+    /// Load that each joint carries and that the model lacks.
     loads: [Load; JOINTS],
     /// The joint whose load is observed in this tick.
     observed: u8,
-    /// Time left in which the missing torque is the one that the controller had found for a payload that is now configured, ms (J-60).
+    /// Time left in which the integral gives back the torque that it had found for a payload that is now configured, ms (J-60).
     pub(super) unwinds_ms: u16,
 }
 
@@ -114,25 +116,26 @@ impl ControlLaw {
         *loads = Default::default();
     }
 
-    /// Prepares a change of the control mode among HoldPos, Operate and Teaching: bumpless transfer, with no step but that of the model
-    /// (J-44).
+    /// Prepares a change of the control mode among HoldPos, Operate and Teaching. The transfer is bumpless: only the torque of the model
+    /// may step (J-44).
     pub fn change_mode(&mut self) {
         self.transfer.change_mode();
     }
 
-    /// Like [`Self::change_mode`], without any step: the torque that decelerates an arm is part of the model's torque afterwards.
+    /// Like [`Self::change_mode`], but no torque may step: the torque that decelerates an arm is part of the model's torque after the
+    /// change.
     pub fn change_whole_torque(&mut self) {
         self.transfer.change_model();
     }
 
-    /// Prepares a change of the model while the arm is held: bumpless transfer without any step.
+    /// Prepares a change of the model while the arm is held. The transfer is bumpless: no torque may step.
     pub fn change_model(&mut self) {
-        // The missing torque was missing in the last model, and the integral must give it back.
+        // The integral holds torque that the last model lacked, and must give it back.
         self.payload_comes();
         self.transfer.change_model();
     }
 
-    /// Changes the gains: the integral keeps the torque that it can, and the rest is blended out.
+    /// Changes the gains. The integral keeps as much of its torque as the new gains allow; the remainder is blended out.
     pub fn change_gains(&mut self, gains: &[PidGains; JOINTS]) {
         for j in 0..JOINTS {
             if !self.yields(j) {
@@ -142,7 +145,7 @@ impl ControlLaw {
         self.transfer.change_mode();
     }
 
-    /// Returns `true` if these gains hold the torque that is held now (J-71).
+    /// Returns `true` if these gains can hold the present torque (J-71).
     pub fn hold_on(&self, gains: &[PidGains; JOINTS], config: &Config) -> bool {
         let holds = |j: usize| {
             let PidTorque { p, i, .. } = self.torque[j].pid;
@@ -156,7 +159,7 @@ impl ControlLaw {
         self.loads.iter_mut().for_each(Load::forget);
     }
 
-    /// Resets the position controllers for a start at rest, without a position error, and forgets the loads.
+    /// Resets the position controllers for a start at rest, without a position error, and clears the loads.
     pub fn begin(&mut self) {
         for pid in &mut self.pid {
             pid.reset(0.0);
@@ -164,23 +167,23 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Resets joints that have ended their position hold, or have not begun it.
+    /// Resets joints whose position hold has ended or has not begun.
     pub fn latch(&mut self, latched: &Latched) {
         for j in 0..JOINTS {
             if !latched.held[j] {
                 self.pid[j].reset(0.0);
                 self.loads[j].forget();
                 self.yields[j] = None;
-                // The joint has no integral that could give torque back.
+                // The joint has no integral that could give back torque.
                 self.unwinds_ms = 0;
             }
         }
         self.transfer.set_just_enabled(latched.just_enabled);
     }
 
-    /// Makes a joint yield, or lower its load, from the next tick on. `set`: position that it was commanded to, rad; `inertia`: inertia
-    /// that it moves, kg·m²; `led`: the joint comes to rest after Teaching.
-    // Inlined, so that its index is known to be that of a joint.
+    /// Makes a joint yield, or lower its load, from the next tick on. `set`: commanded position, rad; `inertia`: inertia that the joint
+    /// moves, kg·m²; `led`: the joint comes to rest after Teaching.
+    // Inlined, so that the compiler knows that the index is in range.
     #[inline(always)]
     pub fn begin_yield(
         &mut self,
@@ -197,11 +200,11 @@ impl ControlLaw {
             }
             return;
         }
-        // The joint releases the commanded torque, not the computed torque.
+        // The joint releases the commanded torque, not the computed one.
         torque.blend += torque.sum().max(-limit).min(limit) - torque.sum();
         self.transfer.begin_yield(joint);
         let load = &self.loads[joint];
-        // The integral of a joint that was pushed has not found a load; that of a joint that was led has the load that Teaching carried.
+        // The integral of a pushed joint has not found a load. The integral of a joint that was led holds the load that Teaching carried.
         let load = if lowers {
             Load::bounded(load.torque(torque.pid.i), limits)
         } else if led {
@@ -223,17 +226,18 @@ impl ControlLaw {
         self.yields.iter().any(Option::is_some)
     }
 
-    /// Returns `true` if a joint yields and is not calm yet.
+    /// Returns `true` if a joint yields and has not calmed down yet.
     pub fn is_yielding(&self) -> bool {
         self.yields.iter().flatten().any(|yields| !yields.is_calm())
     }
 
-    /// Ends the reaction for the host: joints that are calm are held again.
+    /// Ends the reaction at the host's request. Joints that are calm are held again.
     pub fn end_yields(&mut self) {
         self.yields.iter_mut().flatten().for_each(Yield::clear);
     }
 
-    /// Drags the spring of a yielding joint along. Returns the position to which the spring pulls, rad; `None` if the joint does not yield.
+    /// Moves the spring of a yielding joint along with it. Returns the position to which the spring pulls, rad; `None` if the joint does
+    /// not yield.
     pub fn drag(&mut self, joint: usize, position: f64) -> Option<f64> {
         self.yields[joint].as_mut().map(|yields| yields.drag(position))
     }
@@ -243,13 +247,13 @@ impl ControlLaw {
         self.loads[joint].torque(self.torque[joint].pid.i)
     }
 
-    /// Returns the torque that corrects those of the model and of the load, N·m: the torque that opposes a push.
+    /// Returns the feedback torque, which corrects the torques of the model and of the load, N·m. It opposes a push.
     pub fn feedback(&self, joint: usize) -> f64 {
         let pid = &self.torque[joint].pid;
         pid.p + pid.d + (pid.i - self.load(joint))
     }
 
-    /// Ends the yield of joints that are calm. Returns those joints: they are held at their present positions.
+    /// Ends the yield of joints that are calm. Returns these joints, which are held at their present positions.
     pub fn end_of_yields(&mut self, gains: &[PidGains; JOINTS]) -> [bool; JOINTS] {
         let mut ended = [false; JOINTS];
         for j in 0..JOINTS {
@@ -267,10 +271,10 @@ impl ControlLaw {
     }
 
     /// Returns `true` if the load of every held joint is known, so that Teaching can carry it. In addition, the position controller must
-    /// make next to no torque: an integral that is still changing, or gives back torque that is now in the model, has not found the load,
-    /// and a hand that leans on the arm will let go.
+    /// make almost no torque. An integral that is still changing, or that gives back torque of the model, has not found the load. A person
+    /// who leans on the arm will let go.
     ///
-    /// If a `contact` may be against the arm, its pressure is not waited for, but a load that was known before must be known again.
+    /// If a `contact` may press on the arm, its pressure is not waited for, but a load that was known before must be known again.
     pub fn knows_loads(&self, held: &[bool; JOINTS], config: &Config, contact: bool) -> bool {
         let known = |j: usize| {
             let little = LITTLE * config.joints[j].torque_max;
@@ -279,13 +283,13 @@ impl ControlLaw {
         (contact || self.unwinds_ms == 0) && (0..JOINTS).all(|j| !held[j] || known(j))
     }
 
-    /// Sets the loads as if every joint had found that it carries none.
+    /// Sets the loads as if every joint had found a load of zero.
     #[cfg(test)]
     pub fn find_loads_for_test(&mut self) {
         self.loads.iter_mut().for_each(|load| load.set(0.0));
     }
 
-    /// Begins Teaching: it carries the loads that were found (J-25), and no torque that may come from a contact.
+    /// Begins Teaching, which carries the loads that were found (J-25), but no torque that may come from a contact.
     pub fn begin_teaching(&mut self, nodes: &Nodes, config: &Config) {
         let mut loads = [0.0; JOINTS];
         for j in 0..JOINTS {
@@ -298,23 +302,23 @@ impl ControlLaw {
         forget_yields(&mut self.yields);
     }
 
-    /// Notes that the payload of the arm comes into the model while the arm is held. The missing torque has no meaning until the integral
-    /// has given back the torque that it had found for the payload (J-60).
+    /// Records that the payload is added to the model while the arm is held. The missing torque is not a load until the integral has given
+    /// back the torque that it had found for the payload (J-60).
     pub fn payload_comes(&mut self) {
         self.unwinds_ms = UNWINDS_MS;
         self.forget_loads();
     }
 
-    /// Reduces the mass that Teaching had found by `mass` (kg), which the model takes over with this tick: the payload of the arm was
-    /// configured in Teaching (J-60).
+    /// Reduces the mass that Teaching had found by `mass` (kg). The payload was configured in Teaching, and the model carries it from this
+    /// tick on (J-60).
     pub fn give_way_to_payload(&mut self, mass: f64) {
         if let Some(taught) = &mut self.taught {
             taught.give_way(mass);
         }
     }
 
-    /// Takes the answers of the joints in each tick of Teaching, which is `late` by this time, ms. Returns the speeds that follow from
-    /// their positions, rad/s.
+    /// Evaluates the answers of the joints in each tick of Teaching. Returns the speeds that follow from their positions, rad/s. `late`:
+    /// delay of this tick, ms.
     pub fn hear_led_joints(&mut self, nodes: &Nodes, late: u16) -> [f32; JOINTS] {
         let (q, mut speeds) = (nodes.positions(), [0.0; JOINTS]);
         let Some(taught) = &mut self.taught else { return speeds };
@@ -324,7 +328,7 @@ impl ControlLaw {
         speeds
     }
 
-    /// Ends Teaching: the integral takes over the torque that held each joint.
+    /// Ends Teaching. The integral takes over the torque that held each joint.
     pub fn end_teaching(&mut self, nodes: &Nodes, config: &Config, gains: &[PidGains; JOINTS]) {
         let q = nodes.positions();
         if let Some(taught) = &self.taught {
@@ -336,14 +340,14 @@ impl ControlLaw {
         self.forget_loads();
     }
 
-    /// Shifts the position controllers by the sag of the set positions, rad: a sag is not a motion.
+    /// Shifts the position controllers by the sag of the set positions, rad. A sag is not a motion.
     pub fn sag(&mut self, sag: &[f64; JOINTS]) {
         for (pid, way) in self.pid.iter_mut().zip(sag) {
             pid.shift(*way);
         }
     }
 
-    /// Runs one tick: computes its torque, before any limit. Also returns the joint errors found (friction table).
+    /// Runs one tick: computes the torque before any limit. Also returns the joint errors that were found (friction table).
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -356,15 +360,15 @@ impl ControlLaw {
         self.yielded.step();
         let before = self.transfer.begin(&self.torque);
         if before.is_some() && mode != ControlMode::Teach {
-            // Only Teaching has these parts.
+            // These parts of the torque exist only in Teaching.
             self.torque.iter_mut().for_each(|torque| (torque.load, torque.brake) = (0.0, 0.0));
         }
         let q = nodes.positions();
         let v = nodes.velocities();
         // J-62: a measurement is compared with the set position that was due at its time.
         let due = set.due(config);
-        // J-40: measured position; commanded velocity and acceleration in Operate, zero elsewhere. The torque of the model acts now, so the
-        // measured position is advanced by the commanded motion since the measurement.
+        // J-40: uses the measured position, and the commanded velocity and acceleration in Operate (zero elsewhere). The torque of the
+        // model acts now, so the commanded motion since the measurement is added to the measured position.
         let now = core::array::from_fn(|j| q[j] + (set.point.position[j] - due[j]));
         let any_yields = self.any_yields();
         let lowering = if any_yields {
@@ -422,23 +426,23 @@ impl ControlLaw {
         errors
     }
 
-    /// Observes the load of one joint: the next one in each tick.
+    /// Observes the load of one joint. The joints take turns.
     fn observe_load(&mut self, set: &SetValues, config: &Config) {
         let j = usize::from(self.observed) % JOINTS;
         self.observed = (j as u8 + 1) % JOINTS as u8;
         let speed = set.point.velocity[j].abs();
         let creeps = speed > 0.0 && speed < CREEPS;
-        // While the integral gives back torque that is now in the model, it says nothing about a load.
+        // While the integral gives back torque of the model, it does not show a load.
         if self.yields[j].is_none() && self.unwinds_ms == 0 && !creeps {
             let (load, pid, limits) = (&mut self.loads[j], &self.torque[j].pid, &config.joints[j]);
-            // An integral that has not reached the torque that it must hold has not found it.
+            // An integral that has not reached the torque that it must hold has not found the load.
             let found = load.is_known() || (pid.p + pid.d).abs() <= LITTLE * limits.torque_max;
             load.observe(pid.i, found && set.settled(j), limits);
         }
     }
 
-    /// Computes the torque that Teaching adds to the torque of the model (J-25). Parts that change slowly are computed in turns; in the
-    /// tick that computes such a part the rest stays as it was. Returns `true` if all of the torque was computed.
+    /// Computes the torque that Teaching adds to the torque of the model (J-25). Parts that change slowly are computed in turns; in such a
+    /// tick the other parts do not change. Returns `true` if all of the torque was computed.
     #[inline(never)]
     fn teach(&mut self, nodes: &Nodes, config: &Config, parameters: &ControlParameters<'_>) -> bool {
         let (q, v) = (nodes.positions(), nodes.velocities());
@@ -480,7 +484,7 @@ impl ControlLaw {
         true
     }
 
-    /// Limits the brakes of Teaching to the torque that the other parts leave of the limit: brakes cause no overload.
+    /// Limits the brakes of Teaching to the torque that the other parts leave, so that brakes cause no overload.
     #[inline(never)]
     fn bound_brakes(&mut self, nodes: &Nodes, config: &Config) {
         for (j, torque) in self.torque.iter_mut().enumerate() {
@@ -492,15 +496,15 @@ impl ControlLaw {
     }
 }
 
-/// Ends all yields, in place: an array of `None` would be made and copied, with space for values that it does not hold.
+/// Ends all yields in place. Assigning an array of `None` would create and copy it, including the space for unused values.
 fn forget_yields(yields: &mut [Option<Yield>; JOINTS]) {
     for yields in yields {
         *yields = None;
     }
 }
 
-/// Returns the torques that compensate friction at the commanded velocities, N·m, and joint errors for velocities that the table lacks
-/// (J-42).
+/// Returns the torques that compensate friction at the commanded velocities, N·m, and joint errors for velocities that are outside the
+/// friction table (J-42).
 #[inline]
 pub(super) fn compensation(
     inputs: &LawInputs<'_>,

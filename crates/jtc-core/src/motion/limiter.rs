@@ -5,28 +5,28 @@ use crate::limits::{self, Recent, Saturation, Turns};
 use crate::remembered::remembered;
 use crate::{JOINTS, joint_error};
 
-/// Speed above which a torque at its limit that drives the joint on does not count as a catch, rad/s.
+/// Speed in rad/s above which a saturated torque along the motion is not considered part of a catch.
 pub(super) const DRIVEN: f64 = 0.05;
-/// Share of its set velocity below which a joint that comes to rest after Teaching is held up by an obstacle.
+/// Share of its set velocity below which a joint that comes to rest after Teaching is considered to be stopped by an obstacle.
 const LAGS: f64 = 0.7;
-/// Share of the velocity limit from which on the feedback torque may be twice as high: errors of friction and inertia in the model are not
-/// a push. An obstacle in the way of a fast motion takes the torque beyond the doubled share some milliseconds later.
+/// Share of the velocity limit from which on the feedback torque may be twice as high, because friction and inertia of the model may be
+/// wrong. If a fast motion meets an obstacle, its torque exceeds the doubled share a few milliseconds later.
 const FAST: f64 = 0.2;
-/// Number of ticks: a joint whose feedback torque was beyond its share in more than that of the last 100 ticks counts as pushed (J-66).
+/// Number of ticks among the last 100. A joint is considered pushed (J-66) if its feedback torque was above its share in more ticks.
 const PUSHED_MS: u16 = 20;
-/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit, and distance gained by this excess, rad. If a
-/// joint exceeds both, it counts as pushed, also with weak gains. A light joint is at its over-speed before the torque of such gains shows
-/// the push.
+/// Excess of a joint's speed over the commanded speed, as a share of its velocity limit, and distance that this excess has added, rad. A
+/// joint that exceeds both is considered pushed, even with weak gains: a light joint reaches its over-speed before the torque of such gains
+/// shows the push.
 pub(crate) const RUSH: f64 = 0.2;
 const RUSH_WAY: f64 = 1e-3;
 
-/// Counters of each joint's torque at its limit, and of its feedback torque beyond its share.
+/// Counters for each joint: torque at its limit, and feedback torque above its share.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Limiter {
     saturation: [Saturation; JOINTS],
     pushed: [Recent; JOINTS],
     turns: [Turns; JOINTS],
-    /// Number of ticks of this limiter.
+    /// Number of ticks since the start.
     tick: u32,
 }
 
@@ -35,17 +35,17 @@ remembered!(Limiter { saturation, pushed, turns, tick });
 /// Findings of a tick for one joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Found {
-    /// Limits of the set values that the joint exceeds, as joint errors; the torque bit stands for a torque that is not a number.
+    /// Set values that exceed their limits, as joint errors. The torque bit means that the torque is NaN.
     pub errors: u16,
-    /// Its computed torque was beyond the limit for too long (J-43).
+    /// The computed torque was above its limit for too long (J-43).
     pub overloaded: bool,
-    /// Its feedback torque was beyond its share for too long, and it had settled before.
+    /// The feedback torque was above its share for too long, and the joint had settled before.
     pub pushed: bool,
-    /// The feedback torque is beyond its share.
+    /// The feedback torque is above its share.
     pub strained: bool,
     /// The joint has settled since it was enabled.
     pub settled: bool,
-    /// Its torque goes from limit to limit, or its swing grows: its position controller is unstable.
+    /// The torque jumps from limit to limit, or the swing grows: the position controller is unstable.
     pub unstable: bool,
 }
 
@@ -56,19 +56,19 @@ impl Found {
     }
 }
 
-/// Torque that remains within the limits, per joint.
+/// Result of the limiter, per joint.
 #[derive(Default)]
 pub(crate) struct Limited {
-    /// To command, N·m.
+    /// Torque to command, N·m.
     pub torque: [f64; JOINTS],
-    /// Findings of the limits; `None` if no reaction is needed.
+    /// Violations of the limits; `None` if no reaction is needed.
     pub found: Option<[Found; JOINTS]>,
     /// Sag of the set positions of joints whose loads are being caught, rad; `None` if no set position has sagged.
     pub sag: Option<[f64; JOINTS]>,
 }
 
 impl Limiter {
-    /// Returns the joints whose last torque was beyond the limit: their integrals are held (J-41).
+    /// Returns the joints whose last torque was above the limit. Their integrals do not change (J-41).
     pub fn saturated(&self) -> [bool; JOINTS] {
         core::array::from_fn(|j| self.saturation[j].saturated)
     }
@@ -81,14 +81,14 @@ impl Limiter {
         self.turns[joint] = Turns::default();
     }
 
-    /// Clears earlier torques from limit to limit; only those from now on count.
+    /// Clears the record of earlier changes from limit to limit.
     pub fn forget_turns(&mut self) {
         self.turns = Default::default();
     }
 
-    /// Runs one tick: limits the torque that the `law` has computed, and checks torque and set values. Braking with all available torque
-    /// excuses its effects on the torque and, while a motion is commanded, on position error and acceleration (J-33). For a joint that
-    /// yields everything is excused except a torque that is not a number: its torque is bounded by construction.
+    /// Runs one tick: limits the torque that the `law` has computed, and checks torque and set values. While the arm brakes with all
+    /// available torque, an overload is not reported; if a motion is commanded, position error and acceleration are not reported either
+    /// (J-33). For a joint that yields, only a torque of NaN is reported, because its torque is bounded by construction.
     pub fn step(
         &mut self,
         inputs: &LawInputs<'_>,
@@ -98,11 +98,11 @@ impl Limiter {
         limited: &mut Limited,
     ) {
         let LawInputs { mode, braking, nodes, config, ref parameters } = *inputs;
-        // Only while set values move: an arm that stands yields to a push (J-66).
+        // This applies only while set values move: an arm at rest yields to a push (J-66).
         let excused = if braking && mode.moves() {
             joint_error::POSITION_ERROR | joint_error::ACCELERATION
         } else if held_back || mode == ControlMode::Rest {
-            // Path time that slows down adds its own acceleration; an arm that a hand has led may have any acceleration.
+            // Path time that slows down adds its own acceleration. An arm that a hand has led may have any acceleration.
             joint_error::ACCELERATION
         } else {
             0
@@ -124,7 +124,7 @@ impl Limiter {
             if parameters.on_trial && stands {
                 unstable |= set.catch[j].watch(v[j]);
             }
-            // Torque that drives a joint on, instead of stopping it, is neither a catch nor a deceleration.
+            // A torque that accelerates a joint instead of stopping it is neither a catch nor a deceleration.
             let driven = || computed.signum() * v[j] > DRIVEN;
             let stopping = (catching || set.deceleration[j].is_some()) && !driven();
             let excuses = braking || stopping || yields;
@@ -138,9 +138,9 @@ impl Limiter {
             // A fast motion may use more feedback torque.
             let speed = || (set.point.velocity[j].abs() / (FAST * limits.velocity_max)).min(1.0);
             let strained = feedback.abs() > share && feedback.abs() > (1.0 + speed()) * share;
-            // Feedback torque that brakes a joint is not a push against it; feedback torque on a joint that stands is.
+            // Feedback torque that brakes a moving joint is not a push. Feedback torque on a joint at rest is one.
             let brakes = || stopping || (braking && feedback.signum() * v[j] < -DRIVEN);
-            // An arm that a hand has led meets a person before it is at rest: the joint lags its set values.
+            // If an arm that a hand has led hits a person before it is at rest, the joint lags its set values.
             let lags = || {
                 let set = set.point.velocity[j];
                 mode == ControlMode::Rest && feedback * set > 0.0 && v[j] * set.signum() < LAGS * set.abs()
@@ -152,7 +152,7 @@ impl Limiter {
                 let faster = velocity - due;
                 faster.abs() > RUSH * limits.velocity_max && faster * velocity > 0.0 && error * velocity < 0.0
             };
-            // Distance first: it hardly ever exceeds its limit.
+            // The distance is checked first, because it hardly ever exceeds its limit.
             let rushes = error.abs() > RUSH_WAY && rushes() && settled && !yields && !taught && !brakes();
             let pushed = self.pushed[j].exceeds(counts, PUSHED_MS) | rushes;
             let point = (set.point.position[j], set.point.velocity[j], set.point.acceleration[j]);

@@ -1,4 +1,4 @@
-//! Bounds of a ramp of path time (J-33): slopes within the acceleration and torque limits of the arm.
+//! Bounds of a ramp of path time (J-33): the slopes that keep the arm within its acceleration and torque limits.
 use jtc_dynamics::Dynamics;
 
 use super::law::ControlLaw;
@@ -10,26 +10,27 @@ use crate::path::{Bounds, PathClock, SlopeBounds};
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use; the remainder is for changes within a tick and
-/// for the controller.
+/// Shares of the acceleration and torque limits that a pause, a stop or a resume may use. The remainder is for changes within a tick and
+/// for the position controller.
 const RAMP_ACCELERATION: f64 = 0.98;
 const RAMP_TORQUE: f64 = 0.95;
-/// Share of the remaining torque for a stop of an arm that a hand has led: the position controller, which makes the torque, overshoots.
+/// Share of the remaining torque that a stop may use after a hand has led the arm. The position controller makes this torque, and it
+/// overshoots.
 const STOP_TORQUE: f64 = 0.5;
-/// Lowest share of the torque limit that is used if hardly any torque remains.
+/// Least share of the torque limit that a stop uses, even if hardly any torque remains.
 const LEAST_LEFT: f64 = 0.1;
 
 /// The inertia of the arm at the start of a ramp.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PathRamp {
-    /// Mass matrix with rotors.
+    /// Mass matrix, including the rotors.
     inertia: [[f64; JOINTS]; JOINTS],
 }
 
 remembered!(PathRamp { inertia });
 
 impl PathRamp {
-    /// Begins a ramp of path time: its bounds need the inertia of the arm.
+    /// Begins a ramp of path time. Its bounds depend on the inertia of the arm.
     pub fn begin(&mut self, nodes: &Nodes, config: &Config, dynamics: &Dynamics) {
         self.inertia = dynamics.mass_matrix(nodes.positions());
         for j in 0..JOINTS {
@@ -37,7 +38,7 @@ impl PathRamp {
         }
     }
 
-    /// Returns the inertia that each joint moved at the start of the ramp with the other joints held, kg·m².
+    /// Returns the inertia that each joint moved at the start of the ramp while the other joints were held, kg·m².
     pub fn inertia(&self) -> [f64; JOINTS] {
         core::array::from_fn(|j| self.inertia[j][j])
     }
@@ -47,21 +48,21 @@ impl PathRamp {
         self.inertia[j][k]
     }
 
-    /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms, if the stop uses [`STOP_TORQUE`] of the
-    /// torque that the last torques of the `law` leave of the limits.
+    /// Returns the shortest time of a smooth stop of all joints from these velocities (rad/s), ms. The stop uses [`STOP_TORQUE`] of the
+    /// torque that the last torques of the `law` leave within the limits.
     pub fn shortest_stop_ms(&self, law: &ControlLaw, velocity: &[f64; JOINTS], config: &Config) -> f64 {
         let mut longest = 0.0_f64;
         for j in 0..JOINTS {
             let momentum: f64 = (0..JOINTS).map(|k| self.inertia[j][k] * velocity[k]).sum();
             let (limit, held) = (config.joints[j].torque_max, law.torque[j].model + law.torque[j].load);
-            // The holding torque helps to stop the joint, or uses up torque that could.
+            // The holding torque helps to stop the joint, or reduces the torque that could stop it.
             let left = (STOP_TORQUE * (limit + held * momentum.signum())).max(LEAST_LEFT * limit);
             longest = longest.max(STEEPEST_LED * momentum.abs() / (left * DT));
         }
         longest
     }
 
-    /// Runs a tick of a clock that changes to another rate, along a ramp that the arm can follow; `at` and `law` as for `slope_bounds`.
+    /// Runs one tick of a clock that changes to another rate, along a ramp that the arm can follow. For `at` and `law` see `slope_bounds`.
     pub fn step(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         if !clock.ramping() {
             clock.slope = 0.0;
@@ -76,14 +77,14 @@ impl PathRamp {
         }
     }
 
-    /// Runs a tick of a clock that is held back by joints at their torque limits (J-75).
+    /// Runs one tick of a clock that is held back because joints are at their torque limits (J-75).
     pub fn hold_back(&self, at: &SetPoint, law: &ControlLaw, clock: &mut PathClock, config: &Config) {
         clock.hold_back(self.slope_bounds(at, law, clock.rate, clock.slope, config).full);
     }
 
-    /// Returns slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of each
-    /// joint is computed from the last torque of the `law`, with all its parts: a joint that already lags has less. Joints that yield do
-    /// not move along the path, and the rate of path time does not change their torque.
+    /// Returns the slopes of path time that the arm can follow at `at`, at the present `rate` and `slope` (1/s). The remaining torque of
+    /// each joint is computed from the last torque of the `law`, with all its parts, so a joint that already lags has less. Joints that
+    /// yield do not move along the path, and the rate of path time does not change their torque.
     fn slope_bounds(
         &self,
         at: &SetPoint,
@@ -109,7 +110,7 @@ impl PathRamp {
             let torque = law.torque[j].sum() - push * slope;
             narrow(&mut easy, within(torque, push, RAMP_TORQUE * limit.torque_max));
             let (low, high) = within(torque, push, limit.torque_max);
-            // No rate of path time helps a joint that does not move along the path.
+            // A change of path time does not help a joint that does not move along the path.
             narrow(
                 &mut full,
                 if moves(at.velocity[j]) { (low, high) } else { (low.min(0.0), high.max(0.0)) },
@@ -140,7 +141,7 @@ mod tests {
     use crate::Parameters;
     use crate::motion::JointTorque;
 
-    /// Joints that stand, that move slowly enough to count as standing, and that move.
+    /// Velocities of joints that are at rest, that are slow enough to be considered at rest, and that move.
     fn velocities() -> impl Strategy<Value = [f64; JOINTS]> {
         prop::array::uniform6(prop_oneof![Just(0.0), Just(0.02), Just(-0.02), -1.5..1.5f64])
     }
@@ -150,8 +151,8 @@ mod tests {
     }
 
     proptest! {
-        /// Within its bounds a slope keeps the limits of acceleration and torque; outside them it does not. A joint that stands and is
-        /// beyond a limit does not prevent path time from running on at its present rate.
+        /// A slope within the bounds keeps the acceleration and torque limits; a slope outside does not. A joint at rest that exceeds a
+        /// limit does not prevent path time from continuing at its present rate.
         #[test]
         fn j33_the_bounds_of_a_slope_are_where_the_arm_reaches_its_limits(
             velocity in velocities(),

@@ -1,53 +1,54 @@
-//! Torque margin for a motion from the held position: how soon the arm can reach the first point of a path (J-34), and how hard and how
-//! fast it can be jogged (J-58). Gravity and the load found count at both ends of the motion, friction at its top speed.
+//! Torque margin for a motion from the held position. It determines how soon the arm can reach the first point of a path (J-34), and the
+//! acceleration and speed of a jog (J-58). Gravity and the load found are taken into account at both ends of the motion, friction at its
+//! top speed.
 use jtc_dynamics::sqrt;
 
 use super::Motion;
 use super::law::{LawInputs, compensation};
 use crate::{JOINTS, jog};
 
-/// Highest share of a torque limit that an approach uses; the feedback of a fast approach takes up to a fifth.
+/// Highest share of a torque limit that an approach uses. The feedback of a fast approach needs up to a fifth of the limit.
 const APPROACH_TORQUE: f64 = 0.8;
-/// Highest share of a torque limit that a jog uses: the rest is for the feedback, and for the return from a position that takes more torque
-/// to hold.
+/// Highest share of a torque limit that a jog uses. The rest is for the feedback, and for the return from a position with a higher holding
+/// torque.
 const JOG_TORQUE: f64 = 0.92;
-/// Share of the remaining torque that a jog uses, and an approach if standing alone takes nearly all of the limit.
+/// Share of the remaining torque that a jog uses. An approach uses it if holding the arm already needs nearly all of the limit.
 const SHARE_OF_REST: f64 = 0.5;
 /// Longest time that torque limits may add to an approach, ms.
 const LONGER_MS: f64 = 2_000.0;
-/// Top speed of a minimum-jerk polynomial, in distances over its time, and its highest acceleration, in distances over the square of its
-/// time.
+/// Top speed of a minimum-jerk polynomial, in distances per duration, and its highest acceleration, in distances per square of the
+/// duration.
 const TOP_SPEED: f64 = 1.875;
 const TOP_ACCELERATION: f64 = 5.774;
 
 /// Time in which a jogged joint can come to rest with its share of the remaining torque, s.
 const REST_S: f64 = 0.3;
-/// Speed of a slow jog, rad/s: if friction leaves no torque at the wanted speed, it may leave some at this speed.
+/// Speed of a slow jog, rad/s. If friction leaves no torque at the requested speed, it may leave some at this speed.
 const CREEP: f64 = 0.02;
-/// Speed from which on a joint slides, so that the friction of the model acts completely, rad/s.
+/// Speed from which on a joint slides and the full friction of the model acts, rad/s.
 const SLIDES: f64 = 0.1;
-/// Highest speed that counts as zero, rad/s.
+/// Highest speed that is considered zero, rad/s.
 const NO_SPEED: f64 = 1e-3;
-/// Share of a torque limit that counts as left at least for a motion that unloads the joint.
+/// Least share of a torque limit that is assumed to remain for a motion that unloads the joint.
 const UNLOADING: f64 = 0.01;
-/// Least share of the tool speed limit for joints that get faster, so that the jog continues.
+/// Least share of the tool speed limit that remains for joints that become faster, so that the jog continues.
 const LEAST_ROOM: f64 = 0.005;
-/// Lowest share of a jog's acceleration.
+/// Least share of a jog's acceleration.
 const LEAST_ACCELERATION: f64 = 0.02;
 
 /// Limits of a jog that follow from the remaining torque.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct JogRoom {
-    /// Velocities, rad/s: the wanted velocities, or a share of them.
+    /// Velocities, rad/s: the requested velocities, or a share of them.
     pub velocity: [f64; JOINTS],
     /// Highest accelerations, rad/s².
     pub acceleration: [f64; JOINTS],
 }
 
 impl Motion {
-    /// Returns the time for the approach from the held position to `to` (rad), ms: the time of a ramp, or as long as the velocity,
-    /// acceleration and torque limits require. `None` if the torque limits require more than 2 s beyond the others. Uses the inertia of a
-    /// ramp that begins here.
+    /// Returns the time for the approach from the held position to `to` (rad), ms. It is the time of a ramp, or longer if the velocity,
+    /// acceleration or torque limits require it. Returns `None` if the torque limits require over 2 s more than the other limits. Uses the
+    /// inertia of a ramp that begins here.
     pub fn approach_ms(&self, to: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<f64> {
         let config = inputs.config;
         let from = &self.set.point.position;
@@ -58,7 +59,7 @@ impl Motion {
             shortest = shortest.max(1_000.0 * sqrt(TOP_ACCELERATION * way.abs() / limits.acceleration_max));
         }
         let standing = [from, to].map(|q| self.standing(q, inputs));
-        // Time that is long enough if friction is that of an approach which takes `ms`.
+        // Returns the time that is long enough if the friction is that of an approach of `ms` milliseconds.
         let enough = |ms: f64| {
             let friction = compensation(inputs, &way.map(|way| 1_000.0 * TOP_SPEED * way / ms)).0;
             let times = (0..JOINTS).map(|j| {
@@ -81,13 +82,13 @@ impl Motion {
         };
         let longest = shortest + LONGER_MS;
         // A slower approach has less friction. If the friction of the fastest approach leaves too little torque, the friction of the
-        // slowest decides.
+        // slowest approach is used.
         let time = enough(shortest);
         if time <= longest { Some(time) } else { (enough(longest) <= longest).then_some(longest) }
     }
 
-    /// Returns the velocities and accelerations that the limits of torque and tool speed allow a jog at the `wanted` velocities (rad/s);
-    /// `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins here.
+    /// Returns the velocities and accelerations that the limits of torque and tool speed allow for a jog at the `wanted` velocities
+    /// (rad/s). Returns `None` if a torque limit allows no motion. Uses the inertia of a ramp that begins here.
     pub fn jog_room(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> Option<JogRoom> {
         let config = inputs.config;
         let wanted = &if config.tool_speed_max > 0.0 { self.slowed(wanted, inputs) } else { *wanted };
@@ -114,9 +115,9 @@ impl Motion {
         Some(JogRoom { velocity, acceleration: core::array::from_fn(|j| share * hardest(j)) })
     }
 
-    /// Returns the `wanted` velocities (rad/s), reduced to fit the tool speed limit. The contributions of all joints to the speed of the
-    /// flange are summed up, because joints whose motions cancel out do not speed up alike. Joints that get faster share the speed that the
-    /// other joints leave; those become slower or keep their speed.
+    /// Returns the `wanted` velocities (rad/s), reduced to the tool speed limit. The contributions of all joints to the speed of the flange
+    /// are added up without their signs, because joints whose motions cancel out do not accelerate in the same way. Joints that become
+    /// faster share the speed that the other joints leave; the other joints become slower or keep their speed.
     fn slowed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let (most, set) = (inputs.config.tool_speed_max, &self.set.point);
         // Distance of the flange from the axis of each joint, m.
@@ -128,13 +129,13 @@ impl Motion {
         }
         let speed: f64 = (0..JOINTS).map(|j| reach[j] * wanted[j].abs()).sum();
         let share = if speed > most { most / speed } else { 1.0 };
-        // A joint continues to get faster, or reverses, until its acceleration is back at zero.
+        // A joint continues to accelerate or to reverse until its acceleration is zero.
         let peak: [f64; JOINTS] = core::array::from_fn(|j| {
             let (v, a) = (set.velocity[j], set.acceleration[j]);
             let after = v + 0.5 * a * a.abs() / jog::jerk(&inputs.config.joints[j]);
             v.abs().max(after.abs())
         });
-        // Joints that are not to get faster count with their present speed. If less remains for the others, more joints may belong to
+        // Joints that must not become faster use up their present speed. If less remains for the other joints, more joints may belong to
         // this group.
         let mut rising = share;
         for _ in 0..JOINTS {
@@ -155,8 +156,8 @@ impl Motion {
         })
     }
 
-    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of the torque that is
-    /// left there.
+    /// Returns the share of the `wanted` velocities (rad/s) from which the joints can come to rest with their share of the remaining
+    /// torque.
     fn jog_speed(&self, wanted: &[f64; JOINTS], inputs: &LawInputs<'_>) -> f64 {
         let needed = |j: usize| {
             (0..JOINTS).map(|k| self.ramp.coupling(j, k).abs() * wanted[k].abs()).sum::<f64>() / REST_S
@@ -164,8 +165,8 @@ impl Motion {
         self.least_share(wanted, needed, inputs)
     }
 
-    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that fits into its share of the torque that a jog at `velocity`
-    /// (rad/s) leaves of its limit.
+    /// Returns the share (0..1) of the torque `needed` by each joint (N·m) that fits into [`SHARE_OF_REST`] of the torque that a jog at
+    /// `velocity` (rad/s) leaves.
     fn least_share(
         &self,
         velocity: &[f64; JOINTS],
@@ -179,8 +180,9 @@ impl Motion {
         })
     }
 
-    /// Returns the torque that a jog at `velocity` (rad/s) leaves of each torque limit, N·m, at the present position and at the position of
-    /// rest. Friction counts in both directions: a joint that is lowered must be raised again.
+    /// Returns the torque that a jog at `velocity` (rad/s) leaves within each torque limit, N·m, at the present position and at the
+    /// position at which it comes to rest. Friction is subtracted for both directions, because a joint that was lowered must be raised
+    /// again.
     fn jog_leaves(&self, velocity: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let config = inputs.config;
         let here = &self.set.point.position;
@@ -198,7 +200,7 @@ impl Motion {
             let [held, held_there] = standing.map(|torque| torque[j]);
             let (held, held_there) = (held.abs(), held_there.abs());
             let left = JOG_TORQUE * limit - held.max(held_there) - friction[j].abs();
-            // A joint that comes to a position with a lower holding torque moves as long as any torque is available for it.
+            // A joint that moves towards a lower holding torque may move as long as any torque is available for it.
             let push: f64 = (0..JOINTS).map(|k| self.ramp.coupling(j, k) * velocity[k]).sum();
             let lifts = standing[0][j] * push > 0.0;
             let possible = !lifts || held + friction[j].abs() <= limit;
@@ -207,7 +209,7 @@ impl Motion {
     }
 
     /// Returns the torques that hold the arm at `q` (rad): gravity plus the load found, or plus the integral if that sum is larger. While
-    /// the integrals give back a payload that the model has taken over, only gravity counts.
+    /// the integrals give back the torque of a payload that is now in the model, returns gravity alone.
     fn standing(&self, q: &[f64; JOINTS], inputs: &LawInputs<'_>) -> [f64; JOINTS] {
         let gravity = inputs.parameters.dynamics.gravity_torque(q);
         if self.law.unwinds_ms > 0 {

@@ -1,4 +1,4 @@
-//! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach and of the path.
+//! Set values (J-40 to J-44) of the held arm, of joints that come to rest, of the approach, and of the path.
 use crate::catch::Catch;
 use crate::commanded::Commanded;
 use crate::config::Config;
@@ -11,7 +11,7 @@ use crate::path::PathClock;
 use crate::remembered::remembered;
 use crate::{DT, JOINTS};
 
-/// Commanded motion of the arm, with the joints that have not come to rest yet. HoldPos steps it by [`hold`](Self::hold), Operate by
+/// Commanded motion of the arm, including joints that have not come to rest yet. HoldPos steps it by [`hold`](Self::hold), Operate by
 /// [`approach`](Self::approach) and [`follow`](Self::follow).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SetValues {
@@ -19,11 +19,11 @@ pub(crate) struct SetValues {
     pub point: SetPoint,
     /// Set values of the last ticks (J-62).
     pub commanded: Commanded,
-    /// The joint is enabled and its set position latched.
+    /// The joint is enabled and its set position is latched.
     pub(super) holding: [bool; JOINTS],
-    /// The joint is set absent (J-53), so it need not be held.
+    /// The joint is marked as absent (J-53), so it need not be held.
     absent: [bool; JOINTS],
-    /// Joints whose set values restarted from the measured state since the last tick, in motion or at rest.
+    /// Joints whose set values have been restarted from the measured motion since the last tick.
     found_moving: [bool; JOINTS],
     /// Joints whose load is being caught.
     pub(super) catch: [Catch; JOINTS],
@@ -54,21 +54,21 @@ impl SetValues {
     pub fn begin_at(&mut self, position: &[f64; JOINTS]) {
         self.point = SetPoint::still(*position);
         self.commanded.rest(position);
-        // J-63: joints do not stop because the set values restart, least of all a joint that had not followed them.
+        // J-63: joints do not stop because their set values restart, even less a joint that had not followed them.
         self.found_moving = [true; JOINTS];
         self.deceleration = [None; JOINTS];
         self.led = false;
         self.jog = None;
     }
 
-    /// Sets the set position to the measured one while a hand leads the arm.
+    /// Sets the set position to the measured position while a hand leads the arm.
     pub fn follow_measured(&mut self, nodes: &Nodes) {
         self.point = SetPoint::still(*nodes.positions());
         self.commanded.rest(nodes.positions());
     }
 
-    /// Begins the next tick. Returns the joints whose set values restarted in the last tick. This did not change their motion: the set
-    /// values took over the motion in which the joints were found.
+    /// Begins the next tick. Returns the joints whose set values were restarted in the last tick. The restart did not change their motion:
+    /// the set values continued the measured motion.
     pub fn next_tick(&mut self) -> [bool; JOINTS] {
         self.commanded.next_tick();
         core::mem::take(&mut self.found_moving)
@@ -79,7 +79,7 @@ impl SetValues {
         self.commanded.position(config.delay_ticks)
     }
 
-    /// Sets the joint velocities for the jog from now on, rad/s, and the highest accelerations, rad/s².
+    /// Sets the joint velocities of the jog, rad/s, and its highest accelerations, rad/s².
     pub fn jog(&mut self, wanted: &[f64; JOINTS], acceleration: &[f64; JOINTS], config: &Config) {
         let jog = self.jog.get_or_insert_with(Jog::begin);
         jog.command(wanted, acceleration, &self.point.position, config);
@@ -90,7 +90,7 @@ impl SetValues {
         self.jog.as_mut().is_some_and(Jog::ends)
     }
 
-    /// Runs a tick of a jog; `ramp` advances its clock for the commanded set values.
+    /// Runs one tick of a jog. `ramp` advances its clock for the commanded set values.
     pub fn jog_on(&mut self, config: &Config, ramp: impl FnOnce(&SetPoint, &mut PathClock)) {
         let Some(jog) = &mut self.jog else { return };
         jog.step(&mut self.point, config, ramp);
@@ -111,12 +111,12 @@ impl SetValues {
         self.jog = None;
     }
 
-    /// Returns `true` if the arm is jogged and does not come to rest.
+    /// Returns `true` if the arm is jogged and has not begun to come to rest.
     pub fn jogs_on(&self) -> bool {
         self.jog.as_ref().is_some_and(Jog::goes_on)
     }
 
-    /// Returns `true` if the arm is jogged, or has not come to rest since.
+    /// Returns `true` until a jogged arm has come to rest.
     pub fn jogging(&self) -> bool {
         self.jog.is_some()
     }
@@ -126,14 +126,14 @@ impl SetValues {
         self.jog.is_some() || self.deceleration.iter().any(Option::is_some)
     }
 
-    /// Begins to hold the arm at its measured position. An arm that moves, because a hand has led it, first comes to rest within
-    /// `length_ms`, and is caught like a falling load.
+    /// Begins to hold the arm at its measured position. An arm that moves because a hand has led it first comes to rest within `length_ms`.
+    /// It is then caught like a falling load.
     pub fn hold_measured(&mut self, nodes: &Nodes, length_ms: f64, config: &Config) {
         let (from, velocity) = (nodes.positions(), nodes.velocities());
         self.begin_at(from);
         let moving = velocity.iter().any(|&v| moves(v));
         for j in 0..JOINTS {
-            // Joints that are enabled later begin on their own.
+            // Joints that are enabled later begin separately.
             self.deceleration[j] = None;
             if moving && self.holding[j] {
                 let led = Deceleration::led(from[j], velocity[j], length_ms, &config.joints[j]);
@@ -146,7 +146,7 @@ impl SetValues {
         }
     }
 
-    /// Returns `true` when the joints that a hand has led have come to rest. From then on a swinging joint may need to be caught like a
+    /// Returns `true` when the joints that a hand has led have come to rest. From then on, a joint that swings may need to be caught like a
     /// load.
     pub fn led_to_rest(&mut self, config: &Config) -> bool {
         self.led = self.deceleration.iter().any(Option::is_some);
@@ -156,7 +156,7 @@ impl SetValues {
         !self.led
     }
 
-    /// Returns `true` if the arm comes to rest because a hand has led it.
+    /// Returns `true` while the arm comes to rest after a hand has led it.
     pub fn is_led(&self) -> bool {
         self.led
     }
@@ -171,7 +171,7 @@ impl SetValues {
         self.found_moving[j] = true;
     }
 
-    /// Joints that move, by their set values or as measured.
+    /// Returns the joints that move, according to their set values or their measurements.
     pub fn moving(&self, nodes: &Nodes) -> [bool; JOINTS] {
         core::array::from_fn(|j| moves(self.point.velocity[j]) || moves(nodes.velocities()[j]))
     }
@@ -182,7 +182,7 @@ impl SetValues {
         self.holding = [true; JOINTS];
     }
 
-    /// Moves the set position of a yielding joint to the position to which it is dragged, rad. Its set values do not count as motion.
+    /// Moves the set position of a yielding joint to the position of its spring, rad. This change of the set values is not a motion.
     pub fn lead(&mut self, j: usize, position: f64) {
         (self.point.position[j], self.point.velocity[j], self.point.acceleration[j]) = (position, 0.0, 0.0);
         self.commanded.begin(j, position, 0.0, 0);
@@ -190,7 +190,7 @@ impl SetValues {
         self.found_moving[j] = true;
     }
 
-    /// Returns `true` if the joint has been at rest, within its torque limit, since it was enabled.
+    /// Returns `true` if the joint has come to rest, within its torque limit, at any time since it was enabled.
     pub fn settled(&self, joint: usize) -> bool {
         self.catch[joint].settled()
     }
@@ -203,8 +203,9 @@ impl SetValues {
             && !self.catch.iter().any(Catch::busy)
     }
 
-    /// Latches the set position of joints that have just been enabled, and brings those to rest that move; joints that are not enabled are
-    /// followed, without torque. Returns the joints that were held before, and those that have just been enabled.
+    /// Latches the set position of joints that have just been enabled, and brings those of them to rest that move. The set values of joints
+    /// that are not enabled follow the measurements, without torque. Returns the joints that were held before, and those that have just
+    /// been enabled.
     pub fn latch(&mut self, nodes: &Nodes, config: &Config) -> Latched {
         let (measured, velocity) = (nodes.positions(), nodes.velocities());
         let enabled = core::array::from_fn(|j| nodes.node(j).enabled());
@@ -226,7 +227,7 @@ impl SetValues {
                     self.decelerate(j, falling, config);
                 }
             } else if another {
-                // Its load moves when the load of another joint moves.
+                // The load of this joint moves when the load of another joint moves.
                 self.catch[j] = Catch::begin(config);
             }
         }
@@ -234,7 +235,7 @@ impl SetValues {
         Latched { held, just_enabled }
     }
 
-    /// Runs a tick of HoldPos: the held position.
+    /// Runs one tick of the position hold in HoldPos.
     pub fn hold(&mut self, config: &Config) {
         (self.point.velocity, self.point.acceleration) = ([0.0; JOINTS], [0.0; JOINTS]);
         for j in 0..JOINTS {
@@ -248,7 +249,8 @@ impl SetValues {
         }
     }
 
-    /// Runs a tick on the path or of the approach: full-speed values `at`, scaled by the rate of path time and its slope (1/s) (J-33).
+    /// Runs one tick on the path or of the approach. The full-speed values `at` are scaled by the rate of path time and its slope (1/s)
+    /// (J-33).
     pub fn follow(&mut self, at: &SetPoint, rate: f64, slope: f64) {
         self.point.position = at.position;
         for j in 0..JOINTS {
@@ -257,8 +259,8 @@ impl SetValues {
         }
     }
 
-    /// Moves the set position of a joint whose load is being caught towards the joint, by as much as the torque is beyond the limit
-    /// (`excess`, N·m) at a position error of `error` (rad). Returns that step, rad.
+    /// Moves the set position of a joint whose load is being caught towards the joint, by as much as the torque exceeds the limit
+    /// (`excess`, N·m) at a position error of `error` (rad). Returns the step, rad.
     pub fn sag(&mut self, j: usize, excess: f64, kp: f64, error: f64, limits: &JointConfig) -> f64 {
         let step = self.catch[j].sag(excess, kp, error, limits);
         self.point.position[j] += step;
@@ -270,7 +272,8 @@ impl SetValues {
     }
 }
 
-/// Returns the approach from a held position to a point, at `u` (0..1) of `length_ms`: a minimum-jerk (fifth-order) polynomial.
+/// Returns the set values of the approach from a held position to a point, at the fraction `u` (0..1) of `length_ms`: a minimum-jerk
+/// (fifth-order) polynomial.
 pub(crate) fn approach(from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_ms: f64) -> SetPoint {
     let (rest, length) = (1.0 - u, length_ms * DT);
     let rise = u * u * u * (10.0 + u * (6.0 * u - 15.0));
@@ -287,7 +290,7 @@ pub(crate) fn approach(from: &[f64; JOINTS], to: &[f64; JOINTS], u: f64, length_
 /// Result of [`SetValues::latch`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Latched {
-    /// Joints that stay held.
+    /// Joints that were held before and still are.
     pub held: [bool; JOINTS],
     /// Joints that were latched in this tick.
     pub just_enabled: [bool; JOINTS],

@@ -1,4 +1,4 @@
-//! Set values, what is held and what comes to rest (J-40 to J-44).
+//! Set values, position hold, and coming to rest (J-40 to J-44).
 use super::*;
 use crate::DT;
 use crate::catch::Catch;
@@ -29,7 +29,7 @@ fn j34_on_the_approach_velocity_and_acceleration_are_the_derivatives_of_the_posi
     assert!(at(200.0).position.iter().zip(to).all(|(a, b)| (a - b).abs() < 1e-12));
 }
 
-/// Otherwise the torque limits would not apply while the arm stands, and no motion could begin.
+/// If a ramp to rest were begun here, the torque limits would not apply while the arm is at rest, and no motion could begin.
 #[test]
 fn j25_an_arm_that_stands_is_held_at_once() {
     let (config, mut motion) = (Config::avena(), Motion::default());
@@ -81,7 +81,7 @@ fn j34_one_joint_that_is_not_at_rest_is_enough_to_wait_for() {
     }
 }
 
-/// Teaching begins when the arm is held and its load is known. Only an arm that may have a contact against it needs no known load after
+/// Teaching begins when the arm is held and its load is known. If a contact may press on the arm, the load need not be known after
 /// `KNOWN_MS`.
 #[test]
 fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
@@ -107,7 +107,7 @@ fn j25_an_arm_is_taught_when_it_is_held_and_what_it_carries_is_known() {
     }
 }
 
-/// Joint 4 is found at this velocity (rad/s), enabled or not, by an arm that holds the others.
+/// Joint 4 is found at this velocity (rad/s), enabled or not, while the arm holds the other joints.
 fn latched(held: bool, enabled: bool, velocity: f64) -> Motion {
     let (config, at, off) = (Config::avena(), [0.3; JOINTS], 3);
     let mut velocities = [0.0; JOINTS];
@@ -127,10 +127,10 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
     for (held, enabled, velocity, follows, catches, falls) in [
         (true, true, 0.0, false, false, false),
         (true, true, 0.5, false, false, false),
-        // Just enabled: the joint is latched at its measured position, and its load moves the loads of the others.
+        // Just enabled: the joint is latched at its measured position. Its load moves the loads of the other joints.
         (false, true, 0.0, true, true, false),
         (false, true, 0.5, true, true, true),
-        // Not enabled, or no longer: it is followed.
+        // Not enabled, or not any more: the set values follow the joint.
         (false, false, 0.0, true, false, false),
         (false, false, 0.5, true, false, false),
         (true, false, 0.5, true, false, false),
@@ -152,7 +152,7 @@ fn j16_j43_what_becomes_of_a_joint_and_of_the_others_when_it_is_enabled() {
 #[test]
 fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     for (velocity, decelerates) in [(0.0, false), (0.02, false), (0.021, true), (-0.5, true)] {
-        // A single moving joint is enough for all.
+        // One moving joint is sufficient: all joints decelerate.
         let nodes = Nodes::enabled_at([0.3; JOINTS], [0.0, velocity, 0.0, 0.0, 0.0, 0.0]);
         let mut motion = holding([true, true, true, false, true, true]);
         motion.set.hold_measured(&nodes, 200.0, &Config::avena());
@@ -162,7 +162,7 @@ fn j16_j25_what_moves_and_was_held_comes_to_rest() {
     }
 }
 
-/// An arm that a hand has led comes to rest, and is caught as a load is; an arm that stands is held at once.
+/// An arm that a hand has led comes to rest and is caught like a load. An arm at rest is held at once.
 #[test]
 fn j25_the_end_of_teaching_catches_an_arm_that_moves() {
     for (velocity, moves) in [(0.0, false), (0.02, false), (0.3, true)] {
@@ -191,7 +191,7 @@ fn j21_an_arm_without_torque_is_held_nowhere_and_shown_where_it_is() {
     motion.set.begin_at(&[0.1; JOINTS]);
     motion.release(&nodes);
     assert_eq!(motion.set.point, SetPoint::still([0.3; JOINTS]));
-    // J-62: nor has it an error.
+    // J-62: the joint has no position error either.
     assert_eq!(motion.set.due(&Config::avena()), &[0.3; JOINTS]);
     assert_eq!((motion.set.holding, motion.law.torque), Default::default());
     assert!(!motion.set.catch[1].busy());

@@ -1,4 +1,4 @@
-//! The torque of one joint, in its parts.
+//! The parts of the torque of one joint.
 use crate::pid::PidTorque;
 use crate::remembered::remembered;
 
@@ -10,9 +10,9 @@ pub(crate) struct JointTorque {
     pub friction: f64,
     /// Load that Teaching carries.
     pub load: f64,
-    /// Brakes of Teaching.
+    /// Braking torque of Teaching.
     pub brake: f64,
-    /// Remainder of a step that is being blended out.
+    /// Remainder of a torque step that is being blended out.
     pub blend: f64,
 }
 

@@ -6,10 +6,10 @@ use crate::interpolation::smooth;
 use crate::nodes::Nodes;
 use crate::remembered::{BitSink, BitSource, Remembered, remembered};
 
-/// Time within which the torque of a joint that begins to yield falls, ms.
+/// Time in which the torque of a joint that begins to yield falls, ms.
 const FALL_MS: u16 = 10;
 
-/// Part of the last torque that the next torque continues.
+/// Part of the last torque that the next torque must continue without a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Continued {
     /// All parts except the model.
@@ -27,13 +27,13 @@ impl Continued {
     }
 }
 
-/// Last torque, if the next one must continue it.
+/// Last torque, if the next torque must continue it.
 pub(super) type Before = Option<(Continued, [f64; JOINTS])>;
 
 /// Steps that are being blended out.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Transfer {
-    /// Step to blend out, N·m, and the time since it began.
+    /// Step that is blended out, N·m, and the time since its start.
     step: [f64; JOINTS],
     step_ms: [u16; JOINTS],
     /// The step is blended out within [`FALL_MS`].
@@ -42,9 +42,9 @@ pub(super) struct Transfer {
     left_ms: u16,
     /// Joints that yield from this tick on: their torque falls within [`FALL_MS`].
     yields: [bool; JOINTS],
-    /// Joints that were latched in this tick: their torque starts from that of the model.
+    /// Joints that were latched in this tick. Their torque begins at the torque of the model.
     just_enabled: [bool; JOINTS],
-    /// Part of the last torque that the next one must continue.
+    /// Part of the last torque that the next torque must continue.
     next: Option<Continued>,
 }
 
@@ -61,34 +61,35 @@ impl Remembered for Continued {
 }
 
 impl Transfer {
-    /// The control mode changes: only the model may step.
+    /// Prepares a change of the control mode: only the torque of the model may step.
     pub fn change_mode(&mut self) {
         self.next = Some(Continued::Correction);
     }
 
-    /// The model changes: no torque may step.
+    /// Prepares a change of the model: no torque may step.
     pub fn change_model(&mut self) {
         self.next = Some(Continued::Everything);
     }
 
-    /// The joint yields from the next tick on: only the model may step, and excess torque falls within [`FALL_MS`] (J-68).
+    /// Prepares the yield of a joint from the next tick on: only the torque of the model may step, and excess torque falls within
+    /// [`FALL_MS`] (J-68).
     #[inline(always)]
     pub fn begin_yield(&mut self, joint: usize) {
         self.next.get_or_insert(Continued::Correction);
         self.yields[joint] = true;
     }
 
-    /// Joints that were latched in this tick.
+    /// Sets the joints that were latched in this tick.
     pub fn set_just_enabled(&mut self, just_enabled: [bool; JOINTS]) {
         self.just_enabled = just_enabled;
     }
 
-    /// Prepares the computation of the next torque. Returns the part of the last torque that the next one must continue, if any.
+    /// Prepares the computation of the next torque. Returns the part of the last torque that the next torque must continue, if any.
     pub fn begin(&mut self, last: &[JointTorque; JOINTS]) -> Before {
         self.next.take().map(|continued| (continued, core::array::from_fn(|j| continued.of(&last[j]))))
     }
 
-    /// Adds the remainder of the steps to `torque`, and clears it for joints that are not enabled.
+    /// Adds the remainder of the steps to `torque`, and clears the torque of joints that are not enabled.
     #[inline(always)]
     pub fn blend(
         &mut self,
@@ -147,7 +148,7 @@ impl Transfer {
 mod tests {
     use super::*;
 
-    /// Returns the torque that is blended out in a tick after a change of state in which the last torque was `last`.
+    /// Returns the blended torque in each tick after a change of state in which the last torque was `last`.
     fn blended(transfer: &mut Transfer, last: f64) -> [f64; JOINTS] {
         let nodes = Nodes::enabled_at([0.0; JOINTS], [0.0; JOINTS]);
         let before = transfer.begin(&[JointTorque { friction: last, ..JointTorque::default() }; JOINTS]);
@@ -156,7 +157,8 @@ mod tests {
         torque.map(|torque| torque.blend)
     }
 
-    /// The torque of a joint that yields falls at once, and that of the others as at any change; none of them steps.
+    /// The torque of a joint that begins to yield falls at once. The torque of the other joints is blended as at any change. No torque
+    /// steps.
     #[test]
     fn j44_j68_the_torque_of_a_joint_that_begins_to_yield_falls_within_10_ms() {
         let mut transfer = Transfer::default();

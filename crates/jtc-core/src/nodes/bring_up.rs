@@ -1,11 +1,11 @@
-//! The frame of each tick: Move, or instead a frame that brings a node up (J-12, J-20).
+//! The frame of each tick: Move, or a frame that brings up a node (J-12, J-20).
 use jtc_bus::{Frame, NodeState, Request, Target};
 
 use super::{GRIPPER, Goal, Node, Nodes};
 use crate::config::Config;
 use crate::{JOINTS, NODES};
 
-/// Ticks between two frames that take the place of Move (J-12: at most one tick of four).
+/// Ticks between two frames that replace a Move (J-12: at most one tick of four).
 const MOVES_BETWEEN: u8 = 3;
 /// Like [`MOVES_BETWEEN`], while torque is on and only the gripper needs such a frame.
 const MOVES_ASIDE: u8 = 19;
@@ -32,7 +32,7 @@ impl Nodes {
 
     fn instead_of_move(&mut self, config: &Config, goal: Goal) -> Option<Request> {
         if goal == Goal::Enabled && self.all().iter().all(Node::wants_nothing_enabled) {
-            // Nearly every tick with torque.
+            // Nearly every tick with torque returns here.
             return None;
         }
         let present = self.present();
@@ -54,10 +54,10 @@ impl Nodes {
             && self.gripper_answers(config)
             && self.gripper_node().is_some_and(Node::wants_configuration);
         if goal == Goal::Enabled && self.moves < MOVES_ASIDE && all_unchanged(&target[..JOINTS]) {
-            // A frame that only the gripper needs leaves the arm its torque in nearly every tick (J-23).
+            // A frame for the gripper alone is sent rarely, so that nearly every tick sends the torque of the arm (J-23).
             return None;
         }
-        // Nodes that are enabled refuse their configuration and should not be enabled, so they come first.
+        // Enabled nodes refuse a configuration. These nodes must be disabled, so they come first.
         let to_disable = self
             .nodes
             .iter()
@@ -79,7 +79,7 @@ impl Nodes {
     fn targets(&self, goal: Goal, config: &Config) -> [Target; NODES] {
         let mut target = [Target::NoChange; NODES];
         for (node, target) in self.joints().iter().zip(&mut target) {
-            // J-16: an arm that falls is not caught with a jolt.
+            // J-16: a falling arm is not enabled, because that would stop it with a jolt.
             let request = node.request(goal);
             let held_back = request == Target::Enable && !self.may_enable(config);
             *target = if held_back { Target::NoChange } else { request };
@@ -88,7 +88,7 @@ impl Nodes {
         target
     }
 
-    /// Returns the requested state of the gripper, which is also brought up in any state with torque, in addition to the joints (J-23).
+    /// Returns the requested state of the gripper. It is also brought up in states with torque, in addition to the joints (J-23).
     fn gripper_target(&self, goal: Goal, config: &Config) -> Target {
         let Some(node) = self.gripper_node().filter(|_| self.gripper_answers(config)) else {
             return Target::NoChange;

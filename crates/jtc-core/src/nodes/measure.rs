@@ -1,13 +1,13 @@
-//! Measured position and velocity of a joint, and their substitutes while its answers are missing (J-35, J-63).
+//! Measured position and velocity of a joint, and their prediction while its answers are missing (J-35, J-63).
 //!
-//! Terms: an answer is *usable* if the joint can have reached its position since the last usable answer. A tick without a usable answer
-//! takes the *prediction*: the last usable answer, extrapolated at the rate at which the joint moved, plus the change of the commanded
-//! velocity since. The first usable answer after missing ones differs from the prediction by an *offset*, which fades, so that neither the
-//! loss nor the return makes a step of position, nor of the derivative of its error. A *late* answer ([`Lateness`]) belongs to the time at
-//! which it was due: it is compared with the prediction for that time, and the prediction continues from it. A late answer that is close to
-//! its prediction is used directly, like an answer in time. Offsets that fade in each tick would be a filter in the position loop, which
-//! would make the loop swing. The offset has no part in the prediction: the prediction depends on answers and commands alone, so that the
-//! position loop stays closed even if many answers are lost.
+//! Terms: an answer is *usable* if the joint can have reached its position since the last usable answer. In a tick without a usable answer
+//! the *prediction* is used: the last usable answer, extrapolated at the rate at which the joint moved, plus the change of the commanded
+//! velocity since. The first usable answer after missing ones differs from the prediction by an *offset*. The offset fades, so that neither
+//! the loss nor the return makes a step of the position or of the derivative of its error. A *late* answer ([`Lateness`]) belongs to the
+//! time at which it was due: it is compared with the prediction for that time, and the prediction continues from it. A late answer that is
+//! close to its prediction is used directly, like an answer in time. If an offset faded in each tick, it would act as a filter in the
+//! position loop and make the loop swing. The offset is not part of the prediction: the prediction depends only on answers and commands, so
+//! that the position loop stays closed even if many answers are lost.
 mod history;
 mod jump;
 mod lateness;
@@ -25,37 +25,39 @@ pub(super) use jump::Ways;
 use jump::{Jumps, Seen};
 use lateness::Lateness;
 
-/// Speed, in velocity limits, that no joint has: an answer that is further from the prediction than that counts as no answer (J-35).
+/// Speed that no joint can have, in velocity limits. An answer that is further from the prediction than a joint at this speed could be is
+/// not usable (J-35).
 const IMPLAUSIBLE: f64 = 3.0;
-/// Distance from the prediction, as a share of the implausible distance, from which on an answer does not count for the rate:
-/// the joint of an encoder that jumps has not moved.
+/// Distance from the prediction, as a share of the implausible distance, above which an answer is not used for the rate. If an encoder has
+/// jumped, the joint has not moved.
 const UNEXPECTED: f64 = 0.1;
-/// Maximum difference of a late answer from its prediction, in steps of the encoder. Positions and their predicted rate have this
-/// resolution.
+/// Largest difference between a late answer and its prediction for which the answer is used directly, in steps of the encoder. Positions
+/// and their predicted rate have this resolution.
 const IN_ITS_PLACE: f64 = 2.0;
-/// Coarsest encoder for which [`IN_ITS_PLACE`] counts, rad: an answer that is used without a correction may cause a step of this size.
+/// Coarsest encoder step to which [`IN_ITS_PLACE`] is applied, rad. An answer that is used directly may cause a step of this size.
 const COARSEST: f64 = 1e-4;
-/// Distance from the prediction, as a share of the implausible one, within which an answer must be after the jump of its encoder is
+/// Distance from the prediction, as a share of the implausible distance, within which an answer must be after the jump of its encoder was
 /// subtracted.
 const NEAR: f64 = 0.5;
-/// Highest difference between the rate carried on and the reported velocity, rad/s.
+/// Highest difference between the predicted rate and the reported velocity, rad/s.
 const DISAGREEMENT: f64 = 0.2;
-/// Highest ratio of two deviations from the due velocity: that of the last 5 ms to that of the reported mean of 10 ms; with an even
-/// acceleration it is 2.
+/// Highest ratio of two deviations from the due velocity: the deviation of the last 5 ms over the deviation of the reported mean of 10 ms.
+/// With a constant acceleration the ratio is 2.
 const YOUNGER: f64 = 2.5;
-/// Highest rate that is carried on, in velocity limits.
+/// Highest rate of a prediction, in velocity limits.
 const FASTEST: f64 = 1.2;
-/// Double pole of a fading offset times the setting: a fifth remains after that time, a fiftieth after twice that time.
+/// Double pole of a fading offset, times the configured time. A fifth of the offset remains after that time, a fiftieth after twice that
+/// time.
 const FADING: f64 = 3.0;
-/// Remainder at which an offset ends, rad or rad/s.
+/// Value below which an offset ends, rad or rad/s.
 const FADED: f64 = 1e-9;
 
-/// Position and velocity.
+/// Position and velocity of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Reading {
-    /// rad.
+    /// Position, rad.
     pub position: f64,
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: f64,
 }
 
@@ -64,11 +66,11 @@ pub(crate) struct Reading {
 pub(crate) struct Tick {
     /// Answer of the joint, if it has arrived.
     pub answer: Option<Reading>,
-    /// A Move requested an answer.
+    /// A Move requested an answer in this tick.
     pub expected: bool,
-    /// That Move was acknowledged.
+    /// The Move was acknowledged.
     pub asked: bool,
-    /// Number of answers of this tick: those before the last were late.
+    /// Number of answers in this tick. All except the last one were late.
     pub answers: u8,
     /// Commanded velocity, rad/s.
     pub commanded: f64,
@@ -89,20 +91,20 @@ pub(crate) enum Outcome {
     Used,
     /// The answer is not usable, or is missing.
     Predicted,
-    /// The answer is usable, and has shown that the encoder has jumped (J-35).
+    /// The answer is usable, and it confirms that the encoder has jumped (J-35).
     Jumped,
 }
 
 /// An answer that is far from its expected position.
 struct Unexpected {
     answer: Reading,
-    /// Distance of the prediction beyond the answer, rad.
+    /// Prediction minus answer, rad.
     off: f64,
     /// The implausible distance, rad.
     reach: f64,
     /// Time at which the answer was due, ms.
     at_ms: u32,
-    /// The encoder may have jumped.
+    /// The answer must be checked for a jump of the encoder.
     looked_at: bool,
     /// Index of the joint.
     joint: usize,
@@ -111,11 +113,11 @@ struct Unexpected {
 /// A late answer, and the motion that was commanded since it was due.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
-    /// ms.
+    /// Lateness, ms.
     pub ms: u32,
-    /// Velocity that was commanded when it was due, rad/s.
+    /// Velocity that was commanded when the answer was due, rad/s.
     pub commanded: f64,
-    /// Distance that was commanded since, rad.
+    /// Distance that was commanded since then, rad.
     pub commanded_way: f64,
 }
 
@@ -124,19 +126,19 @@ pub(crate) struct Late {
 pub(crate) struct Measurement {
     /// Position and velocity that the control law uses.
     used: Reading,
-    /// There is a last usable answer.
+    /// There has been a usable answer.
     known: bool,
-    /// Time, ms. Wraps around after 49 days, which does not affect differences.
+    /// Time, ms. It wraps around after 49 days, which does not affect differences.
     clock_ms: u32,
-    /// The last usable answer, its position carried on since.
+    /// The last usable answer. Its position is extrapolated to the present tick.
     answer: Reading,
-    /// Time at which the answer came.
+    /// Time to which the last usable answer belongs, ms.
     answered_ms: u32,
-    /// Commanded velocity then, rad/s.
+    /// Velocity that was commanded at that time, rad/s.
     commanded: f64,
-    /// Rate of the answered positions then, rad/s.
+    /// Rate of the answered positions at that time, rad/s.
     rate: f64,
-    /// That rate as far as the reported velocity confirms it, rad/s: the rate that a prediction carries on.
+    /// The rate, limited to the neighbourhood of the reported velocity, rad/s. A prediction uses this rate.
     carried: f64,
     /// The last usable answers.
     history: History,
@@ -146,20 +148,20 @@ pub(crate) struct Measurement {
     jumps: Jumps,
     /// An answer has been missing since the last usable one.
     missing: bool,
-    /// The part of prediction minus answer that has not faded.
+    /// Part of prediction minus answer that has not faded yet.
     position_offset: Fading,
     velocity_offset: Fading,
-    /// At least one of the offsets has not faded.
+    /// At least one of the offsets has not faded yet.
     fading: bool,
 }
 
-/// An offset that fades without a step, nor one of its slope: a critically damped filter of second order. The offset continues to fade when
-/// more is added to it. If it restarted instead, it would never fade while every other answer is lost.
+/// An offset that fades without a step of its value or slope: a critically damped filter of second order. The offset continues to fade when
+/// another difference is added to it. If it restarted instead, it would never fade while every other answer is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Fading {
-    /// rad or rad/s.
+    /// Remaining offset, rad or rad/s.
     left: f64,
-    /// Change in a millisecond.
+    /// Change per millisecond.
     slope: f64,
 }
 
@@ -189,7 +191,7 @@ impl Fading {
         let ms = f64::from(elapsed_ms);
         let pole = FADING / f64::from(config.blend_ms.max(1));
         let x = pole * ms;
-        // 1/eˣ by its series, which is stable for any length of the tick.
+        // 1/eˣ from its series, which is stable for any length of the tick.
         let decay = 1.0 / (1.0 + x * (1.0 + x / 2.0 * (1.0 + x / 3.0)));
         let both = self.slope + pole * self.left;
         (self.left, self.slope) = ((self.left + both * ms) * decay, (self.slope - pole * both * ms) * decay);
@@ -198,20 +200,21 @@ impl Fading {
         }
     }
 
-    /// Removes the part of the offset that is opposite to `by`.
+    /// Reduces the offset by `by` if the signs are opposite, at most to zero.
     fn take_back(&mut self, by: f64) {
         let left = self.left + by;
         self.left = if self.left > 0.0 { left.max(0.0).min(self.left) } else { left.min(0.0).max(self.left) };
     }
 }
 
-/// Returns the distance from its prediction within which a late answer is in its place, rad.
+/// Returns the distance from its prediction within which a late answer is used directly, rad.
 fn place(config: &Config) -> f64 {
     config.encoder_step.min(COARSEST) * IN_ITS_PLACE
 }
 
 impl Late {
-    /// Creates a late answer of this joint that is `ticks` late, as far back as the commanded motion is known.
+    /// Creates a late answer of this joint that is `ticks` late. The lateness is limited to the ticks for which the commanded motion is
+    /// stored.
     #[cold]
     pub fn new(ticks: u8, joint: usize, commanded: &Commanded, config: &Config) -> Self {
         let now = config.delay_ticks.max(1);
@@ -224,7 +227,7 @@ impl Late {
         }
     }
 
-    /// Returns the distance that a joint has moved since, rad, if its rate was `carried` (rad/s) then.
+    /// Returns the distance that the joint has moved since the answer was due, rad, if its rate was `carried` (rad/s) then.
     fn way(&self, carried: f64) -> f64 {
         self.commanded_way + (carried - self.commanded) * (f64::from(self.ms) * DT)
     }
@@ -242,32 +245,33 @@ impl Measurement {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported one. This velocity differs from the `due`
-    /// velocity (rad/s) in the same direction as the reported one, and not by much more. Otherwise an encoder has jumped, and the joint has
-    /// not moved.
+    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. It must differ from the `due` velocity
+    /// (rad/s) in the same direction as the reported velocity, and not by much more. Otherwise an encoder has jumped and the joint has not
+    /// moved, and the `due` velocity is returned.
     pub fn young_velocity(&self, due: f64) -> f64 {
-        // Without the part of an offset that still fades: that part is older still.
+        // The remainder of a fading offset is subtracted, because it is even older.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);
         let most = YOUNGER * reported.abs();
         if young * reported > 0.0 { due + young.max(-most).min(most) } else { due }
     }
 
-    /// Returns the jump of the encoder that is subtracted from an answer, rad.
+    /// Returns the jump of the encoder that is subtracted from each answer, rad.
     pub fn taken_off(&self) -> f64 {
         self.jumps.taken_off()
     }
 
-    /// Returns the misfit of the two encoders since the drive was configured: a jump and its size (rad), or the factor of a speed.
+    /// Returns the disagreement of the two encoders that was found since the drive was configured: a jump and its size (rad), or the factor
+    /// of a speed.
     pub fn misfit(&self) -> Option<(StopKind, f64)> {
         self.jumps.found()
     }
 
-    /// Stores that positions move `factor` times as fast as the speed says.
+    /// Stores that positions change `factor` times as fast as the reported speed.
     pub fn find_factor(&mut self, factor: f32) {
         self.jumps.find_factor(factor);
     }
 
-    /// Returns the ways of an answer of this tick; `None` without an answer, or if nothing is known of its ways.
+    /// Returns the two distances of the answer in this tick. Returns `None` without an answer, or if they are not known.
     pub fn ways(&self, config: &Config) -> Option<Ways> {
         let window_ms = config.drive_speed_window_ms;
         let from = self.history.before(self.clock_ms, window_ms).filter(|_| window_ms > 0)?;
@@ -275,18 +279,18 @@ impl Measurement {
         Ways::of(&Reading { position, ..self.answer }, from, config)
     }
 
-    /// Takes the next answer without a correction.
+    /// Makes the next answer be used without a correction.
     pub fn forget(&mut self) {
         self.known = false;
     }
 
-    /// Makes this velocity, rad/s, the reference of the commanded velocity from now on.
+    /// Sets the reference for changes of the commanded velocity, rad/s.
     pub fn go_on_moving(&mut self, commanded: f64) {
         self.commanded = commanded;
     }
 
-    /// Runs one tick. The jump of the encoder is already taken off the answer. `past`: commanded motion since the given number of ticks
-    /// ago.
+    /// Runs one tick. The jump of the encoder has already been subtracted from the answer. `past`: motion that was commanded since the
+    /// given number of ticks ago.
     pub fn step(&mut self, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
         self.clock_ms = self.clock_ms.wrapping_add(tick.elapsed_ms);
@@ -296,7 +300,7 @@ impl Measurement {
             self.velocity_offset.step(tick.elapsed_ms, config);
             self.fading = [self.position_offset, self.velocity_offset] != [Fading::default(); 2];
         }
-        // Nearly always every answer is in time. The code for this case is compiled separately.
+        // Nearly always every answer is in time. The code for late answers is compiled separately.
         if self.lateness.stands(tick.answers) {
             self.take(tick, None, config)
         } else {
@@ -304,19 +308,19 @@ impl Measurement {
         }
     }
 
-    /// Runs the rest of a tick whose answer may be late. `tick` is a copy: with a `tick` in memory, every tick is slower.
+    /// Runs the rest of a tick whose answer may be late. `tick` is passed by value: a `tick` in memory would slow down every tick.
     #[cold]
     #[inline(never)]
     fn take_late(&mut self, tick: Tick, past: impl Fn(u8) -> Late, config: &Config) -> Outcome {
         let counted = self.lateness.count(tick.asked, tick.answers, tick.elapsed_ms);
-        // Younger than the last one: a frame that comes twice counts as evidence, too, and may have been counted wrongly.
+        // The answer cannot be older than the last one. A repeated frame is also taken as evidence, so the count may be wrong.
         let since = self.clock_ms.wrapping_sub(self.answered_ms).saturating_sub(1);
         let ticks = if self.known { counted.min(since.min(u8::MAX.into()) as u8) } else { counted };
         let late = self.late(ticks, &tick, past, config);
         self.take(&tick, late, config)
     }
 
-    /// Takes the answer of a tick, if the answer is usable. Inlined, because half of the code is not needed without a late answer.
+    /// Uses the answer of a tick if it is usable. Inlined, because half of the code is not needed without a late answer.
     #[inline(always)]
     fn take(&mut self, tick: &Tick, late: Option<Late>, config: &Config) -> Outcome {
         let change = tick.commanded - self.commanded;
@@ -354,12 +358,12 @@ impl Measurement {
             self.answer = Reading { position: answer.position + since(self.carried), ..answer };
             self.answered_ms = at_ms;
             self.commanded = late.map_or(tick.commanded, |late| late.commanded);
-            // While answers may be late, each may also be the first that is counted otherwise than those before.
+            // While answers may be late, the lateness of this answer may differ from the lateness of the answers before.
             if known && (self.missing || late.is_some()) {
                 let in_its_place = late.is_some() && off <= place(config);
                 self.bridge(&predicted, tick.commanded, in_its_place);
             }
-            // A suspected jump that was not a jump leaves a difference like a missing answer.
+            // If a suspected jump is not confirmed, the difference is bridged like a missing answer.
             self.missing = self.jumps.watching();
         } else {
             self.missing |= tick.expected || tick.answer.is_some();
@@ -378,7 +382,7 @@ impl Measurement {
     #[inline(never)]
     fn unexpected(&mut self, unexpected: Unexpected, config: &Config) -> (Option<Reading>, Outcome) {
         let Unexpected { answer, off, reach, at_ms, looked_at, joint } = unexpected;
-        // A position less its jump may be on the other side of the point at which the positions of the drive wrap around.
+        // A position minus its jump may be on the other side of the point at which the positions of the drive wrap around.
         let turn = if self.jumps.taken_off() == 0.0 || off.abs() <= PI { 0.0 } else { off.signum() * TAU };
         let (answer, off) = (Reading { position: answer.position + turn, ..answer }, off - turn);
         let seen = if off.abs() <= UNEXPECTED * reach || !looked_at {
@@ -388,7 +392,7 @@ impl Measurement {
             let twist = torque_max / config.gear_stiffness;
             self.jumps.look(&answer, self.answer.velocity, at_ms, twist, &self.history, config)
         };
-        // Less the jump, the position must be near the prediction of the motion. Otherwise its speed is wrong, too.
+        // After the jump was subtracted, the position must be near the predicted one. Otherwise its speed is wrong as well.
         let near = |way: f64| (off + way).abs() <= NEAR * reach;
         let without = |way: f64| Some(Reading { position: answer.position - way, ..answer });
         match seen {
@@ -404,8 +408,8 @@ impl Measurement {
         }
     }
 
-    /// Bridges the difference between the answer of this tick and `predicted`, which must not be a step. An answer in its place makes no
-    /// step; it reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
+    /// Bridges the difference between the answer of this tick and `predicted`, so that it does not become a step. An answer in its place
+    /// makes no step. It reduces the remainder of earlier differences as far as it can, because they would add up otherwise.
     #[inline(always)]
     fn bridge(&mut self, predicted: &Reading, commanded: f64, in_its_place: bool) {
         let position = predicted.position - self.answer.position;
@@ -420,7 +424,7 @@ impl Measurement {
         }
     }
 
-    /// Returns the motion that was commanded since the answer of this tick was due: the counted `ticks` ago.
+    /// Returns the motion that was commanded since the answer of this tick was due, which was the counted `ticks` ago.
     fn late(&mut self, ticks: u8, tick: &Tick, past: impl Fn(u8) -> Late, config: &Config) -> Option<Late> {
         let answer = tick.answer?;
         let counted = past(ticks);
@@ -431,7 +435,7 @@ impl Measurement {
         if !self.known || in_its_place(&counted) {
             return Some(counted);
         }
-        // Fast joints show at once that an answer was lost: the answers after it are at the positions of answers that are less late.
+        // A fast joint shows at once that an answer was lost: the next answers have positions that correspond to less lateness.
         let Some(later) = (0..ticks).rev().find(|&ticks| in_its_place(&past(ticks))) else {
             return Some(counted);
         };
@@ -439,16 +443,16 @@ impl Measurement {
         Some(past(later))
     }
 
-    /// Takes the rate at an answer, since the youngest answer that is old enough. The rate comes from answers alone: a rate that came from
-    /// predictions would carry itself on, for any motion of the joint, while every other answer is lost. `as_predicted`: the answer was
-    /// close to the motion so far. Inlined for the sake of the ticks without a late answer.
+    /// Computes the rate from the youngest answer that is old enough to this answer. The rate is computed from answers only. A rate
+    /// computed from predictions would confirm itself, whatever the joint does, while every other answer is lost. `as_predicted`: the
+    /// answer was close to its prediction. Inlined for the ticks without a late answer.
     #[inline(always)]
     fn take_rate(&mut self, answer: &Reading, at_ms: u32, as_predicted: bool, velocity_max: f64) {
         let Reading { position, velocity } = *answer;
         let answered = Answered { position, at_ms };
         let rate = self.history.take(&answered, as_predicted);
         self.rate = rate.map_or(0.0, |rate| rate.rad_s);
-        // If the encoder of the joint has jumped, only the report of the drive counts.
+        // If the encoder of the joint has jumped, the velocity that the drive reports is used alone.
         let carried = match rate {
             Some(rate) if as_predicted && rate.as_predicted => rate.rad_s,
             _ => velocity,

@@ -28,37 +28,37 @@ const GRIPPER_FLAG: u32 = can_flag::no_answer(GRIPPER);
 /// Highest number of frames that one tick reads.
 pub(crate) const FRAMES_MAX: usize = 32;
 
-/// All nodes and the order of frames to them.
+/// State of all nodes, and of the frames that are sent to them.
 #[derive(Clone, Debug)]
 pub(crate) struct Nodes {
     nodes: [Node; NODES],
-    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 until they count.
+    /// Measured positions (rad) and velocities (rad/s) of the joints; 0 until they are valid.
     position: [f64; JOINTS],
     velocity: [f64; JOINTS],
     gripper: bool,
-    /// A joint is set absent (J-53).
+    /// At least one joint is marked as absent (J-53).
     some_absent: bool,
     gripper_lost: bool,
     /// Ticks for which every joint has been slow enough to be enabled (J-16).
     still_ms: u16,
     /// Ticks left in which the drives rest after torque was taken away.
     rest_ms: u16,
-    /// Torque was wanted in the last tick.
+    /// Torque was requested in the last tick.
     powered: bool,
     /// Measured state of the gripper.
     pub pump: bool,
     pub pressure: [bool; 2],
     /// Frames that were ignored (J-15).
     pub ignored: u32,
-    /// Consecutive Moves without acknowledge.
+    /// Consecutive Moves without acknowledgement.
     unacknowledged: u8,
     sent_move: bool,
-    /// Moves since the last frame that took the place of one.
+    /// Moves since the last frame that replaced a Move.
     moves: u8,
     configured_last: bool,
-    /// Check that positions and speeds of the drives fit (J-35).
+    /// Checks whether the positions and speeds of the drives agree (J-35).
     speed_check: SpeedCheck,
-    /// Joints whose two encoders were found in this tick not to fit (J-35): a mask.
+    /// Joints, as a mask, whose encoders were found to disagree in this tick (J-35).
     misfits: u8,
 }
 
@@ -84,7 +84,7 @@ remembered!(Nodes {
 });
 
 impl Nodes {
-    /// Creates the nodes; each of them must be reset once (J-20).
+    /// Creates the nodes. Each of them must be reset once (J-20).
     pub fn new(config: &Config) -> Self {
         let mut node = Node::default();
         node.restart(config);
@@ -126,19 +126,19 @@ impl Nodes {
         nodes
     }
 
-    /// Like [`Self::enabled_at`], but the joint with this index is ready only.
+    /// Like [`Self::enabled_at`], but the joint with this index is ready and not enabled.
     #[cfg(test)]
     pub fn with_torque_off(mut self, joint: usize) -> Self {
         self.nodes[joint].report.state = NodeState::READY;
         self
     }
 
-    /// Returns the number of nodes that are there: the gripper can be configured as absent.
+    /// Returns the number of configured nodes, with or without the gripper.
     fn present(&self) -> usize {
         if self.gripper { NODES } else { JOINTS }
     }
 
-    /// Returns the nodes that are there.
+    /// Returns the configured nodes.
     fn all(&self) -> &[Node] {
         if self.gripper { &self.nodes } else { &self.nodes[..JOINTS] }
     }
@@ -156,50 +156,50 @@ impl Nodes {
         self.gripper_node().is_some_and(|node| node.silent < config.missed_moves_max)
     }
 
-    /// Returns `true` if the gripper is enabled, and the configuration has it keep its part when the arm loses its torque.
+    /// Returns `true` if the gripper is enabled and, by the configuration, keeps its part when the arm loses its torque.
     pub fn gripper_keeps_part(&self, config: &Config) -> bool {
         !config.pump_off_on_error
             && self.gripper_node().is_some_and(|node| node.report.state == NodeState::ENABLED)
     }
 
-    /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick: a pump that was commanded before does not
+    /// Returns `true` if the gripper left OperationEnable or lost its configuration in this tick. A pump that was commanded before does not
     /// start again by itself (J-23).
     pub fn gripper_lost(&self) -> bool {
         self.gripper_lost
     }
 
-    /// Returns the CAN flags of a gripper that does not answer: they are shown, but are not an error (J-14, J-23).
+    /// Returns the CAN flags of a gripper that does not answer. They are shown, but are not an error (J-14, J-23).
     pub fn gripper_flags(&self, config: &Config) -> u32 {
         if self.gripper && !self.gripper_answers(config) { GRIPPER_FLAG } else { 0 }
     }
 
     pub fn node(&self, n: usize) -> &Node {
-        // An index of this crate's own; node 0 stands in rather than a panic.
+        // The index comes from this crate. If it were out of range, node 0 would be returned instead of a panic.
         self.nodes.get(n).unwrap_or(&self.nodes[0])
     }
 
-    /// Returns the measured positions, rad, predicted while answers are missing (J-63); positions that do not count yet are 0.
+    /// Returns the measured positions, rad, predicted while answers are missing (J-63). Positions that are not valid yet are 0.
     pub fn positions(&self) -> &[f64; JOINTS] {
         &self.position
     }
 
-    /// Returns the positions, once those of all joints count.
+    /// Returns the positions if those of all joints are valid.
     pub fn known_positions(&self) -> Option<&[f64; JOINTS]> {
         (!self.fallen_back()).then_some(&self.position)
     }
 
-    /// Returns the joints whose two encoders were found in this tick not to fit (J-35): a mask.
+    /// Returns the joints, as a mask, whose encoders were found to disagree in this tick (J-35).
     pub fn misfits(&self) -> u8 {
         self.misfits
     }
 
-    /// Returns the misfit of the two encoders of the joint with this index, since its drive was configured, with the size of a jump (rad)
+    /// Returns the disagreement of the two encoders of a joint that was found since its drive was configured, with the size of a jump (rad)
     /// or the factor of a speed (J-35).
     pub fn misfit(&self, joint: usize) -> Option<(StopKind, f64)> {
         self.node(joint).measured.misfit()
     }
 
-    /// Returns the joints with a misfit, until their drives are configured again (J-35): a mask.
+    /// Returns the joints, as a mask, whose encoders disagree. Such a joint stays in the mask until its drive is configured again (J-35).
     pub fn untrusted(&self) -> u8 {
         (0..JOINTS).fold(0, |mask, j| mask | u8::from(self.misfit(j).is_some()) << j)
     }
@@ -209,9 +209,9 @@ impl Nodes {
         &self.velocity
     }
 
-    /// Takes the frames that came over the bus since the last tick. `commanded`: the set values of the ticks so far.
+    /// Processes the frames that the bus has received since the last tick. `commanded`: the set values of the last ticks.
     pub fn take(&mut self, inputs: &Inputs<'_>, config: &Config, goal: Goal, commanded: &Commanded) {
-        // Masks of nodes. A configuration accepted in this very tick is followed by its Move answer in a later one.
+        // Masks of nodes. If a configuration is accepted in this tick, the answer to the next Move comes in a later tick.
         let (mut answered, mut configured_before) = (0u8, 0u8);
         if self.some_absent {
             self.nodes.iter_mut().for_each(|node| node.unasked = None);
@@ -247,7 +247,7 @@ impl Nodes {
                         node.refused = !accepted;
                     }
                 }
-                // The byte is the state before or after the change, depending on the drive: the state is taken from Move answers.
+                // Depending on the drive, the byte is the state before or after the change. Therefore only Move answers set the state.
                 Ok(Answer::State { .. }) => {}
                 Err(_) => self.ignored = self.ignored.saturating_add(1),
             }
@@ -266,7 +266,7 @@ impl Nodes {
         }
     }
 
-    /// Sets the substitutes of the joints that are set absent, and finds drives of such joints that still answer (J-53).
+    /// Sets the substitutes of the joints that are marked as absent, and detects drives of such joints that still answer (J-53).
     #[inline(never)]
     fn stand_in(&mut self, config: &Config) {
         for (j, node) in self.nodes.iter_mut().take(JOINTS).enumerate() {
@@ -287,14 +287,14 @@ impl Nodes {
         *answered |= 1 << n;
         let before = node.report.state;
         if node.report.warnings & warning::POSITION_NOT_ACCURATE != 0 {
-            // The position may be anywhere when it becomes accurate.
+            // When the position becomes valid, it may have any value.
             node.measured.forget();
         }
         node.report = *report;
         node.seen = true;
         if node.starting() {
             if !before.is_starting() || report.state == NodeState::START {
-                // The node has fallen back: its configuration is lost and must be accepted again.
+                // The node has fallen back, so its configuration is lost and must be accepted again.
                 node.lose_configuration();
             }
             if report.state != NodeState::START_TO_INIT {
@@ -306,8 +306,8 @@ impl Nodes {
         }
     }
 
-    /// Takes the `commanded` velocities (rad/s) of joints that were found in motion or at rest as a new reference: a restart of the set
-    /// values is not a change of the motion (J-63).
+    /// Sets the `commanded` velocities (rad/s) of joints whose set values were restarted as the new reference. A restart of the set values
+    /// is not a change of the motion (J-63).
     pub fn go_on_moving(&mut self, found: &[bool; JOINTS], commanded: &[f64; JOINTS]) {
         for ((node, found), commanded) in self.nodes.iter_mut().zip(found).zip(commanded) {
             if *found {
@@ -316,7 +316,7 @@ impl Nodes {
         }
     }
 
-    /// Takes positions and velocities from the nodes that `answered`. Returns the nodes whose answers are usable.
+    /// Updates positions and velocities from the nodes that `answered`. Returns the nodes whose answers are usable.
     fn measure(&mut self, inputs: &Inputs<'_>, answered: u8, commanded: &Commanded, config: &Config) -> u8 {
         let elapsed_ms = 1 + u32::from(inputs.missed_ticks);
         let asked = self.sent_move && inputs.bus_state.acknowledged;
@@ -355,12 +355,12 @@ impl Nodes {
         usable
     }
 
-    /// Returns `true` if the arm stands, or moves slowly, and its drives have rested: joints may be enabled (J-16).
+    /// Returns `true` if the arm is at rest or slow, and its drives have rested, so that joints may be enabled (J-16).
     fn may_enable(&self, config: &Config) -> bool {
         self.still_ms >= config.enable_still_ms && self.rest_ms == 0
     }
 
-    /// Returns the node init word: bit n is set while node n is not initialised, or the gripper does not answer.
+    /// Returns the node init word. Bit n is set while node n is not initialised, or if it is the gripper and does not answer.
     pub fn init_word(&self, config: &Config) -> u8 {
         let mut word = 0;
         for (n, node) in self.all().iter().enumerate() {
@@ -386,9 +386,9 @@ impl Nodes {
             && (self.gripper_keeps_part(config) || self.gripper_node().is_none_or(ready))
     }
 
-    /// Executes ClearCurrentErrors for the nodes in `mask`: nodes with an error to clear are commanded to Init until they follow. An error
-    /// that has merely occurred is cleared only while the torque is off: it is not a reason to drop the arm. Returns `true` if any node has
-    /// an error to clear.
+    /// Executes ClearCurrentErrors for the nodes in `mask`. Nodes with an error to clear are commanded to Init until they follow. An error
+    /// that is only in the word of occurred errors is cleared only while the torque is off, because it is not a reason to drop the arm.
+    /// Returns `true` if any node has an error to clear.
     pub fn clear(&mut self, mask: u8, torque_off: bool) -> bool {
         let present = self.present();
         let mut any = false;
@@ -412,8 +412,8 @@ impl Nodes {
 }
 
 impl Nodes {
-    /// Applies other settings from now on, in a state without torque. Returns `true` if these settings are sent to the nodes, which are
-    /// then configured again.
+    /// Applies new settings, in a state without torque. Returns `true` if these settings are sent to the nodes, which are then configured
+    /// again.
     pub fn use_settings(&mut self, config: &Config, before: &Config) -> bool {
         self.gripper = config.gripper;
         self.some_absent = config.absent.contains(&true);
@@ -425,11 +425,11 @@ impl Nodes {
                 node.stand_in();
                 (self.position[j], self.velocity[j]) = (config.absent_position[j], 0.0);
             } else if before.absent[j] {
-                // The joint is brought up like any other.
+                // The joint is brought up like any other joint.
                 node.restart(config);
             }
         }
-        // With another scale the speeds may fit.
+        // With another scale the speeds may agree.
         let bits = |config: &Config| {
             let Config { joint_config_bits, gripper_config_bits, gripper, velocity_full_scale, .. } = *config;
             (joint_config_bits, gripper_config_bits, gripper, velocity_full_scale)

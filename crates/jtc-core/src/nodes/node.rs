@@ -1,21 +1,21 @@
-//! State of a node: its last report, the progress of its bring-up, and the state that is requested of it (J-16, J-20).
+//! State of a node: its last report, the progress of its bring-up, and the state that the controller requests (J-16, J-20).
 use jtc_bus::{JointReport, NodeState, Target, warning};
 
 use super::measure::Measurement;
 use crate::config::Config;
 use crate::remembered::remembered;
 
-/// Ticks after a reset in which a late answer of the node does not count.
+/// Ticks after a reset in which late answers of the node are ignored.
 const DEAF_AFTER_RESET: u8 = 20;
 
-/// Goal of the nodes.
+/// State into which the controller brings the nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Goal {
     /// Configured and ready to operate: Init.
     Ready,
     /// Operation enabled: HoldPos, Operate, Teaching.
     Enabled,
-    /// Not enabled, otherwise left alone: Error.
+    /// Not enabled, otherwise unchanged: Error.
     Down,
 }
 
@@ -23,39 +23,39 @@ pub(crate) enum Goal {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Node {
     pub report: JointReport,
-    /// Answered a Move since boot or reset.
+    /// The node has answered a Move since its start or reset.
     pub(super) seen: bool,
-    /// Accepted its configuration.
+    /// The node has accepted its configuration.
     pub(super) configured: bool,
-    /// Answered a Move after that: position and velocity count.
+    /// The node has answered a Move after that, so position and velocity are valid.
     pub(super) valid: bool,
-    /// Refused its configuration in the state it is in.
+    /// The node has refused its configuration in its present state.
     pub(super) refused: bool,
-    /// Consecutive Moves left unanswered.
+    /// Consecutive Moves that the node has not answered.
     pub(super) silent: u8,
     /// Consecutive Moves without a usable answer.
     pub(super) missed: u8,
-    /// Position and velocity, once they count.
+    /// Measured position and velocity, once they are valid.
     pub(super) measured: Measurement,
-    /// Ticks of silence that are not an error yet.
+    /// Ticks left in which silence of the node is not an error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
     /// The node is commanded to Init to clear its errors, until it has followed (J-21).
     pub(super) clear: bool,
     /// A reset frame must be sent.
     pub(super) reset: bool,
-    /// Reported OperationEnable while that was wanted.
+    /// The node reported OperationEnable while that state was requested.
     pub(super) enabled: bool,
     pub(super) enable_wait: u32,
-    /// A usable answer came in since the last tick: the measurement is not a prediction.
+    /// A usable answer has come since the last tick, so the measurement is not a prediction.
     pub(super) fresh: bool,
-    /// Its joint is set absent (J-53).
+    /// The joint is marked as absent (J-53).
     pub(super) absent: bool,
-    /// State that the node reported while its answers did not count.
+    /// State that the node reported although its joint is absent.
     pub(super) unasked: Option<NodeState>,
-    /// Answers that came in since the last tick: all but the last were late.
+    /// Number of answers since the last tick. All except the last one were late.
     pub(super) answers: u8,
-    /// Misbehaved in this tick: left OperationEnable, did not enable in time, or reported implausible positions.
+    /// The node misbehaved in this tick: it left OperationEnable, did not enable in time, or reported implausible positions.
     pub(super) misbehaved: bool,
 }
 
@@ -82,7 +82,7 @@ remembered!(Node {
 });
 
 impl Node {
-    /// Returns `true` if the measurement came in since the last tick.
+    /// Returns `true` if a usable answer has come since the last tick.
     pub fn fresh(&self) -> bool {
         self.fresh
     }
@@ -92,7 +92,7 @@ impl Node {
         self.measured.young_velocity(due)
     }
 
-    /// Returns `true` if the joint is set absent (J-53).
+    /// Returns `true` if the joint is marked as absent (J-53).
     pub fn absent(&self) -> bool {
         self.absent
     }
@@ -117,7 +117,7 @@ impl Node {
 
     /// Returns `true` if the node reports an error. A gripper has no warnings.
     pub fn faulty(&self) -> bool {
-        // Drives set this warning also before they are configured, for any state of the line.
+        // Drives also set this warning before they are configured, whatever the level of the line is.
         let safety_line = self.valid && self.report.warnings & warning::SAFETY_LINE != 0;
         self.in_fault() || (self.seen && safety_line)
     }
@@ -128,13 +128,13 @@ impl Node {
         self.seen && (r.state.is_fault() || (r.errors | r.mc_current) != 0)
     }
 
-    /// Restarts the node: all knowledge of it is discarded.
+    /// Restarts the node. All information about it is discarded.
     pub fn restart(&mut self, config: &Config) {
         *self = Self { boot_left: config.node_boot_ms, deaf_left: DEAF_AFTER_RESET, ..Self::default() };
     }
 
-    /// Sets the node of an absent joint (J-53), in every tick: configured, ready and silent. So the controller requests nothing of the
-    /// node, and does not wait for it. A drive that answers is an error: either the drive or the setting is wrong.
+    /// Sets the node of an absent joint in every tick (J-53): configured, ready and silent. So the controller requests nothing from the
+    /// node, and does not wait for it. A drive that answers is an error, because either the drive or the setting is wrong.
     pub fn stand_in(&mut self) {
         let unasked = self.unasked;
         *self = Self {
@@ -149,17 +149,17 @@ impl Node {
         self.report.state = NodeState::READY;
     }
 
-    /// Discards the configuration: it must be accepted again, and until then position and velocity do not count.
+    /// Discards the configuration, which must be accepted again. Until then position and velocity are not valid.
     pub fn lose_configuration(&mut self) {
         (self.configured, self.valid, self.refused) = (false, false, false);
         self.measured = Measurement::default();
     }
 
-    /// Returns the state requested of the node (J-16).
+    /// Returns the state that is requested from the node (J-16).
     pub fn request(&self, goal: Goal) -> Target {
         let state = self.report.state;
         if !self.seen {
-            // J-53: an absent joint has no torque, even if its drive is there.
+            // J-53: an absent joint has no torque, even if its drive is connected.
             let powered = self.absent && self.unasked == Some(NodeState::ENABLED);
             return if powered { Target::Ready } else { Target::NoChange };
         }
@@ -187,8 +187,8 @@ impl Node {
         }
     }
 
-    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset: no change is requested of it for
-    /// [`Goal::Enabled`].
+    /// Returns `true` if the node is configured and enabled, and must be neither cleared nor reset. For [`Goal::Enabled`] no change is then
+    /// requested from it.
     pub fn wants_nothing_enabled(&self) -> bool {
         self.seen & self.configured & !self.reset & !self.clear & (self.report.state == NodeState::ENABLED)
     }
@@ -205,7 +205,7 @@ impl Node {
 mod tests {
     use super::*;
 
-    /// The short check agrees with the long one.
+    /// The short check has the same result as the long one.
     #[test]
     fn j12_j16_an_enabled_node_wants_nothing() {
         for bits in 0..16u8 {
@@ -224,7 +224,7 @@ mod tests {
         }
     }
 
-    /// A drive that was enabled before the controller began keeps its state, but nothing is known of its configuration.
+    /// A drive that was enabled before the controller started keeps its state, but its configuration is not known.
     #[test]
     fn j16_a_node_is_enabled_when_it_says_so_and_its_configuration_is_known() {
         for (valid, state, enabled) in [

@@ -1,7 +1,7 @@
-//! Check that the positions and the speed that a drive reports fit (J-35).
+//! Checks whether the positions and the speed that a drive reports agree (J-35).
 //!
-//! Positions and speed come from two encoders, so either shows a fault of the other. A full scale that is set wrong makes all speeds wrong
-//! by a factor. An encoder that slips, or has stopped, moves while the motor does not, or stands while the motor moves.
+//! Positions and speed come from two encoders, so each shows a fault of the other. A wrong full scale makes all speeds wrong by a factor.
+//! An encoder that slips moves while the motor does not; an encoder that has stopped is at rest while the motor moves.
 use super::measure::Ways;
 use super::node::Node;
 use crate::JOINTS;
@@ -9,32 +9,32 @@ use crate::config::Config;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two checks of a joint: one joint is checked per tick.
+/// Ticks between two checks of the same joint. One joint is checked per tick.
 const PERIOD: u8 = 10;
-/// Looks, one after the other, at which the two differ in the same direction when they do not fit.
+/// Consecutive checks of a joint that must show a difference in the same direction.
 const LOOKS: u8 = 5;
-/// Multiple of the largest twist of the gear that the two must differ by together: a hand or a wall may twist the gear by less.
+/// Multiple of the largest twist of the gear that the differences must exceed in total. A hand or a wall may twist the gear by less.
 const TWISTS: f64 = 2.0;
-/// Ratio of the two ways above which the encoder with the shorter way counts as standing.
+/// Ratio of the two distances above which the encoder with the shorter distance is considered at rest.
 const STANDS: f32 = 10.0;
 
-/// A joint whose position and speed have differed at each of the last looks.
+/// Differences between the position and the speed of a joint in its last checks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Differs {
     looks: u8,
-    /// Distance of its positions in the windows of these looks, rad.
+    /// Distance of the positions in the windows of these checks, rad.
     measured: f32,
-    /// Distance that corresponds to its speed, rad.
+    /// Distance that corresponds to the speed, rad.
     reported: f32,
 }
 
 /// Number and size of the differences between the two encoders.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SpeedCheck {
-    /// Index of the joint whose turn it is.
+    /// Index of the joint that is checked next.
     turn: u8,
     differs: [Differs; JOINTS],
-    /// Reported torque at the last look, N·m.
+    /// Reported torque at the last check, N·m.
     torque: [f32; JOINTS],
 }
 
@@ -42,7 +42,8 @@ remembered!(Differs { looks, measured, reported });
 remembered!(SpeedCheck { turn, differs, torque });
 
 impl SpeedCheck {
-    /// Runs one tick. Returns the joint whose speed has another scale, as a mask. A joint with only one moving encoder has misbehaved.
+    /// Runs one tick. Returns the joint, as a mask, whose speed has another scale. If only one encoder of a joint moves, its node is marked
+    /// as misbehaved.
     #[inline(always)]
     pub fn step(&mut self, nodes: &mut [Node], config: &Config) -> u8 {
         let turn = self.turn;
@@ -67,7 +68,7 @@ impl SpeedCheck {
 }
 
 impl Differs {
-    /// Takes a difference of the two. Returns `true` if it shows another scale of the speed. `before`: torque at the last look, N·m.
+    /// Adds a difference. Returns `true` if it shows that the speed has another scale. `before`: torque at the last check, N·m.
     #[cold]
     fn differ(
         &mut self,
@@ -77,7 +78,7 @@ impl Differs {
         limits: &JointConfig,
         config: &Config,
     ) -> bool {
-        // Possible twist of the gear since.
+        // Possible twist of the gear since the last check.
         let twist = (node.report.torque - f64::from(before)).abs() / config.gear_stiffness;
         if ways.unexplained().abs() <= ways.tolerance(config) + twist {
             self.looks = 0;

@@ -1,4 +1,4 @@
-//! Errors of the nodes: missing answers (J-14, J-35), joints that leave OperationEnable or do not reach it (J-16).
+//! Errors of the nodes: missing answers (J-14, J-35), and joints that leave OperationEnable or do not reach it (J-16).
 use jtc_bus::{NodeState, warning};
 use jtc_wire::can_flag;
 
@@ -8,10 +8,10 @@ use crate::config::Config;
 use crate::io::Inputs;
 
 impl Nodes {
-    /// Counts Moves without answer, without usable answer, and without acknowledge (J-14, J-35).
+    /// Counts Moves without an answer, without a usable answer, and without an acknowledgement (J-14, J-35).
     pub(super) fn count_missing(&mut self, inputs: &Inputs<'_>, config: &Config, answered: u8, usable: u8) {
         let on_the_bus = inputs.bus_state.acknowledged && !inputs.bus_state.bus_off;
-        // While every node boots, no node acknowledges.
+        // While all nodes start, none of them acknowledges.
         let any_booted = || self.all().iter().any(|node| node.boot_left == 0 && !node.absent);
         if on_the_bus {
             self.unacknowledged = 0;
@@ -26,7 +26,7 @@ impl Nodes {
             }
             node.boot_left = if answered { 0 } else { node.boot_left.saturating_sub(1) };
             let unanswered = self.sent_move && on_the_bus && node.boot_left == 0;
-            // No node can have answered, but the controller has not given up the bus yet: the joint is still predicted (J-63).
+            // No node can have answered, but the transmit timeout has not been raised yet. Therefore the joint is still predicted (J-63).
             let predicted =
                 self.sent_move && node.valid && (1..config.missed_moves_max).contains(&self.unacknowledged);
             let more = |count: u8| count.saturating_add(1).min(config.missed_moves_max);
@@ -36,19 +36,19 @@ impl Nodes {
                 node.silent = more(node.silent);
             }
             if usable || self.unacknowledged >= config.missed_moves_max {
-                // Or the transmit timeout stands for all of them.
+                // The second case: the transmit timeout is reported instead of missing answers of the joints.
                 node.missed = 0;
             } else if answered || unanswered || predicted {
                 node.missed = more(node.missed);
             }
             let enabled_gripper = n == GRIPPER && node.report.state == NodeState::ENABLED;
             if node.silent == config.missed_moves_max && !enabled_gripper {
-                // The node may have lost its supply, and its configuration with it, in any state. An enabled gripper shows that by its
-                // state when it answers again; if the gripper is still enabled, it has held its part meanwhile.
+                // The node may have lost its supply, and with it its configuration, in any state. An enabled gripper shows this by its
+                // state when it answers again. If it is still enabled, it has held its part meanwhile.
                 node.lose_configuration();
             } else if node.missed == config.missed_moves_max && n < JOINTS {
-                // J-35: its answers have impossible positions. Or too few of its Moves were acknowledged to decide if it answers: it must
-                // not be predicted for longer than this (J-63).
+                // J-35: the answers of the joint have impossible positions. Or too few of its Moves were acknowledged to decide whether it
+                // answers, and it must not be predicted for longer than this (J-63).
                 node.misbehaved = true;
                 node.missed = 0;
                 node.measured.forget();
@@ -56,7 +56,7 @@ impl Nodes {
         }
     }
 
-    /// Detects joints that leave OperationEnable unasked, do not reach it in time (J-16), or lose their position.
+    /// Detects joints that leave OperationEnable without a request, do not reach it in time (J-16), or lose their position.
     pub(super) fn watch(&mut self, config: &Config, goal: Goal) {
         let may_enable = self.may_enable(config);
         for node in self.nodes.iter_mut().take(JOINTS) {
@@ -75,7 +75,7 @@ impl Nodes {
                 node.misbehaved = true;
             }
             node.enabled = false;
-            // J-16: while the arm falls no state is requested.
+            // J-16: no state is requested while the arm falls.
             node.enable_wait = node.enable_wait.saturating_add(u32::from(may_enable));
             if node.enable_wait > config.enable_timeout_ms {
                 (node.misbehaved, node.enable_wait) = (true, 0);
@@ -93,19 +93,19 @@ impl Nodes {
         flags
     }
 
-    /// Returns `true` if a joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared do not
-    /// count.
+    /// Returns `true` if a joint has an error, or misbehaved in this tick. While no torque is on, errors that are being cleared are
+    /// ignored.
     pub fn external_error(&self, powered: bool) -> bool {
         self.joints().iter().any(|node| node.misbehaved || ((powered || !node.clear) && node.faulty()))
     }
 
-    /// Returns `true` if a joint reports a fault that only a clear of its own ends, and none has been sent. Its safety-line warning ends by
-    /// itself.
+    /// Returns `true` if a joint reports a fault that only a clear of this joint ends, and no clear has been sent. A safety-line warning
+    /// ends by itself.
     pub fn fault_stays(&self) -> bool {
         self.joints().iter().any(|node| !node.clear && node.in_fault())
     }
 
-    /// Returns `true` if a joint is still being cleared: the cause of its error persists.
+    /// Returns `true` if a joint is still being cleared, because the cause of its error persists.
     pub fn clearing(&self) -> bool {
         self.joints().iter().any(|node| node.clear)
     }

@@ -1,4 +1,4 @@
-//! Effect of one tick on a node, state by state (J-14, J-16, J-20, J-21, J-23).
+//! Effect of one tick on a node in each state (J-14, J-16, J-20, J-21, J-23).
 use jtc_bus::{Frame, GripperReport, Request, Target};
 
 use super::*;
@@ -11,7 +11,7 @@ mod missing;
 const SCALE: Scale = Scale { velocity: 2.0 };
 const GOOD: BusState = BusState { acknowledged: true, bus_off: false };
 
-/// Returns the inputs of a tick that finds these frames on the bus, and nothing else.
+/// Returns the inputs of a tick that receives only these frames.
 fn inputs(bus: &[Frame], bus_state: BusState) -> Inputs<'_> {
     Inputs { bus, bus_state, ..Inputs::QUIET }
 }
@@ -20,7 +20,7 @@ fn tick(nodes: &mut Nodes, bus: &[Frame], bus_state: BusState) {
     nodes.take(&inputs(bus, bus_state), &Config::avena(), Goal::Ready, &Commanded::default());
 }
 
-/// Every node configured and ready, and a Move just sent.
+/// Returns nodes that are all configured and ready. A Move has just been sent.
 fn ready() -> Nodes {
     let mut nodes = Nodes::new(&Config::avena());
     for node in &mut nodes.nodes {
@@ -55,7 +55,7 @@ fn j16_joints_may_be_enabled_when_they_were_slow_and_rested_for_long_enough() {
     }
 }
 
-/// The time for which the arm is slow begins when all its joints are known.
+/// The time for which the arm is slow begins when the positions of all joints are known.
 #[test]
 fn j16_an_arm_that_is_not_known_is_not_still() {
     let mut nodes = ready();
@@ -91,7 +91,7 @@ fn j16_a_joint_that_leaves_operation_enable_or_does_not_reach_it_misbehaves() {
     assert_eq!(watched(false, NodeState::ENABLED, 7, still, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::ENABLED, 0, 0, Goal::Enabled), (false, true, 0));
     assert_eq!(watched(true, NodeState::READY, 0, 0, Goal::Enabled), (true, false, 0));
-    // That is J-20.
+    // This case is an error by J-20.
     assert_eq!(watched(true, NodeState::INIT, 0, 0, Goal::Enabled), (false, false, 0));
     for goal in [Goal::Ready, Goal::Down] {
         assert_eq!(watched(true, NodeState::READY, 7, still, goal), (false, false, 0), "it was asked to");
@@ -173,10 +173,10 @@ fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
     assert!(nodes.node(2).configured && !nodes.node(2).valid);
     tick(&mut nodes, &[joint(2, NodeState::INIT)], GOOD);
     assert!(nodes.node(2).valid);
-    // A refusal afterwards does not take it back.
+    // A later refusal does not revoke the acceptance.
     tick(&mut nodes, &[Answer::Mode { node: 2, accepted: false }.emit(SCALE)], GOOD);
     assert!(nodes.node(2).configured && nodes.node(2).refused);
-    // After a reset nothing that still arrives counts.
+    // After a reset, frames that still arrive are ignored.
     nodes.nodes[2].restart(&Config::avena());
     tick(&mut nodes, &[accepted, joint(2, NodeState::READY)], GOOD);
     assert!(!nodes.node(2).configured && !nodes.node(2).seen);

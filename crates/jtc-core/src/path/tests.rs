@@ -1,4 +1,4 @@
-//! Path time: what each tick does, and how long ramps take (J-33).
+//! Path time: each tick of a ramp, and the duration of ramps (J-33).
 extern crate std;
 use super::*;
 use proptest::prelude::*;
@@ -15,7 +15,7 @@ fn tick(clock: &mut PathClock, easy: f64, full: f64) {
     }
 }
 
-/// Returns the ticks from full speed to standstill; `bounds` gives the bounds of each tick.
+/// Returns the ticks from full speed to standstill. `bounds` returns the bounds of each tick.
 fn stop(mut bounds: impl FnMut(u32, &PathClock) -> SlopeBounds) -> u32 {
     let mut clock = PathClock::start(1.0);
     clock.halt();
@@ -55,17 +55,17 @@ fn j33_a_ramp_takes_its_length() {
 
 #[test]
 fn j33_margins_give_way_before_a_stop_comes_late() {
-    // No slope within the margins, all that is needed within the torque limits; then less and less of that.
+    // The margins leave no slope, and the torque limits leave enough; the following cases leave less and less.
     for easy in [(0.0, 0.0), (1.0, -1.0), (0.5, 1.0), (-0.3, FREE.1)] {
         for most in [2.6, 4.0, 10.0, f64::INFINITY] {
             let ticks = stop(|_, _| SlopeBounds { easy, full: (-most, most) });
             assert!(ticks <= 480, "{ticks} ms with {easy:?} and {most}");
         }
     }
-    // Also when they shrink after half of the ramp.
+    // The same is true if the bounds shrink after half of the ramp.
     let ticks = stop(|ms, _| SlopeBounds { easy: if ms < 100 { FREE } else { (0.0, 0.0) }, full: FREE });
     assert!(ticks <= 350, "{ticks}");
-    // Within its margins it is not in a hurry.
+    // A stop within its margins is not hurried.
     let ticks = stop(|_, clock| {
         assert!(!clock.hurried);
         SlopeBounds { easy: (-4.5, 4.5), full: FREE }
@@ -81,7 +81,7 @@ fn j33_a_stop_uses_all_the_torque_but_no_more() {
         SlopeBounds { easy: (0.0, 0.0), full: (-most, most) }
     });
     assert!((905..960).contains(&ticks), "{ticks}: 1/1.1 s");
-    // An arm that cannot even be kept from gaining speed for 100 ms.
+    // For 100 ms, the arm gains speed even with all available torque.
     let mut fastest: f64 = 0.0;
     let ticks = stop(|ms, clock| {
         fastest = fastest.max(clock.rate);
@@ -95,7 +95,7 @@ fn j33_a_stop_uses_all_the_torque_but_no_more() {
 fn j33_time_for_a_stop_runs_from_the_first_one() {
     let mut clock = PathClock::start(1.0);
     for ms in 0..480 {
-        // Asked for again and again.
+        // The stop is requested again and again.
         clock.halt();
         tick(&mut clock, 0.0, 2.8);
         if clock.standing() {
@@ -105,24 +105,24 @@ fn j33_time_for_a_stop_runs_from_the_first_one() {
     }
 }
 
-/// Each tick of a stop along ramps of 200 ms, whose slope changes by at most 0.1125 1/s in a tick, or eight times that in a hurry.
+/// Each tick of a stop along ramps of 200 ms. The slope changes by at most 0.1125 1/s in a tick, or eight times as much in a hurried stop.
 #[test]
 fn j33_each_tick_of_a_stop() {
     let (rounded, hurried) = (4.5 / 0.04 * DT, 8.0 * (4.5 / 0.04 * DT));
     let on_time = 0.001 * (PUNCTUAL * 500.0);
     for (rate, slope, easy, full, expected) in [
         (1.0, 0.0, FREE, FREE, -rounded),
-        // Margins that leave one slope only, and more than is wanted; that contradict each other; that leave nothing.
+        // Margins that allow one slope only, larger than the ramp needs; margins that contradict each other; margins that allow no slope.
         (1.0, 0.0, (-1.0, -1.0), FREE, -rounded),
         (1.0, 0.0, (1.0, -1.0), FREE, -hurried),
         (1.0, 0.0, (0.0, 0.0), FREE, -hurried),
-        // Within its margins, and just in time: that is not a hurry.
+        // Within its margins and just in time, so the stop is not hurried.
         (on_time, -5.0, (-1.0, FREE.1), (-7.0, 7.0), -1.0),
-        // At full speed path time does not get any faster, for any motion of the arm.
+        // At full speed path time does not become faster, whatever the arm does.
         (1.0, 0.0, (2.0, 5.0), (2.0, 5.0), 0.0),
-        // The last step: it stands, and does not slow down any more.
+        // The last step: path time is at rest and does not slow down any further.
         (0.1 * DT, -5.0, (-0.1, FREE.1), FREE, 0.0),
-        // The remaining rate counts as zero, although the limits leave no slope for it.
+        // The remaining rate is considered zero, although the limits leave no slope.
         (1e-10, -5.0, (0.0, 0.0), (0.0, 0.0), 0.0),
     ] {
         let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
@@ -136,20 +136,20 @@ fn j33_each_tick_of_a_stop() {
     }
 }
 
-/// Ramps are shortened to what a stop leaves them.
+/// If a stop must end earlier than a ramp would, the ramp is shortened.
 #[test]
 fn j33_a_stop_sooner_than_the_ramp_shortens_the_ramp() {
     let mut clock = PathClock::start(1.0);
     clock.halt();
     let free = SlopeBounds { easy: FREE, full: FREE };
     clock.slow_down(1_000.0, 500.0, &free);
-    // An S of 400 ms.
+    // The S-shaped ramp takes 400 ms.
     assert!((clock.slope + 4.5 / 0.16 * DT).abs() < 1e-12, "{clock:?}");
 }
 
 proptest! {
-    /// Pauses at any time, also during a resume: the rate stays within 0..1, never goes the wrong way for long, has no
-    /// step, and the slope is the derivative of it. Each pause ends in time.
+    /// The path is paused at any time, also during a resume. The rate stays within 0..1, does not move in the wrong direction for long, and
+    /// has no step. The slope is the derivative of the rate. Each pause ends in time.
     #[test]
     fn j33_the_ramp_is_smooth(
         pauses in prop::collection::vec(1..400u32, 1..8),
@@ -178,7 +178,7 @@ proptest! {
     }
 }
 
-/// A clock on its way to full speed, after one tick.
+/// Returns a clock after one tick of a ramp to full speed.
 fn sped_up(rate: f64, slope: f64, bounds: Bounds) -> PathClock {
     let mut clock = PathClock { rate, slope, target: 1.0, ..PathClock::default() };
     clock.change_pace(200.0, bounds);
@@ -191,7 +191,7 @@ fn j33_each_tick_of_a_resume() {
     for (rate, slope, bounds, expected) in [
         (0.0, 0.0, FREE, rounded),
         (0.5, -1.0, FREE, -1.0 + 8.0 * rounded),
-        // Bounds that leave one slope only, contradict each other, or leave the other direction only.
+        // Bounds that allow one slope only, contradict each other, or allow only the other direction.
         (0.5, 5.0, (2.0, 2.0), 2.0),
         (0.5, 5.0, (2.0, 1.0), 0.0),
         (0.5, 5.0, (-2.0, -1.0), 0.0),
@@ -206,10 +206,10 @@ fn j33_each_tick_of_a_resume() {
     }
 }
 
-/// With the last tick of the way it is at full speed, and its slope is over.
+/// When a tick covers the remaining change of the rate, path time is at full speed and its slope is zero.
 #[test]
 fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
-    // A rest that no rounding touches, and the slope that is just enough for it.
+    // A remaining change that no rounding affects, and the slope that is just sufficient for it.
     let rest = 1.0 / 16_384.0;
     let enough = rest / DT;
     assert_eq!(enough * DT, rest);
@@ -217,7 +217,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
         (rest, enough, true),
         (rest, 0.99 * enough, false),
         (rest, FREE.1, true),
-        // A rest that is too small for a bound to hold back.
+        // The remaining change is too small to be held back by a bound.
         (0.9e-9, 0.0, true),
         (1.1e-9, 0.0, false),
     ] {
@@ -231,7 +231,7 @@ fn j33_a_resume_ends_where_a_tick_covers_the_rest_of_the_way() {
 fn j33_the_rest_of_the_way_flattens_the_slope_out() {
     let ramp = Ramp::of(200.0);
     for ticks in [1.0, 2.0, 7.0, 40.0] {
-        // From `ticks` times the change of a tick down to one: the sum of them.
+        // The slope falls from `ticks` times the change per tick to one time; this is the sum.
         let way = ramp.round * DT * ticks * (ticks + 1.0) / 2.0;
         assert!((ramp.flatten(way) - ticks * ramp.round).abs() < 1e-9, "{ticks}");
     }
@@ -260,14 +260,15 @@ fn j33_a_rate_below_a_billionth_is_standstill() {
     for (rate, stands) in [(1.01e-9, false), (1e-9, false), (0.99e-9, true)] {
         let mut clock = PathClock { rate, target: 1.0, ..PathClock::default() };
         clock.halt();
-        // The limits leave no slope for it.
+        // The limits leave no slope for the remaining rate.
         clock.slow_down(200.0, 500.0, &SlopeBounds { easy: (0.0, 0.0), full: (0.0, 0.0) });
         assert_eq!(clock.standing(), stands, "{clock:?}");
     }
 }
 
 proptest! {
-    /// For any speeds at any times: path time gets there by itself, within the rates wanted before, and its slope never steps.
+    /// For any speeds at any times, path time reaches the speed by itself, within the rates that were the target so far, and its slope
+    /// never steps.
     #[test]
     fn j57_path_time_gets_to_every_speed_along_the_ramp(
         start in 0.05..1.0f64,
@@ -284,7 +285,7 @@ proptest! {
                 if clock.ramping() {
                     clock.change_pace(200.0, FREE);
                 }
-                // The rate stays within the rates wanted so far, except for the change that removes a slope.
+                // The rate stays within the targets so far, except for the change that removes a slope.
                 let (least, most) = wanted.iter().fold((1.0f64, 0.0f64), |(l, m), w| (l.min(*w), m.max(*w)));
                 prop_assert!(clock.rate >= least - 1e-9 && clock.rate <= most + 1e-9, "{clock:?}");
                 prop_assert!((clock.slope - before.slope).abs() <= REVERSAL * round + 1e-9, "{before:?} {clock:?}");
@@ -296,7 +297,7 @@ proptest! {
     }
 }
 
-/// A pause stays a pause, for any speed that is wanted meanwhile; it takes no longer from a lower speed.
+/// A pause is not ended by a new speed. From a lower speed it does not take longer.
 #[test]
 fn j57_a_speed_that_is_set_does_not_undo_a_pause() {
     let mut clock = PathClock::start(0.5);

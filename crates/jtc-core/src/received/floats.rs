@@ -1,17 +1,17 @@
-//! The parameters in use as the numbers of their frames, for reading them back (J-54).
+//! The values of the parameters in use, in the order of their frames, for reading them back (J-54).
 use jtc_dynamics::Origin;
 
 use super::{ReceivedParameters, TABLE_FLOATS};
 use crate::parameters::PidGains;
 
 impl ReceivedParameters {
-    /// Number `i` of the gains in the order of the wire.
+    /// Returns value `i` of the gains, in the order of the wire format.
     pub fn pid_float(&self, i: usize) -> f64 {
         let PidGains { kp, ki, kd, int_min, int_max } = self.pid.get(i / 5).copied().unwrap_or_default();
         [kp, ki, kd, int_min, int_max].get(i % 5).copied().unwrap_or(0.0)
     }
 
-    /// Number `i` of the model in the order of the wire.
+    /// Returns value `i` of the model, in the order of the wire format.
     pub fn model_float(&self, i: usize) -> f64 {
         let of = |origin: &Origin, i: usize| origin.xyz.iter().chain(&origin.rpy).nth(i).copied();
         let number = match i.checked_sub(6 * self.model.joints.len()) {
@@ -25,7 +25,7 @@ impl ReceivedParameters {
         number.unwrap_or(0.0)
     }
 
-    /// Number `i` of the friction in use in the order of the wire.
+    /// Returns value `i` of the friction in use, in the order of the wire format.
     pub fn friction_float(&self, i: usize) -> f32 {
         if !self.friction_is_table {
             let coefficient = self.polynomial.get(i / 6).and_then(|joint| joint.iter().rev().nth(i % 6));

@@ -1,4 +1,4 @@
-//! The parameters as they come in frames: numbers in the order of the wire, refused if one is not a finite number (J-06).
+//! The parameters in frames: values in the order of the wire format. A frame is refused if a value is not finite (J-06).
 use jtc_dynamics::{ArmModel, Link, Origin};
 use jtc_wire::{DataStatus, Floats};
 
@@ -9,7 +9,7 @@ use crate::host::slices::{SliceOutcome, SliceProgress};
 use crate::parameters::{PidGains, TableOf};
 
 impl ReceivedParameters {
-    /// A model in slices, as [`set_model`](Self::set_model).
+    /// Takes a model in slices, like [`set_model`](Self::set_model).
     pub fn take_model(
         &mut self,
         floats: &Floats<'_>,
@@ -23,7 +23,7 @@ impl ReceivedParameters {
         }
     }
 
-    /// Gains and model of a stored arm. The gains are checked when a host requests them.
+    /// Takes gains and model of a stored arm. The gains are checked against the model when a host requests them.
     pub fn load(&mut self, pid: &Floats<'_>, model: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
         let (pid, model) = (read_pid(pid)?, read_model(model)?);
         self.check_pid(&pid, config)?;
@@ -33,7 +33,7 @@ impl ReceivedParameters {
     }
 
     pub fn take_polynomial(&mut self, floats: &Floats<'_>, config: &Config) -> Result<(), DataStatus> {
-        // 4 or 6 per joint, highest index first.
+        // Each joint has 4 or 6 coefficients, the highest index first.
         let count = if floats.len() == 4 * JOINTS { 4 } else { 6 };
         let mut polynomial = [[0.0; 6]; JOINTS];
         for (j, coefficients) in polynomial.iter_mut().enumerate() {
@@ -44,7 +44,7 @@ impl ReceivedParameters {
         self.set_polynomial(&polynomial, config)
     }
 
-    /// The tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
+    /// Takes the tables of a frame, in as many ticks as [`take_tables`](Self::take_tables) needs.
     pub fn take_table(
         &mut self,
         floats: &Floats<'_>,
@@ -55,7 +55,7 @@ impl ReceivedParameters {
     }
 }
 
-/// Gains in the order of the wire.
+/// Returns the gains, which are in the order of the wire format.
 pub(crate) fn read_pid(floats: &Floats<'_>) -> Result<[PidGains; JOINTS], DataStatus> {
     let mut gains = [PidGains::default(); JOINTS];
     for (j, gain) in gains.iter_mut().enumerate() {
@@ -77,12 +77,12 @@ fn read_model(floats: &Floats<'_>) -> Result<ArmModel, DataStatus> {
     Ok(model)
 }
 
-/// Returns float `i`; refuses it if it is NaN, infinite or not there (J-06).
+/// Returns float `i`. Refuses it if it is NaN, infinite or missing (J-06).
 fn finite(floats: &Floats<'_>, i: usize) -> Result<f64, DataStatus> {
     floats.get(i).filter(|f| f.is_finite()).map(f64::from).ok_or(DataStatus::IncorrectValue)
 }
 
-/// Takes finite floats one after the other.
+/// Reads finite floats one after the other.
 struct Reader<'a> {
     floats: &'a Floats<'a>,
     next: usize,

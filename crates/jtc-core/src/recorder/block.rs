@@ -1,17 +1,17 @@
-//! A block of the flight recorder's memory, as it lies there (J-56).
+//! The format of a block in the flight recorder's memory (J-56).
 //!
-//! A block has a head of [`HEAD`] words, followed by bits. Its *commit* word has the number of bits and their check, and is written once a
-//! tick, last: bits that a cut tick has left after the committed bits are not read. Memory that was never written, or has been damaged,
-//! fails the check and does not read as a block.
+//! A block has a head of [`HEAD`] words, followed by bits. Its *commit* word contains the number of bits and their check, and is written
+//! last, once per tick. Bits after the committed ones, which an interrupted tick has left, are not read. Memory that was never written or
+//! is damaged fails the check and is not read as a block.
 use jtc_wire::LogState;
 
 use super::{BLOCK_WORDS, Block};
 
-/// "JTCF" and the version of the layout, which must be raised with each change of the written data, including a list of `remembered!`.
+/// "JTCF" and the version of the layout. Raise the version with each change of the written data, including a list of `remembered!`.
 pub(super) const MAGIC: u32 = 0x4A46_000A;
-/// Words in front of the bits.
+/// Words before the bits.
 pub(super) const HEAD: usize = 5;
-/// Bits of a block.
+/// Number of bits in a block.
 pub(super) const BITS: u32 = ((BLOCK_WORDS - HEAD) * 32) as u32;
 
 /// Indices of the words of the head.
@@ -19,11 +19,11 @@ pub(super) mod head {
     pub const MAGIC: usize = 0;
     /// Number of the block.
     pub const SEQUENCE: usize = 1;
-    /// Bits (low half) and their check.
+    /// Number of bits (low half) and their check.
     pub const COMMIT: usize = 2;
-    /// Begin of the first snapshot (low half, [`super::NONE`]: nowhere) and the complement.
+    /// Start of the first snapshot (low half; [`super::NONE`] if there is none) and its complement.
     pub const SNAPSHOT: usize = 3;
-    /// State of the log (low half) and the complement.
+    /// State of the log (low half) and its complement.
     pub const FLAGS: usize = 4;
 }
 
@@ -35,12 +35,12 @@ pub(super) const POWERED: u16 = 0x100;
 /// The next block continues this one.
 pub(super) const CLOSED: u16 = 0x200;
 
-/// A number with its complement above it.
+/// Returns a number with its complement above it.
 pub(super) const fn doubled(value: u16) -> u32 {
     value as u32 | (!value as u32) << 16
 }
 
-/// Returns the number, if the complement is right.
+/// Returns the number if its complement is correct.
 fn halved(word: u32) -> Option<u16> {
     let value = word as u16;
     (doubled(value) == word).then_some(value)
@@ -50,21 +50,21 @@ pub(super) fn mix(hash: u32, word: u32) -> u32 {
     (hash ^ word).wrapping_mul(0x0100_0193).rotate_left(7)
 }
 
-/// Returns the commit word for this number of `bits`, the last of them in `rest`.
+/// Returns the commit word for this number of `bits`; `rest` contains the last of them.
 pub(super) fn commit(hash: u32, rest: u32, bits: u32) -> u32 {
     let hash = mix(hash, rest);
     bits | (hash ^ hash << 16) & 0xFFFF_0000
 }
 
-/// A block that was written, and whose head and bits are whole.
+/// A block that was written, with a valid head and valid bits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Whole<'a> {
     pub sequence: u32,
-    /// Bits that are committed.
+    /// Number of committed bits.
     pub bits: u32,
-    /// The next block continues these bits.
+    /// The next block continues the bits of this one.
     pub closed: bool,
-    /// Begin of the first snapshot.
+    /// Start of the first snapshot.
     pub snapshot: Option<u32>,
     pub state: LogState,
     pub powered: bool,
@@ -72,7 +72,7 @@ pub(super) struct Whole<'a> {
 }
 
 impl<'a> Whole<'a> {
-    /// Parses a block; returns `None` for memory that holds no block.
+    /// Parses a block. Returns `None` if the memory does not contain a valid block.
     pub fn parse(block: &'a Block) -> Option<Self> {
         let (head, words) = block.split_first_chunk::<HEAD>()?;
         let bits = head[head::COMMIT] & 0xFFFF;
@@ -94,7 +94,7 @@ impl<'a> Whole<'a> {
     }
 }
 
-/// Creates a block with these bits, as the recorder writes it: for tests of the code that reads a log.
+/// Creates a block with these bits in the recorder's format, for tests of code that reads a log.
 #[doc(hidden)]
 pub fn sealed_block(sequence: u32, snapshot: u16, bits: &[u32]) -> Block {
     let mut block = [0; BLOCK_WORDS];
@@ -115,7 +115,7 @@ pub(super) fn flags(state: LogState, powered: bool) -> u16 {
     state as u16 | if powered { POWERED } else { 0 }
 }
 
-/// Returns `true` if the block has this number, without a check of its content.
+/// Returns `true` if the block has this number. The content is not checked.
 pub(super) fn in_place(block: &Block, sequence: u32) -> bool {
     block[head::MAGIC] == MAGIC && block[head::SEQUENCE] == sequence
 }

@@ -1,7 +1,7 @@
-//! The inputs of a tick against those before: whole words for values that are new in each tick, which take little time to write, and bits
-//! for the rest, which a bit of the first word announces.
+//! Encodes the inputs of a tick relative to earlier ones. Values that change in each tick are written as whole words, which takes little
+//! time. All other values are written as bits, if a bit of the first word says so.
 //!
-//! Writer and reader keep the same [`Reference`]; a snapshot restarts it on both sides.
+//! Writer and reader keep the same [`Reference`]. A snapshot resets it on both sides.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{EVENTS_MAX, FrameRef, FrameType, LinkEvent, Segment, UrgentCommand, UrgentCommands};
 
@@ -12,29 +12,30 @@ use crate::nodes::FRAMES_MAX;
 use crate::remembered::BitSink;
 use crate::{JOINTS, NODES};
 
-/// Longest frame of a host that is recorded with its bytes.
+/// Longest frame of a host whose bytes are recorded.
 pub const HOST_BYTES: usize = 48;
-/// Bytes of frames of hosts that are recorded, on average in a tick and at once.
+/// Number of bytes of host frames that are recorded: on average per tick, and at most at once.
 const ALLOWANCE: (u16, u16) = (2, 500);
-/// Bytes that an event counts for in addition to its own: it takes 15 to 20 bits.
+/// Bytes that are charged for an event in addition to its own bytes. An event takes 15 to 20 bits.
 const EVENT_BYTES: u16 = 2;
 
-/// Reference for writing the next inputs.
+/// Reference for encoding the next inputs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reference {
-    /// The last answers to a Move: lengths, and words by [`words`]; velocity and torque as they were when something else had changed.
+    /// The last answers to a Move: lengths, and words from [`words`]. Velocity and torque are those of the last tick in which another value
+    /// had changed.
     pub(super) len: [u8; NODES],
     pub(super) words: [Words; NODES],
     /// Number of nodes that answer.
     pub(super) expected: u8,
-    /// Bytes of frames of hosts that may still be recorded.
+    /// Bytes of host frames that may still be recorded.
     allowance: u16,
 }
 
 /// Words of a payload.
 pub(super) type Words = [u32; MAX_LEN / 4];
 
-/// Returns the words of an answer as they are in memory, except the position, which is a number.
+/// Returns the words of an answer as they are in memory. Only the position is converted to a number.
 #[inline]
 fn words(frame: &Frame) -> Words {
     let mut words = frame.words();
@@ -53,31 +54,31 @@ impl Default for Reference {
     }
 }
 
-/// Word of an answer that holds the position, and the one with velocity and torque.
+/// Index of the word of an answer that contains the position, and of the word with velocity and torque.
 pub(super) const POSITION: usize = 0;
 pub(super) const RATES: usize = 1;
-/// Bits of a joint's way in a tick, in steps of a 16-bit encoder, if all joints have moved little enough.
+/// Bits for the distance of a joint in a tick, in steps of a 16-bit encoder, if no joint has moved further.
 const WAY_BITS: u32 = 5;
 /// Mask of [`WAY_BITS`], and half of its range.
 const WAY: u32 = (1 << WAY_BITS) - 1;
 const WAY_HALF: u32 = 1 << (WAY_BITS - 1);
 
-/// Returns the position of a joint that was at `before`, by the ways of all of them.
+/// Returns the position of joint `n`, which was at `before`, from the word with the distances of all joints.
 pub(super) fn moved(n: usize, before: u32, ways: u32) -> u32 {
     let way = (ways >> (WAY_BITS * n as u32) & WAY).wrapping_sub(WAY_HALF);
     before.wrapping_add(way << 16)
 }
 
-/// The first word of a tick. Bit 0 is a 1 in front of a snapshot.
+/// The first word of a tick. In a tick bit 0 is 0; a 1 announces a snapshot.
 pub(super) mod head {
     pub const STATUS_FREE: u32 = 1 << 1;
-    /// Only answers came.
+    /// The only inputs are answers.
     pub const QUIET: u32 = 1 << 2;
-    /// Each node that is expected has answered, in order: words with what the joints have moved follow.
+    /// Each expected node has answered, in order. Words with the distances of the joints follow.
     pub const ORDERED: u32 = 1 << 3;
-    /// The way of a joint is not a small number of steps: the words hold all positions.
+    /// The distance of a joint is too large for [`WAY_BITS`], so the words contain all positions.
     pub const FAR: u32 = 1 << 4;
-    /// More than the motion has changed.
+    /// Other values than the motion have changed.
     pub const CHANGED: u32 = 1 << 5;
     /// First bit of the check of the outputs.
     pub const CHECK: u32 = 16;
@@ -87,14 +88,14 @@ pub(super) mod head {
 struct Answers {
     positions: [u32; JOINTS],
     rates: [u32; JOINTS],
-    /// Ways of the joints, and bits that are set if a joint has moved far.
+    /// Distances of the joints, and bits that are set if a joint has moved too far for [`WAY_BITS`].
     ways: u32,
     far: u32,
-    /// Bits of other words that have changed.
+    /// Bits in which other words differ.
     changed: u32,
 }
 
-/// Words that have changed.
+/// Writes the words that have changed.
 #[inline(never)]
 fn write_words<S: BitSink>(now: &[u32], before: &[u32], to: &mut S) {
     for (now, before) in now.iter().zip(before) {
@@ -110,10 +111,10 @@ fn is_move_answer(frame: &Frame) -> bool {
 }
 
 impl Reference {
-    /// Writes a tick: its inputs, and a check of its outputs. Returns `true` if all inputs are written (a replay of this tick gives the
-    /// same).
+    /// Writes a tick: its inputs, and a check of its outputs. Returns `true` if all inputs are written, so that a replay of this tick has
+    /// the same result.
     ///
-    /// Drives send other positions in each tick, and the rest of their answers changes seldom: as a rule a tick is eight words.
+    /// Drives send new positions in each tick, and the rest of their answers changes seldom. A tick usually takes eight words.
     pub fn write<P, const N: usize>(
         &mut self,
         inputs: &Inputs<'_>,
@@ -152,7 +153,7 @@ impl Reference {
         (quiet && !changed) || self.write_more(head, inputs, done, to)
     }
 
-    /// Returns the motion, if each node that is expected has answered, in order.
+    /// Returns the motion if each expected node has answered, in order.
     #[inline]
     fn ordered(&self, bus: &[Frame]) -> Option<Answers> {
         if bus.len() != usize::from(self.expected) {
@@ -160,7 +161,7 @@ impl Reference {
         }
         let mut answers = Answers { positions: [0; JOINTS], rates: [0; JOINTS], ways: 0, far: 0, changed: 0 };
         let mut misplaced = 0;
-        // Without a jump for each: what differs is collected.
+        // Differences are collected without a branch for each value.
         let nodes = bus.iter().zip(self.len.iter().zip(&self.words)).zip(id::MOVE_ANSWER..);
         for (n, ((frame, (len, before)), id)) in nodes.enumerate() {
             let now = words(frame);
@@ -183,7 +184,7 @@ impl Reference {
         (misplaced == 0).then_some(answers)
     }
 
-    /// Writes the inputs of a tick besides motion, as its first word says.
+    /// Writes all inputs of a tick except the motion, as the first word announces.
     #[inline(never)]
     fn write_more<P, const N: usize>(
         &mut self,
@@ -238,14 +239,14 @@ impl Reference {
         self.expect(answers);
     }
 
-    /// Sets the nodes that are expected from now on.
+    /// Sets the nodes that are expected to answer.
     pub(super) fn expect(&mut self, answers: u32) {
         if answers == 0x3F || answers == 0x7F {
             self.expected = answers.count_ones() as u8;
         }
     }
 
-    /// Writes an answer of node `n` to a Move, of the length that is known.
+    /// Writes an answer of node `n` to a Move. Its length is already known.
     fn write_answer<S: BitSink>(&mut self, n: usize, frame: &Frame, to: &mut S) {
         let Some(before) = self.words.get_mut(n) else { return };
         let now = words(frame);
@@ -256,7 +257,7 @@ impl Reference {
         }
     }
 
-    /// Writes the inputs that are not as usual, except the joint bus.
+    /// Writes all unusual inputs except those of the joint bus.
     #[inline(never)]
     fn write_rest<S: BitSink>(&mut self, inputs: &Inputs<'_>, done: usize, to: &mut S) -> bool {
         to.put(inputs.safety_input.into(), 1);
@@ -273,7 +274,7 @@ impl Reference {
                 to.put(count.into(), 8);
             }
         }
-        // Events that were done, and the event that was worked on or had no turn; as many as there is room for.
+        // Events that were done, and the next event, which was worked on or has waited; at most as many as fit.
         let looked_at = inputs.host.get(..done + 1).unwrap_or(inputs.host);
         let left = looked_at.iter().take(EVENTS_MAX).position(|event| !self.allows(event));
         let count = left.unwrap_or(looked_at.len().min(EVENTS_MAX));
@@ -286,7 +287,7 @@ impl Reference {
         whole
     }
 
-    /// Takes what an event needs off the allowance, if there is as much.
+    /// Subtracts the bytes of an event from the allowance. Returns `false` if the allowance is too small.
     fn allows(&mut self, event: &HostEvent<'_>) -> bool {
         let bytes = match event.event {
             LinkEvent::Frame(frame) if has_bytes(frame) => EVENT_BYTES + frame.bytes.len() as u16,
@@ -297,7 +298,7 @@ impl Reference {
         rest.is_some()
     }
 
-    /// Writes one event; returns `false` if its bytes were left out.
+    /// Writes one event. Returns `false` if its bytes were omitted.
     fn write_event<S: BitSink>(&self, event: &HostEvent<'_>, to: &mut S) -> bool {
         to.put(event.line.min(3) as u32, 2);
         to.put(event.overtaken.into(), 1);
@@ -313,7 +314,7 @@ impl Reference {
                         to.put((*byte).into(), 8);
                     }
                 } else {
-                    // In Operate all that counts of a segment is whether it begins an upload (J-30).
+                    // In Operate, the only effect of a segment is that segment 0 begins an upload (J-30).
                     to.put(begins_upload(frame).into(), 1);
                 }
                 return fits;
@@ -334,13 +335,13 @@ fn begins_upload(frame: FrameRef<'_>) -> bool {
         && Segment::parse(frame.body()).is_some_and(|segment| segment.segment == 0)
 }
 
-/// Returns `true` if the frame is recorded with its bytes. Parameters change the arm, at any length: a snapshot after them says which arm
-/// it is.
+/// Returns `true` if the bytes of the frame are recorded. Bytes of parameters are never recorded: parameters change the arm, and the
+/// snapshot after them identifies the arm.
 fn has_bytes(frame: FrameRef<'_>) -> bool {
     frame.bytes.len() <= HOST_BYTES && !changes_arm(frame.frame_type)
 }
 
-/// Returns `true` for frames that change the parameters, which a log has by hash only.
+/// Returns `true` for frames that change the parameters. A log contains only the hash of the parameters.
 fn changes_arm(frame_type: FrameType) -> bool {
     use FrameType::*;
     frame_type.is_default() || matches!(frame_type, FrictionTable | PidParam | ArmModel | FrictionPolynomial)

@@ -1,4 +1,4 @@
-//! The memory of the flight recorder: a ring of blocks that stay readable wherever a reset cuts the writing (J-56).
+//! The memory of the flight recorder: a ring of blocks that stay readable even if a reset interrupts the writing (J-56).
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use jtc_wire::LogState;
@@ -7,14 +7,14 @@ use super::block::{CLOSED, HEAD, MAGIC, NONE, Whole, commit, doubled, flags, hea
 use super::{BLOCK_WORDS, Block};
 use crate::remembered::BitSink;
 
-/// Place of a block.
+/// Position of a block in the memory.
 #[derive(Clone, Copy, Debug, Default)]
 struct Place {
     piece: usize,
     block: usize,
 }
 
-/// Memory in one or more pieces, as one ring.
+/// Memory in one or more pieces, used as one ring.
 pub(super) struct Ring<P, const N: usize> {
     pieces: [P; N],
 }
@@ -24,7 +24,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         self.pieces.iter().map(|piece| piece.as_ref().len() as u32).sum()
     }
 
-    /// Returns the block of this number.
+    /// Returns the block with this number.
     fn block(&self, sequence: u32) -> Option<&Block> {
         let mut at = sequence.checked_rem(self.len())? as usize;
         for piece in &self.pieces {
@@ -36,7 +36,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         None
     }
 
-    /// Returns the place of the block of this number: its piece, and its place in that piece.
+    /// Returns the position of the block with this number: its piece, and its index in that piece.
     fn place(&self, sequence: u32) -> Place {
         let mut at = sequence.checked_rem(self.len()).unwrap_or(0) as usize;
         for (piece, blocks) in self.pieces.iter().enumerate() {
@@ -54,21 +54,21 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
         self.pieces.get_mut(place.piece)?.as_mut().get_mut(place.block)
     }
 
-    /// Returns the block of this number, if it is there and whole.
+    /// Returns the block with this number if it exists and is valid.
     fn whole(&self, sequence: u32) -> Option<Whole<'_>> {
         self.block(sequence).and_then(Whole::parse).filter(|whole| whole.sequence == sequence)
     }
 
     /// Returns the newest block.
     fn newest(&self) -> Option<u32> {
-        // By their heads first: the memory is slow, and drives wait for the first frame after a reset.
+        // The heads are searched first, because the memory is slow and the drives wait for the first frame after a reset.
         let mut below = None;
         for _ in 0..self.len() {
             let blocks = self.pieces.iter().flat_map(|piece| piece.as_ref());
             let numbers =
                 blocks.filter(|block| block[head::MAGIC] == MAGIC).map(|block| block[head::SEQUENCE]);
             let next = numbers.filter(|number| below.is_none_or(|below| *number < below)).max()?;
-            // In its place: others are left from memory of another size.
+            // The block must also be at its position. Other blocks may be left from memory of another size.
             if self.whole(next).is_some() {
                 return Some(next);
             }
@@ -87,15 +87,15 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Ring<P, N> {
 /// Writes bits into the ring.
 pub(super) struct Writer<P, const N: usize> {
     ring: Ring<P, N>,
-    /// Number of the open block; `None` before the first.
+    /// Number of the open block; `None` before the first block.
     open: Option<u32>,
-    /// Place of the open block.
+    /// Position of the open block.
     place: Place,
     /// Number of the next block.
     next: u32,
     /// The head of the open block has been written.
     begun: bool,
-    /// Word of the open block that is filled next, with `fill` bits of it in `rest`.
+    /// Index of the word that is filled next; `rest` contains its first `fill` bits.
     word: usize,
     rest: u32,
     fill: u32,
@@ -107,7 +107,7 @@ pub(super) struct Writer<P, const N: usize> {
 }
 
 impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
-    /// Creates a writer, for any content of the memory.
+    /// Creates a writer, whatever the memory contains.
     pub fn new(pieces: [P; N]) -> Self {
         let ring = Ring { pieces };
         let newest = ring.newest();
@@ -140,7 +140,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         &self.ring.pieces
     }
 
-    /// Returns the block of this number.
+    /// Returns the block with this number.
     pub fn block(&self, sequence: u32) -> Option<&Block> {
         self.ring.block(sequence)
     }
@@ -150,7 +150,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open.is_none()
     }
 
-    /// Forgets everything.
+    /// Discards all blocks.
     pub fn clear(&mut self) {
         self.ring.wipe();
         (self.open, self.state, self.powered) = (None, LogState::Recording, false);
@@ -161,8 +161,8 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.open_block();
     }
 
-    /// Marks the begin of a snapshot here. Until the snapshot is committed, the mark points past the committed bits, which hold no
-    /// snapshot.
+    /// Marks the start of a snapshot at the present position. Until the snapshot is committed, the mark points past the committed bits and
+    /// is not used.
     pub fn mark_snapshot(&mut self) {
         if !self.marked {
             self.marked = true;
@@ -184,7 +184,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Returns the number of bits of the open block.
+    /// Returns the number of bits in the open block.
     fn bits(&self) -> u32 {
         ((self.word - HEAD) * 32) as u32 + self.fill
     }
@@ -206,7 +206,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         self.hash = mix(MAGIC, sequence);
     }
 
-    /// Commits everything that was put.
+    /// Commits all bits that have been written.
     #[inline]
     pub fn commit(&mut self) {
         let (rest, bits, hash, word) = (self.rest, self.bits(), self.hash, self.word);
@@ -224,13 +224,13 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Ends the log here, for this reason.
+    /// Ends the log for this reason.
     pub fn freeze(&mut self, state: LogState) {
         self.state = state;
         self.set_head(head::FLAGS, doubled(flags(state, self.powered)));
     }
 
-    /// Returns the numbers of the oldest block and of the block after the newest.
+    /// Returns the number of the oldest block, and the number after the newest block.
     pub fn range(&self) -> (u32, u32) {
         let Some(newest) = self.open else { return (self.next, self.next) };
         let mut oldest = newest;
@@ -244,7 +244,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         (oldest, newest.wrapping_add(1))
     }
 
-    /// Reads bytes of a block from `offset` on, little-endian words; returns the number of bytes.
+    /// Reads bytes of a block from `offset` on, as little-endian words. Returns the number of bytes that were read.
     pub fn read(&self, sequence: u32, offset: usize, out: &mut [u8]) -> usize {
         let Some(block) = self.ring.block(sequence).filter(|block| in_place(block, sequence)) else {
             return 0;
@@ -258,7 +258,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         read
     }
 
-    /// Fills up the present word: the next data begins at a whole word.
+    /// Fills up the present word, so that the next data begins at a whole word.
     pub fn align(&mut self) {
         if self.fill != 0 {
             let word = core::mem::take(&mut self.rest);
@@ -267,7 +267,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Appends whole words after whole words, in one block.
+    /// Appends whole words to whole words, within one block.
     #[inline]
     pub fn append<const K: usize>(&mut self, words: [u32; K]) {
         if self.word + K > BLOCK_WORDS {
@@ -285,7 +285,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
         }
     }
 
-    /// Writes a full word; the bits in `rest` and `fill` follow it.
+    /// Writes a full word. The bits in `rest` and `fill` follow it.
     #[inline]
     fn full(&mut self, word: u32) {
         if let Some(place) = self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word)) {
@@ -304,7 +304,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> Writer<P, N> {
     #[cold]
     #[inline(never)]
     fn next_block(&mut self) {
-        // The bits so far count as they are: their end may be in the middle of a tick, whose rest follows.
+        // The bits so far are committed, even if they end in the middle of a tick. The rest of the tick follows in the next block.
         self.commit();
         self.set_head(head::FLAGS, doubled(flags(self.state, self.powered) | CLOSED));
         self.open_block();
@@ -321,7 +321,7 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
             return;
         }
         let word = self.rest;
-        // Bits that did not fit; none if all of them did.
+        // Bits that did not fit, if any.
         let used = 32 - self.fill;
         (self.rest, self.fill) = (value.checked_shr(used).unwrap_or(0), fill - 32);
         self.full(word);
@@ -332,12 +332,12 @@ impl<P: AsRef<[Block]> + AsMut<[Block]>, const N: usize> BitSink for Writer<P, N
         let fill = self.fill;
         if value != 0 {
             let (low, high) = (value as u32, (value >> 32) as u32);
-            // After a bit that is set: 65 bits.
+            // A set bit and the 64 bits of the value: 65 bits.
             let (a, b, c) = (low << 1 | 1, low >> 31 | high << 1, high >> 31);
             let over = |word: u32| (word >> 1) >> (31 - fill);
             let words = [self.rest | a << fill, over(a) | b << fill];
             self.rest = over(b) | c << fill;
-            // Two words at once if neither is the last of the block.
+            // Writes two words at once, unless one of them is the last word of the block.
             let place =
                 self.ring.at_mut(self.place).and_then(|block| block.get_mut(self.word..BLOCK_WORDS - 1));
             match place.and_then(|place| place.first_chunk_mut()) {

@@ -1,13 +1,13 @@
-//! The bits of blocks that follow each other, read back.
+//! Reads back the bits of consecutive blocks.
 use super::Block;
 use super::block::Whole;
 use crate::remembered::BitSource;
 
-/// Reads the bits of blocks that follow each other.
+/// Reader of the bits of consecutive blocks.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reader<'a> {
     blocks: &'a [Block],
-    /// Block in the list, and bit in it.
+    /// Index of the block in the list, and of the bit in the block.
     block: usize,
     bit: u32,
     current: Option<Whole<'a>>,
@@ -15,7 +15,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Reads from bit `bit` of the first of `blocks` on.
+    /// Creates a reader that begins at bit `bit` of the first of `blocks`.
     pub fn new(blocks: &'a [Block], bit: u32) -> Self {
         let current = blocks.first().and_then(Whole::parse);
         Self { blocks, block: 0, bit, current, damaged: false }
@@ -26,23 +26,23 @@ impl<'a> Reader<'a> {
         self.bit = self.bit.next_multiple_of(32);
     }
 
-    /// Returns the next bit, which is read once more.
+    /// Returns the next bit without consuming it.
     pub fn peek(&self) -> bool {
         self.clone().take(1) != 0
     }
 
-    /// Returns the block in the list that is read.
+    /// Returns the index of the present block in the list.
     pub fn block(&self) -> usize {
         self.block
     }
 
-    /// Returns `true` if nothing is left, or the next bits are in a block that does not follow.
+    /// Returns `true` if no bits are left, or the next block does not continue this one.
     pub fn at_end(&mut self) -> bool {
         self.advance();
         self.current.is_none_or(|whole| self.bit >= whole.bits)
     }
 
-    /// Moves to the next block if this one is used up and another follows.
+    /// Moves to the next block if this one is used up and the next one continues it.
     fn advance(&mut self) {
         let Some(whole) = self.current else { return };
         if self.bit < whole.bits || !whole.closed {

@@ -1,4 +1,4 @@
-//! The inputs of a tick as a log gives them back.
+//! The inputs of a tick as they are read from a log.
 use jtc_bus::{Frame, MAX_LEN, id};
 use jtc_wire::{
     EVENTS_MAX, FrameRef, FrameStatus, FrameType, LinkEvent, Response, UrgentCommand, UrgentCommands,
@@ -12,7 +12,7 @@ use crate::nodes::FRAMES_MAX;
 use crate::remembered::BitSource;
 use crate::response_queue::HOST_LINES;
 
-/// An event of a host as it was recorded.
+/// Recorded event of a host.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedEvent {
     /// Line.
@@ -21,7 +21,7 @@ pub struct RecordedEvent {
     pub overtaken: bool,
     /// The event came on a plain line (J-51).
     pub plain: bool,
-    /// Type byte, 0 if unknown.
+    /// Type byte; 0 if it was not known.
     pub frame_type: u8,
     /// Kind of the event.
     pub kind: RecordedKind,
@@ -31,17 +31,17 @@ pub struct RecordedEvent {
     len: usize,
 }
 
-/// A Trajectory frame of segment 0 without points.
+/// The body of a Trajectory frame with segment 0 and no points.
 const EMPTY_SEGMENT: &[u8] = &[0; 14];
 
 /// Kinds of [`RecordedEvent`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RecordedKind {
-    /// A good frame with its bytes.
+    /// A valid frame with its bytes.
     Frame,
-    /// A good frame whose bytes are not in the log: too long, too many, or parameters.
+    /// A valid frame whose bytes are not in the log, because it is too long, there were too many frames, or it contains parameters.
     Unrecorded,
-    /// A bad frame, and its status.
+    /// A damaged frame, and its status.
     Bad(FrameStatus),
     /// Noise, and its status.
     Noise(FrameStatus),
@@ -64,8 +64,8 @@ impl RecordedEvent {
         self.bytes.get(..self.len).unwrap_or(&[])
     }
 
-    /// Returns the event as the controller gets it. In place of a frame that was not recorded: one that changes nothing; of segment 0 of a
-    /// trajectory, one without points, which does in Operate what any segment 0 does (J-30).
+    /// Returns the event as an input of the controller. A frame that was not recorded is replaced by one that changes nothing. Segment 0 of
+    /// a trajectory is replaced by a segment without points, which has the effect of any segment 0 in Operate (J-30).
     pub fn event(&self) -> HostEvent<'_> {
         let event = match (self.kind, FrameType::from_byte(self.frame_type)) {
             (RecordedKind::Bad(status), _) => LinkEvent::Bad(Response::bad(self.frame_type, status, 0)),
@@ -106,16 +106,16 @@ impl RecordedEvent {
     }
 }
 
-/// The inputs of a tick as they were recorded.
+/// Recorded inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedInputs {
     /// State of the joint bus.
     pub bus_state: BusState,
     /// Level of the safety input.
     pub safety_input: bool,
-    /// Ticks that did not come before this one.
+    /// Ticks before this one that were missed.
     pub missed_ticks: u16,
-    /// Stop and Pause that arrived.
+    /// Stop and Pause commands that arrived.
     pub urgent: [UrgentCommands; HOST_LINES],
     /// The lines could take a status.
     pub status_free: bool,
@@ -136,12 +136,12 @@ impl RecordedInputs {
         self.host.get(..self.host_len).unwrap_or(&[])
     }
 
-    /// Returns `true` if every input is there: a replay of this tick does what the controller did.
+    /// Returns `true` if the log contains every input, so that a replay of this tick has the same result.
     pub fn is_whole(&self) -> bool {
         !self.left_out && self.host().iter().all(|event| event.kind != RecordedKind::Unrecorded)
     }
 
-    /// Reads a tick, and the check of its outputs.
+    /// Reads a tick and the check of its outputs.
     pub(super) fn read(reference: &mut Reference, from: &mut Reader<'_>) -> (Self, u16) {
         let head = from.take(32);
         let mut inputs = Self {
@@ -192,9 +192,9 @@ impl RecordedInputs {
     }
 }
 
-/// Form in which positions were written.
+/// Form of the recorded positions.
 enum Way {
-    /// Ways of all joints.
+    /// Distances of all joints.
     Moved(u32),
     /// Position of each joint.
     Far([u32; JOINTS]),
@@ -214,7 +214,7 @@ impl Motion {
         Self { rates, way }
     }
 
-    /// Returns the position of joint `n`, which was at `before`.
+    /// Returns the position of joint `n`, which was at `before` in the last tick.
     fn position(&self, n: usize, before: u32) -> u32 {
         match &self.way {
             Way::Moved(ways) => moved(n, before, *ways),
@@ -279,7 +279,7 @@ impl Reference {
     }
 }
 
-/// Reads an answer that has changed; words that have not changed stay as they were.
+/// Reads an answer that has changed. Words that have not changed keep their values.
 fn read_words<S: BitSource>(words: &mut Words, from: &mut S) {
     if from.take(1) != 0 {
         for word in words {

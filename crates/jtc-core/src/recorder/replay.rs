@@ -1,4 +1,4 @@
-//! A log read back, and run through the controller again.
+//! Reads a log and replays it through the controller.
 use jtc_bus::Frame;
 use jtc_wire::{EVENTS_MAX, FrameType, IMAGE_MAX, LogState, RawPoint};
 
@@ -15,13 +15,13 @@ use crate::remembered::{BitSink, BitSource, Remembered};
 use crate::telemetry::Telemetry;
 
 /// A record of a log.
-// A snapshot is large, and there are few.
+// A snapshot is large, but there are few of them.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug)]
 pub enum Record {
-    /// The state after the tick before.
+    /// The state after the previous tick.
     Snapshot(Snapshot),
-    /// A tick.
+    /// One tick.
     Tick {
         /// Inputs of the tick.
         inputs: RecordedInputs,
@@ -30,24 +30,24 @@ pub enum Record {
     },
 }
 
-/// A log: blocks in the order of their numbers. Reading is total: for any content of the blocks, it gives the records of those that are
-/// whole, from the first snapshot on.
+/// A log: blocks in the order of their numbers. Reading never fails: whatever the blocks contain, it returns the records of the valid ones,
+/// from the first snapshot on.
 #[derive(Clone, Debug)]
 pub struct Log<'a> {
     blocks: &'a [Block],
-    /// Block from which on the next snapshot is looked for.
+    /// Index of the block from which on the next snapshot is searched.
     next: usize,
     reader: Option<Reader<'a>>,
     reference: Reference,
 }
 
 impl<'a> Log<'a> {
-    /// Reads from the oldest block on.
+    /// Creates a log that is read from the oldest block on.
     pub fn new(blocks: &'a [Block]) -> Self {
         Self { blocks, next: 0, reader: None, reference: Reference::default() }
     }
 
-    /// Returns the number of the newest block and its state, which says why the log ends; `None` if no block is whole.
+    /// Returns the number of the newest block and its state, which shows why the log ends; `None` if no block is valid.
     pub fn end(&self) -> Option<(u32, LogState)> {
         self.blocks.iter().rev().find_map(Whole::parse).map(|whole| (whole.sequence, whole.state))
     }
@@ -75,7 +75,7 @@ impl Iterator for Log<'_> {
             };
             let before = reader.block();
             if reader.at_end() {
-                // Blocks may be missing here, or recording was paused: the replay continues with a snapshot.
+                // Blocks may be missing here, or recording was paused. The replay continues at the next snapshot.
                 continue;
             }
             let record = if reader.peek() {
@@ -98,38 +98,39 @@ impl Iterator for Log<'_> {
     }
 }
 
-/// Comparison of a tick of a replay with the log.
+/// Result of comparing a replayed tick with the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// The outputs are those of the log.
+    /// The outputs are equal to those in the log.
     Same,
-    /// The outputs differ from those of the log.
+    /// The outputs differ from those in the log.
     Differs,
-    /// The outputs may differ, until the next snapshot, for this reason.
+    /// For this reason, the outputs may differ until the next snapshot.
     Unsure(Unsure),
 }
 
 /// Reason why a replay may differ from the recorded ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsure {
-    /// An input is not in the log: a long frame, parameters, more frames than it has room for, or the memory that a StoreArm is for.
+    /// An input is not in the log: a long frame, parameters, or more frames than fit. Or a StoreArm depends on memory that the replay does
+    /// not have.
     Input,
-    /// The arm is not the one of that time.
+    /// The arm is not the recorded one.
     Arm,
-    /// The points of the trajectory of that time are not known.
+    /// The points of the recorded trajectory are not known.
     Points,
-    /// No snapshot came yet.
+    /// There has been no snapshot yet.
     NoSnapshot,
 }
 
-/// A tick of a replay.
+/// One tick of a replay.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
     /// Everything that the controller computed.
     pub telemetry: Telemetry,
-    /// Starts of the device.
+    /// Number of starts of the device.
     pub boots: u32,
-    /// Inputs; `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
+    /// Inputs. `None` for a snapshot, which is the state after a tick whose inputs are not in the log.
     pub inputs: Option<RecordedInputs>,
     /// Outputs; `None` for a snapshot.
     pub outputs: Option<Outputs>,
@@ -137,40 +138,40 @@ pub struct Step {
     pub outcome: Outcome,
 }
 
-/// Runs a log through a controller, which has the arm of that time and the points of its trajectory.
+/// Replays a log through a controller that has the recorded arm and the points of its trajectory.
 pub struct Replay<'a, M> {
     log: Log<'a>,
     controller: Controller<M>,
-    /// The last snapshot was restored; `None` before the first.
+    /// Starts of the device in the last snapshot that was restored; `None` before the first.
     boots: Option<u32>,
     chain: u32,
     outcome: Outcome,
-    /// An input is not in the log, but the outputs are still the same.
+    /// An input is not in the log, but the outputs have still been equal since then.
     follows: bool,
     arm: Option<u64>,
     points_hash: Option<u32>,
 }
 
 impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
-    /// Creates a replay of this log, by a controller that has an arm and, in its memory, the points of this hash.
+    /// Creates a replay of this log. The controller has an arm, and its memory contains the points with this hash.
     pub fn new(log: Log<'a>, mut controller: Controller<M>, points_hash: Option<u32>) -> Self {
-        // In many more parts than an image has.
+        // The limit is far above the number of parts of an image.
         for _ in 0..IMAGE_MAX {
             controller.hash_arm();
         }
         let arm = controller.extensions.hash;
-        // The controller takes the requests that a device with a recorder has taken.
+        // The replay accepts the requests that a device with a recorder has accepted.
         controller.extensions.log = LogState::Recording;
         let outcome = Outcome::Unsure(Unsure::NoSnapshot);
         Self { log, controller, boots: None, chain: 0, outcome, follows: false, arm, points_hash }
     }
 
-    /// Returns `true` if the points of this hash are in memory.
+    /// Returns `true` if the memory contains the points with this hash.
     fn knows(&self, points_hash: u32) -> bool {
         self.points_hash == Some(points_hash)
     }
 
-    /// Returns the outcome of a replay from this snapshot on.
+    /// Returns the outcome that a replay from this snapshot on can have.
     fn worth(&self, snapshot: &Snapshot) -> Outcome {
         let Origin { arm, points_hash, .. } = snapshot.origin;
         if arm != self.arm {
@@ -192,7 +193,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         &self.controller
     }
 
-    /// Takes a snapshot. A difference in the state stays until a snapshot corrects it.
+    /// Processes a snapshot. A difference in the state is reported at the snapshot, which also corrects it.
     fn snapshot(&mut self, snapshot: &Snapshot) -> Option<Step> {
         let follows = self.boots == Some(snapshot.origin.boots)
             && self.controller.observed.tick == snapshot.tick()
@@ -212,7 +213,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         (self.outcome, self.follows) = (self.worth(snapshot), false);
         (self.boots, self.chain) = (Some(snapshot.origin.boots), 0);
         let outcome = if follows { Outcome::Differs } else { self.outcome };
-        // A tick that was replayed has been seen already.
+        // If the tick has already been replayed, it is not returned again.
         (next || follows).then(|| self.step(None, None, outcome))
     }
 
@@ -257,7 +258,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         self.chain = chain(self.chain, &self.controller, self.controller.errors.word(), &outputs);
         let executes = |event: &RecordedEvent| event.frame_type == FrameType::TrajSetExecStatus as u8;
         let same = check(self.chain) == recorded_check;
-        // A replay has no memory that lasts: a device that has one takes some ticks for a StoreArm which is refused here at once.
+        // A replay has no permanent memory. A device with such memory takes some ticks for a StoreArm, which is refused at once here.
         let stores = |event: &RecordedEvent| event.frame_type == FrameType::StoreArm as u8;
         let repeatable = recorded.is_whole() && !recorded.host().iter().any(stores);
         if !repeatable && self.outcome == Outcome::Same {
@@ -271,7 +272,7 @@ impl<'a, M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Replay<'a, M> {
         } else if self.outcome == Outcome::Same && !same {
             self.outcome = Outcome::Differs;
         }
-        // A missing input may have changed nothing: as long as the outputs are the same, it has not.
+        // A missing input may have changed nothing. This is assumed as long as the outputs are equal.
         self.follows &= same && self.outcome == Outcome::Unsure(Unsure::Input);
         let outcome = if self.follows { Outcome::Same } else { self.outcome };
         self.step(Some(*recorded), Some(outputs), outcome)
@@ -295,13 +296,13 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Iterator for Replay<'_, M> {
     }
 }
 
-/// Fills the places that hold no frame.
+/// Placeholder for positions without a frame.
 const NO_FRAME: Frame = match Frame::new(0, &[]) {
     Some(frame) => frame,
     None => unreachable!(),
 };
 
-/// Fills the places that hold no event.
+/// Placeholder for positions without an event.
 const NO_EVENT: HostEvent<'_> = HostEvent {
     line: 0,
     overtaken: false,
@@ -309,7 +310,7 @@ const NO_EVENT: HostEvent<'_> = HostEvent {
     event: jtc_wire::LinkEvent::Noise(jtc_wire::Response::NONE),
 };
 
-/// Bits compared by what they come to.
+/// Digest of bits, for comparing two states.
 #[derive(Default, PartialEq)]
 struct Digest {
     hash: u64,

@@ -1,8 +1,8 @@
-//! The state of the controller in a snapshot: all values that decide how the arm moves and what the controller reports, without the arm and
-//! the points of the trajectory, which a log names by hash.
+//! The state of the controller in a snapshot: all values that affect the motion of the arm and the reports of the controller. The arm and
+//! the points of the trajectory are not included; a log identifies them by their hashes.
 //!
-//! The link's own bookkeeping (records that wait, frames to be sent, how far a long frame has been executed) is not part of it: a replay
-//! gives the same frames on the joint bus and the same states, not the same bytes on the lines.
+//! The state of the host link (waiting records, frames to send, progress of a long frame) is not included. A replay gives the same frames
+//! on the joint bus and the same states, but not the same bytes on the host lines.
 use jtc_dynamics::Payload;
 use jtc_wire::RawPoint;
 
@@ -24,7 +24,7 @@ use crate::store::StoreState;
 use crate::telemetry::Observed;
 use crate::{ControllerState, JOINTS, TrajectoryState};
 
-/// Log, device and arm of a snapshot.
+/// Identity of the device, the arm and the trajectory of a snapshot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Origin {
     /// Starts of the device.
@@ -33,9 +33,9 @@ pub struct Origin {
     pub firmware: u64,
     /// Hash of the arm in use (J-52); `None` if it was not known yet.
     pub arm: Option<u64>,
-    /// Gains, model and friction polynomial are the built-in ones: these have more digits than the arm image carries.
+    /// Gains, model and friction polynomial are the built-in ones. These have more digits than an arm image contains.
     pub built_in: [bool; 3],
-    /// Hash of the points of the trajectory in memory, and how many there are.
+    /// Hash of the points of the trajectory in memory.
     pub points_hash: u32,
     /// Number of those points.
     pub points: u32,
@@ -68,7 +68,7 @@ impl LiveSettings {
     }
 }
 
-/// The state itself.
+/// The state of the controller.
 #[derive(Clone, Debug)]
 pub(crate) struct Dynamic {
     state: ControllerState,
@@ -120,10 +120,10 @@ remembered!(Dynamic {
     jogs_refused_ms,
 });
 
-/// The controller after a tick, as a log has it.
+/// Snapshot: the state of the controller after a tick, as recorded in a log.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Log, device and arm of the snapshot.
+    /// Identity of the device, the arm and the trajectory.
     pub origin: Origin,
     pub(crate) dynamic: Dynamic,
 }
@@ -141,7 +141,7 @@ impl Snapshot {
         self.dynamic.state
     }
 
-    /// Returns the time since the first point along the path, ms, and the ms between points.
+    /// Returns the path time since the first point, ms, and the time between points, ms.
     pub fn path_ms(&self) -> (f64, u16) {
         (self.dynamic.clock.time, self.dynamic.store.step_ms())
     }
@@ -153,7 +153,7 @@ impl Snapshot {
 }
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Returns the log, device and arm of a snapshot.
+    /// Returns the identity of the device, the arm and the trajectory.
     pub(crate) fn origin(&self) -> Origin {
         let (points_hash, points) = self.store.points_hash();
         Origin {
@@ -168,7 +168,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
 
     /// Appends the state in the order of [`Dynamic`].
     pub(crate) fn write_state<S: BitSink>(&self, to: &mut S) {
-        // Every field is named: a new field needs a decision.
+        // Every field is listed, so that a new field needs a decision.
         let Self {
             config,
             state,
@@ -222,7 +222,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         extensions.jogs_refused_ms.write(to);
     }
 
-    /// Goes on from a snapshot: this controller has the arm of that time and, if it executes a trajectory, that trajectory.
+    /// Continues from a snapshot. This controller must have the recorded arm and, if the snapshot executes a trajectory, that trajectory.
     pub fn restore(&mut self, snapshot: &Snapshot) {
         let Dynamic {
             state,
@@ -273,7 +273,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.store.held_points(0)
     }
 
-    /// Puts points of a trajectory from number `first` on into the memory of a controller that replays a log.
+    /// Copies points of a trajectory, from number `first` on, into the memory of a controller that replays a log.
     pub fn put_points(&mut self, first: usize, points: &[RawPoint]) {
         self.store.put_points(first, points);
     }
@@ -288,7 +288,7 @@ mod tests {
     use crate::remembered::tests::Bits;
     use crate::settings::{self, TABLE};
 
-    /// Each setting that the hash of the arm does not name is in the snapshot.
+    /// Each setting that is not covered by the hash of the arm is in the snapshot.
     #[test]
     fn j56_every_setting_that_is_no_part_of_the_arm_is_remembered() {
         let points = || [RawPoint::default(); 4];

@@ -1,4 +1,4 @@
-//! Any frames on the bus are read back unchanged.
+//! Whatever frames the bus carries, they are read back unchanged.
 extern crate std;
 use std::vec;
 use std::vec::Vec;
@@ -18,11 +18,11 @@ use crate::io::Inputs;
 enum Change {
     /// Each joint moves a little.
     Motion(Vec<(i32, i16, i16)>),
-    /// A byte of an answer is another.
+    /// A byte of an answer changes.
     Byte { node: usize, at: usize, to: u8 },
-    /// A node answers with this number of bytes, or not at all.
+    /// A node answers with this number of bytes, or does not answer.
     Length { node: usize, len: usize },
-    /// Two answers come in the other order.
+    /// Two answers change places.
     Swap { first: usize, second: usize },
     /// A frame that is not an answer to a Move comes first.
     Other { id: u16, len: usize },
@@ -45,7 +45,7 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-/// The frames of each tick.
+/// Returns the frames of each tick.
 fn ticks(changes: &[Change]) -> Vec<Vec<Frame>> {
     let mut answers = [[0u8; 24]; NODES];
     let mut lengths = [16; NODES];

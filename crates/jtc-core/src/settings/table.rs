@@ -1,10 +1,10 @@
-//! The table of settings: number on the wire, name, unit, range, meaning, and place of each (J-53). Docs, arm files and `jtc arm show` are
-//! made from it. No number is used a second time: 59 to 63 belonged to an earlier Teaching.
+//! The table of settings (J-53): number in the wire format, name, unit, range, meaning, and field of each. Docs, arm files and `jtc arm
+//! show` are generated from it. A number is never used again: 59 to 63 belonged to an earlier Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 
-/// Declares the table, and how a value is read and written: matches, because a table of functions would be calls that nobody can
-/// follow before they run.
+/// Declares the table and the functions that read and write a value. The functions use `match`, because calls through a table of functions
+/// cannot be analysed before they run.
 macro_rules! settings {
     ($($kind:ident $number:literal $name:literal [$unit:literal] $low:literal..=$high:literal $live:ident $meaning:literal ($($place:tt)+);)+) => {
         /// Every setting, in the order of the numbers.

@@ -35,12 +35,12 @@ fn j53_numbers_and_names_are_unique_and_in_order() {
         assert_eq!(named(row.name).map(|found| found.number), Some(row.number));
         assert!(!row.meaning.is_empty() && row.low < row.high);
         assert_eq!(row.of_joint(), row.number < 32, "{}", row.name);
-        // A whole number is exact as it is set.
+        // Whole numbers are stored without rounding.
         assert!(!row.whole || (row.low >= 0.0 && row.high <= 65_535.0), "{}", row.name);
     }
 }
 
-/// Every field of the configuration is in the table: there are as many values as numbers in it.
+/// Every field of the configuration is in the table: the table has as many values as the configuration has numbers.
 #[test]
 fn j53_every_field_has_a_row() {
     let text = std::format!("{:?}", Config::avena());
@@ -83,14 +83,14 @@ fn j53_what_is_out_of_range_is_refused_and_named() {
         }
     }
     assert_eq!(set(200, 0, 1.0), Err(SettingError::Unknown { setting: 200, joint: 0 }));
-    // Together they are not valid for any arm.
+    // These values are not valid together.
     assert!(matches!(set(1, 1, 2.98), Err(SettingError::Config(ConfigError::Range { joint: 1, .. }))));
     assert!(matches!(set(8, 2, 9.0), Err(SettingError::Config(ConfigError::TorqueScale { joint: 2, .. }))));
     assert!(matches!(set(3, 4, 5.0), Err(SettingError::Config(ConfigError::SpeedScale { joint: 4, .. }))));
 }
 
 proptest! {
-    /// Settings that are taken make a configuration that passes its check, and read back as they were set.
+    /// If settings are accepted, the configuration passes its check, and the settings read back unchanged.
     #[test]
     fn j53_what_is_taken_reads_back(
         changes in prop::collection::vec((0usize..200, 0.0..1.0f64), 1..20),

@@ -1,4 +1,4 @@
-//! The state machine under all its conditions, and its diagram in docs/protocol-jtc.md.
+//! The state machine under all conditions, and its diagram in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -19,7 +19,7 @@ const STATES: [ControllerState; 6] = [
     ControllerState::Error,
 ];
 
-/// A condition, and its names in the diagram if it holds and if it does not.
+/// A condition, and the texts in the diagram for the cases that it holds and that it does not hold.
 type Named = (fn(&Conditions) -> bool, &'static str, &'static str);
 const NAMES: [Named; 6] = [
     (|c| c.error, "an error", "errors cleared"),
@@ -44,7 +44,7 @@ fn all_conditions() -> impl Iterator<Item = Conditions> {
     })
 }
 
-/// Returns the conditions of teaching and of a loaded trajectory after the host sends this in a state that HoldPos has changed into.
+/// Returns the conditions after the host has sent this frame in a state that followed HoldPos, while a trajectory was loaded.
 fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditions {
     let mut controller = Controller::new(Config::avena(), [RawPoint::default(); 4]);
     controller.state = ControllerState::HoldPos;
@@ -63,9 +63,9 @@ fn sent(state: ControllerState, frame_type: FrameType, body: [u8; 4]) -> Conditi
     Conditions { teaching, execute, ..Conditions::default() }
 }
 
-/// Returns the conditions that a state can find: some need a command that the host sends and the state accepts.
+/// Returns the conditions that are possible in a state. Some of them need a command that the host sends and the state accepts.
 fn possible(state: ControllerState) -> Vec<Conditions> {
-    // The host is not served in Start, so that every parameter is missing.
+    // The host is not served in Start, so all parameters are missing there.
     let start = state == ControllerState::Start;
     let teaching = !start
         && (state == ControllerState::Teaching
@@ -78,8 +78,8 @@ fn possible(state: ControllerState) -> Vec<Conditions> {
         .collect()
 }
 
-/// Returns the conditions that an arrow needs: those that hold whenever the arrow is taken, except conditions that only keep a state away
-/// that comes before it in any case.
+/// Returns the conditions of an arrow: those that hold whenever the arrow is taken. Conditions that only exclude a state with higher
+/// priority are left out.
 fn label(from: ControllerState, to: ControllerState) -> Option<String> {
     let all = possible(from);
     let taken: Vec<_> = all.iter().filter(|c| next_state(from, c) == to).collect();
@@ -124,7 +124,7 @@ fn j20_the_diagram_is_what_the_code_does() {
     is_in_the_protocol("states", &diagram());
 }
 
-/// Under every condition, possible or not.
+/// Tests all combinations of conditions, possible or not.
 #[test]
 fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
     for (state, conditions) in STATES.iter().flat_map(|state| all_conditions().map(move |c| (*state, c))) {
@@ -142,7 +142,7 @@ fn j20_j21_torque_is_on_with_no_error_and_all_initialised_only() {
     }
 }
 
-/// The arm moves, or becomes compliant, from HoldPos only, and only on a command of the host.
+/// The arm begins to move or becomes compliant only from HoldPos, and only on a command of the host.
 #[test]
 fn j24_j25_no_state_but_holdpos_leads_to_motion_or_teaching() {
     for (from, conditions) in STATES.iter().flat_map(|from| possible(*from).into_iter().map(|c| (*from, c))) {

@@ -1,4 +1,4 @@
-//! Damping, dry friction, friction that is taken away, and the soft ends of one joint in Teaching.
+//! Damping, dry friction, friction compensation and soft ends of one joint in Teaching.
 use crate::DT;
 use crate::config::Config;
 use crate::interpolation::smooth;
@@ -7,84 +7,84 @@ use crate::remembered::remembered;
 use crate::soft_end;
 use crate::yielding::SPRING_RATE;
 
-/// Speed of a joint, rad/s, from which on its damping grows, and from which on it does not grow any more.
+/// Speeds of a joint between which its damping grows, rad/s.
 const FAST: (f64, f64) = (0.4, 0.8);
-/// Highest rate at which the damping reduces a speed, 1/s, of a joint whose others are free to move. Measured speeds are about 8 ms old;
-/// joints that move each other lower the damping that they bear.
+/// Highest rate at which the damping reduces the speed of a joint whose other joints are free to move, 1/s. Measured speeds are about 8 ms
+/// old. Joints that move each other tolerate less damping.
 pub(super) const DAMPING_RATE: f64 = 90.0;
-/// Speed, rad/s, at which the damping of a joint balances the load that it carries, if its inertia bears that much damping.
+/// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates so much damping.
 const SINKS: f64 = 0.5;
 /// Value to which the damping grows, as a multiple of the torque limit, s/rad.
 const GROWN: f64 = 1.0;
-/// Speeds, rad/s, between which a brake is added to the damping, and the deceleration of that brake, rad/s²: too little to turn a joint
-/// round before that is measured. Over-speed would release the arm.
+/// Speeds between which a brake is added to the damping, rad/s, and deceleration of that brake, rad/s². The brake is too weak to reverse a
+/// joint before that is measured. Without it, over-speed would release the arm.
 const BRAKES: (f64, f64) = (0.9, 1.7);
 const BRAKE: f64 = 60.0;
-/// Speed, rad/s, and share of the speed of its release (J-35) above which a joint is not taught any more but brought to rest.
+/// Speed above which a joint is no longer taught but brought to rest: in rad/s, and as a share of the over-speed threshold (J-35).
 const TOO_FAST: (f64, f64) = (1.4, 0.75);
-/// Time constant of the speed that is computed from positions, s: drives report a mean over 10 ms.
+/// Time constant of the speed that is computed from positions, s. Drives report a mean over 10 ms.
 const SPEED_S: f32 = 0.004;
-/// Share of a rotor inertia that counts: it may be a proposal that was not measured. If none is configured, it is that of the proposal: the
-/// torque limit over this acceleration, rad/s².
+/// Share of a rotor inertia that is relied on, because the value may be a proposal that was not measured. If none is configured, the
+/// proposal is the torque limit divided by `PROPOSED`, rad/s².
 const ROTOR: f64 = 0.2;
 const PROPOSED: f64 = 200.0;
 /// Part of the modelled friction that every joint has.
 const CERTAIN_FRICTION: f64 = 0.7;
-/// Part of the damping that the friction which is taken away may use up: that friction may not be there.
+/// Highest share of the damping that the friction compensation may cancel, because the friction may not exist.
 const USED_UP: f64 = 0.5;
-/// Time constant of the dry friction as it comes and goes, s.
+/// Time constant with which the dry friction fades in and out, s.
 const GRIP_S: f64 = 0.1;
-/// Speed below which a joint always stands, rad/s.
+/// Speed below which a joint is always considered at rest, rad/s.
 const STANDING: f64 = 0.01;
-/// Highest speed up to which the dry friction is whole, rad/s.
+/// Highest speed at which the full dry friction may act, rad/s.
 const SLOW: f64 = 0.3;
-/// Longest stretch of the spring that holds a standing joint, rad.
+/// Longest stretch of the spring that holds a joint at rest, rad.
 const STRETCH: f64 = 0.005;
-/// Speed around zero in which the sign of the friction that is taken away is smoothed, rad/s.
+/// Speed around zero in which the sign of the friction compensation is smoothed, rad/s.
 const SIGN_WIDTH: f64 = 0.1;
-/// Speed from which on less of the friction is taken away, rad/s, and from which on nothing.
+/// Speeds between which the friction compensation fades to zero, rad/s.
 const COMPENSATED: (f64, f64) = (0.3, 0.6);
-/// Missing answers after which first the springs go, then damping and friction, each within [`LETS_GO`] ticks.
+/// Number of missing answers after which the springs fade, followed by damping and friction compensation, each within [`LETS_GO`] ticks.
 const MISSING: u8 = 2;
 const LETS_GO: u8 = 5;
 
-/// Returns the speed, from positions, above which a joint ends Teaching, rad/s: a position controller stops a joint that a damper cannot
-/// stop, and over-speed would release the arm.
+/// Returns the speed, computed from positions, above which a joint ends Teaching, rad/s. The position controller can stop a joint that a
+/// damper cannot stop, before over-speed releases the arm.
 pub(crate) fn too_fast(limits: &JointConfig, config: &Config) -> f64 {
     TOO_FAST.0.min(TOO_FAST.1 * config.overspeed_factor * limits.velocity_max)
 }
 
-/// Returns the rotor inertia that a joint has at least, kg·m².
+/// Returns the least rotor inertia that is relied on for a joint, kg·m².
 pub(super) fn rotor(limits: &JointConfig) -> f64 {
     let given = limits.rotor_inertia;
     ROTOR * if given > 0.0 { given } else { limits.torque_max / PROPOSED }
 }
 
-/// State of a joint in Teaching. Single precision, because the flight recorder keeps it.
+/// State of a joint in Teaching. Single precision, because the flight recorder stores it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtJoint {
-    /// Anchor of the spring of the dry friction, rad, and its share that acts.
+    /// Anchor of the spring of the dry friction, rad, and the share of the spring that acts.
     anchor: f32,
     pub(super) grip: f32,
-    /// Depth inside a soft end at which the joint began, rad: a spring that acts from there on moves nothing by itself.
+    /// Depth inside a soft end at which the joint began, rad. The spring acts only beyond it, so that it moves nothing by itself.
     begun: f32,
-    /// Friction of the joint as its parameters have it, N·m: the Coulomb part, and all of it at the speed of a while ago.
+    /// Friction of the joint according to its parameters, N·m: the Coulomb part, and the whole friction at a recent speed.
     coulomb: f32,
     rubs: f32,
     /// Least inertia that the joint moves, kg·m².
     inertia: f32,
     /// Torque of damping and friction against the last motion, N·m.
     against: f32,
-    /// Position that follows that of the joint, rad: the faster the joint is, the more this position lags.
+    /// Position that follows the joint, rad. The faster the joint is, the more this position lags.
     behind: f32,
-    /// Answers of the joint that are missing now, and how far springs and damping have gone because of that: 2 · [`LETS_GO`] is wholly.
+    /// Number of consecutive missing answers, and progress of fading springs and damping, which is complete at 2 · [`LETS_GO`].
     missing: u8,
     lost: u8,
 }
 
 remembered!(TaughtJoint { anchor, grip, begun, coulomb, rubs, inertia, against, behind, missing, lost });
 
-/// The inputs of a joint in a tick of Teaching.
+/// Inputs of a joint in a tick of Teaching.
 pub(crate) struct LedJoint<'a> {
     /// Measured position, rad.
     pub position: f64,
@@ -98,20 +98,20 @@ pub(crate) struct LedJoint<'a> {
 /// Torque that Teaching adds to a joint, N·m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct TaughtTorque {
-    /// Torque of the load found.
+    /// Torque of the load that is carried.
     pub load: f64,
-    /// Damping, dry friction and soft ends.
+    /// Torque of damping, dry friction and soft ends.
     pub brake: f64,
-    /// Friction of the joint that is taken away.
+    /// Torque that compensates friction of the joint.
     pub friction: f64,
 }
 
-/// How a joint bears its load.
+/// How the joint carries its load.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bears {
-    /// Share of it that the damping balances at [`SINKS`].
+    /// Share of the load that the damping balances at [`SINKS`].
     pub balanced: f64,
-    /// Depth of the joint inside a soft end beyond the depth at which it began, rad, with the sign of [`soft_end::depth`].
+    /// Depth of the joint inside a soft end beyond the depth at which it began, rad. The sign is that of [`soft_end::depth`].
     pub compressed: f64,
 }
 
@@ -123,19 +123,19 @@ impl TaughtJoint {
         Self { anchor, behind: anchor, grip: 1.0, begun, inertia, ..Self::default() }
     }
 
-    /// Sets the inertia that the joint moves at least, kg·m². An inertia that cannot be computed changes nothing.
+    /// Sets the least inertia that the joint moves, kg·m². A value that is not finite is ignored.
     pub fn set_inertia(&mut self, inertia: f64) {
         if inertia.is_finite() {
             self.inertia = inertia as f32;
         }
     }
 
-    /// Takes the answer of the joint in each tick, which is `late` by this time, ms: `fresh` if the joint has answered, with this
-    /// `position`, rad. Without an answer its speed is an old one, and its springs pull to its old position. Returns the speed that follows
-    /// from its positions, rad/s.
+    /// Evaluates the answer of the joint in each tick. `late`: delay of this tick, ms; `fresh`: the joint has answered, with this
+    /// `position`, rad. Without an answer its speed is old, and its springs pull to its old position. Returns the speed that follows from
+    /// its positions, rad/s.
     #[inline(always)]
     pub fn hear(&mut self, fresh: bool, position: f64, late: u16) -> f32 {
-        // A tick that is late shows as an answer that is missing.
+        // A late tick has the effect of a missing answer.
         let missed = self.missing.saturating_add(late.min(u8::MAX.into()) as u8);
         if !fresh {
             self.missing = missed.saturating_add(1);
@@ -146,7 +146,7 @@ impl TaughtJoint {
         }
         (self.missing, self.lost) = (0, self.lost.saturating_sub(1));
         let way = position as f32 - self.behind;
-        // Without a missing answer both are constants.
+        // If no answer is missing, both values are constant.
         let (time, part) = if missed == 0 {
             (SPEED_S, DT as f32 / SPEED_S)
         } else {
@@ -157,7 +157,7 @@ impl TaughtJoint {
         way / time
     }
 
-    /// Returns the shares of the springs, and of damping and friction, that act.
+    /// Returns the acting shares of the springs, and of damping and friction compensation.
     fn heard(&self) -> (f64, f64) {
         if self.lost == 0 {
             return (1.0, 1.0);
@@ -181,14 +181,14 @@ impl TaughtJoint {
         self.against = torque as f32;
     }
 
-    /// Returns the damping at low speed, and the damping that it grows to, N·m·s/rad.
+    /// Returns the damping at low speed, and the damping to which it grows, N·m·s/rad.
     fn dampings(&self, load: f64, limits: &JointConfig) -> (f64, f64) {
         let most = DAMPING_RATE * f64::from(self.inertia);
         let damping = limits.teach_damping.max(load.abs() / SINKS).min(most);
         (damping, damping.max(most.min(GROWN * limits.torque_max)))
     }
 
-    /// Runs a tick of a joint that carries this `load`, N·m; `haste`: excess of the flange speed over the tool speed limit, 0 to 1.
+    /// Runs one tick of a joint that carries this `load`, N·m. `haste`: excess of the flange speed over the tool speed limit, 0 to 1.
     #[inline(always)]
     pub fn step(
         &mut self,
@@ -225,13 +225,13 @@ impl TaughtJoint {
         (torque, Bears { balanced, compressed })
     }
 
-    /// Returns the torque of the dry friction, N·m: less if the joint has friction of its own.
+    /// Returns the highest torque of the dry friction, N·m. It is less if the joint has friction of its own.
     fn breakaway(&self, limits: &JointConfig, config: &Config) -> f64 {
         (config.teach_stiction * limits.torque_max - CERTAIN_FRICTION * f64::from(self.coulomb)).max(0.0)
     }
 
-    /// Returns the dry friction of a slow joint. The friction fades out from the speed that its torque gives the damped joint to three
-    /// times that speed. So any torque below it is stopped, and damping and dry friction together never fall with the speed.
+    /// Returns the dry friction of a slow joint. It fades between the speed at which damping balances its torque and three times that
+    /// speed. So any lower torque is stopped, and the sum of damping and dry friction never falls with the speed.
     fn dry_friction(
         &mut self,
         position: f64,
@@ -250,7 +250,7 @@ impl TaughtJoint {
             if velocity.abs() > slow { 1.0 - smooth((velocity.abs() - slow) / (2.0 * slow)) } else { 1.0 };
         let grip = f64::from(self.grip);
         self.grip = (grip + (gripped - grip) * (DT / GRIP_S)) as f32;
-        // The spring slips when its whole torque stretches it; in a joint that moves the spring only follows.
+        // The spring slips when its full torque stretches it. In a fast joint the spring only follows.
         let stretch = if gripped > 0.0 { self.stretch(breakaway) } else { 0.0 };
         self.anchor = f64::from(self.anchor).max(position - stretch).min(position + stretch) as f32;
         self.dry_spring(position, limits, config)
@@ -268,7 +268,7 @@ impl TaughtJoint {
         f64::from(self.grip) * (breakaway / self.stretch(breakaway) * way).max(-breakaway).min(breakaway)
     }
 
-    /// Returns the friction of the joint that is taken away, N·m. At standstill it grows with the speed at most half as fast as the
+    /// Returns the friction of the joint that is compensated, N·m. Near standstill it grows with the speed at most half as fast as the
     /// damping.
     fn compensation(&self, velocity: f64, damping: f64, config: &Config) -> f64 {
         let torque = config.teach_friction * f64::from(self.coulomb);

@@ -1,27 +1,28 @@
-//! The swing of a joint that is lighter than its inertia in the arm file: its brake is too hard for it, because measured speeds are late.
+//! Detects the swing of a joint that is lighter than its inertia in the arm file. Its brake is too strong for it, because measured speeds
+//! are old.
 use crate::remembered::remembered;
 
-/// A half of a swing ends within this time, ms, and has at least this speed, rad/s.
+/// Longest duration of half a swing, ms, and its lowest peak speed, rad/s.
 const HALF_MS: u8 = 80;
 const HALF_SPEED: f32 = 0.15;
-/// A swing is two halves in turn. The second has at least this share of the speed of the first: a shove and the return of the spring are
-/// two halves as well, but the second is slow.
+/// A swing is two halves in opposite directions. The second half has at least this share of the speed of the first. A shove and the return
+/// of the spring are also two halves, but the second one is slow.
 const LASTS: f32 = 0.5;
-/// Each swing makes the joint softer by this factor, down to the second factor.
+/// Each swing makes the joint softer by the first factor, but not softer than the second one.
 const SOFTER: f32 = 0.5;
 const SOFTEST: f32 = 0.2;
-/// Time without a swing after which the joint is harder again by a step, and time between further steps, ms.
+/// Time without a swing after which the joint becomes harder by one step, and time between further steps, ms.
 const HARDENS_MS: (u16, u16) = (300, 100);
 
-/// Swing of a joint, and the factor that makes the joint softer because of it.
+/// State of the swing of a joint, and the factor by which the joint is softer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Swing {
-    /// Highest speed in this direction, rad/s, signed, and since when the joint moves so, ms.
+    /// Highest speed in the present direction, with its sign, rad/s, and time in this direction, ms.
     peak: f32,
     half_ms: u8,
-    /// Highest speed of the half before, if that was one of a swing.
+    /// Highest speed of the previous half; 0 if that was not half a swing.
     before: f32,
-    /// How much softer everything is, and since when it has been, ms.
+    /// Factor by which spring, damper and brake are softer, and time since it changed, ms.
     soft: f32,
     soft_ms: u16,
 }
@@ -31,7 +32,7 @@ remembered!(Swing { peak, half_ms, before, soft, soft_ms });
 impl Swing {
     pub const NONE: Self = Self { peak: 0.0, half_ms: u8::MAX, before: 0.0, soft: 1.0, soft_ms: 0 };
 
-    /// Runs a tick at this velocity, rad/s. Returns the share of spring, damper and brake that acts.
+    /// Runs one tick at this velocity, rad/s. Returns the acting share of spring, damper and brake.
     pub fn step(&mut self, velocity: f64) -> f64 {
         let velocity = velocity as f32;
         if velocity * self.peak < 0.0 {
@@ -60,8 +61,8 @@ impl Swing {
 mod tests {
     use super::*;
 
-    /// A joint that comes back fast, again and again, becomes softer each time, and harder again when it does not; a joint that a push has
-    /// moved and a spring takes back does not become softer.
+    /// A joint that returns fast, again and again, becomes softer each time, and harder again when this ends. A joint that a push has moved
+    /// and the spring returns does not become softer.
     #[test]
     fn j68_what_swings_becomes_softer_for_a_while() {
         let swing = |half_ms: usize, speeds: [f64; 2]| {

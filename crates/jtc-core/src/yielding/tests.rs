@@ -11,7 +11,7 @@ fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// The brake has no torque in the first tick of a yield, soon all of its torque, and always acts against the motion.
+/// The brake has no torque in the first tick of a yield, its full torque soon after, and always acts against the motion.
 #[test]
 fn j68_a_fast_joint_is_braked_with_all_of_its_torque() {
     let limits = limits();
@@ -41,15 +41,15 @@ fn at<'a>(limits: &'a JointConfig, position: f64, velocity: f64, model: f64) -> 
     }
 }
 
-/// Drags the spring along, and takes a tick.
+/// Drags the spring along, and runs one tick.
 fn tick(yields: &mut Yield, joint: &Joint<'_>) -> PidTorque {
     yields.drag(joint.position);
     yields.step(joint)
 }
 
 proptest! {
-    /// For any motion of the joint, the spring never exceeds the share; together with the damper it does so only if the damper alone does.
-    /// The damper only takes energy out.
+    /// For any motion of the joint, the torque of the spring never exceeds the share. The sum of spring and damper exceeds it only if the
+    /// damper alone does. The damper only dissipates energy.
     #[test]
     fn j68_a_slow_push_has_the_share_against_it_and_a_shove_the_limit(
         set in -3.0..3.0f64,
@@ -62,7 +62,7 @@ proptest! {
         let limits = limits();
         let most = SHARE * limits.torque_max;
         let mut yields = Yield::begin(false, false, set, inertia, load);
-        // Its damper has settled.
+        // After 100 ticks the damper has settled.
         let joint = at(&limits, set + way, velocity, model);
         (0..100).for_each(|_| {
             tick(&mut yields, &joint);
@@ -72,13 +72,13 @@ proptest! {
         prop_assert!((torque.p + torque.d).abs() <= most.max(torque.d.abs()) + 1e-9);
         prop_assert!(torque.d * velocity <= 0.0 && (velocity != 0.0 || torque.d == 0.0));
         prop_assert_eq!(torque.i, load);
-        // Half of the velocity limit takes all of it, unless the joint is too light.
+        // Half of the velocity limit needs the whole torque, unless the joint is too light.
         let expected = (limits.torque_max - most) * velocity.abs() / (0.5 * limits.velocity_max);
         let light = DAMPING_RATE * inertia * velocity.abs();
         prop_assert!((torque.d.abs() - expected.min(light).min(limits.torque_max)).abs() < 1e-3);
     }
 
-    /// A load that is lowered has no spring; what it learns never exceeds the limit, and is not less than at the begin.
+    /// A lowered load has no spring. Its torque never exceeds the limit, and never falls below its value at the beginning.
     #[test]
     fn j70_a_load_that_is_lowered_is_damped_and_learned_within_the_limit(
         model in prop_oneof![-170.0..-20.0f64, 20.0..170.0f64],
@@ -101,7 +101,7 @@ proptest! {
     }
 }
 
-/// A hand lifts a joint that lowers its load, and lets go: what carried it is still there.
+/// A hand lifts a joint that lowers its load, and lets go. The torque that carried the joint is still there.
 #[test]
 fn j70_a_joint_that_is_lifted_keeps_what_carries_it() {
     let limits = limits();
@@ -121,7 +121,7 @@ fn j68_the_spring_is_dragged_along() {
         assert!((yields.drag(position) - set).abs() < 1e-12, "{position}");
         let torque = yields.step(&at(&limits, position, 0.0, 0.0));
         assert!((torque.p - SHARE * limits.torque_max * (set - position) / STRETCH).abs() < 1e-9);
-        // A light joint has a softer one.
+        // A light joint has a softer spring.
         let light = Yield { inertia: 0.1, ..yields }.step(&at(&limits, position, 0.0, 0.0));
         assert!((light.p - 90.0 * (set - position)).abs() < 1e-9);
     }
@@ -179,7 +179,7 @@ fn j68_a_joint_that_is_calm_for_200_ms_is_held_again() {
     assert!(stays.is_calm() && !stays.is_over(), "the host decides");
     stays.clear();
     assert!(stays.is_over());
-    // A motion restarts the time.
+    // A motion restarts the time of calm.
     tick(&mut stays, &at(&limits, 0.0, 0.2, 0.0));
     assert!(!stays.is_calm());
 }
@@ -194,9 +194,9 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
             yields.lowers()
         })
     };
-    // Torque of 20 N·m holds the joint up: gravity pulls it down.
+    // A torque of 20 N·m holds the joint up, so gravity pulls it down.
     assert_eq!(lowers_after(-0.3, 20.0), Some(1_667), "0.5 rad");
-    // Led down and up again it has not sunk.
+    // A joint that is led down and up again has not sunk.
     let mut led = Yield::begin(false, false, 0.0, INERTIA, 0.0);
     for k in 0..10_000 {
         let velocity = if k % 1_000 < 500 { -0.3 } else { 0.3 };
@@ -209,7 +209,7 @@ fn j68_j70_a_joint_that_sinks_for_long_enough_lowers_its_load() {
     }
 }
 
-/// A lowered load comes to rest if the limit holds it, and is then held; nearly all of the limit is left to the damper.
+/// A lowered load comes to rest if the limit can hold it. It is then held if a little of the limit remains for the position controller.
 #[test]
 fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
     let limits = limits();
@@ -220,7 +220,7 @@ fn j70_a_load_at_rest_is_held_again_where_the_limit_leaves_something() {
             yields.is_over()
         });
         assert_eq!(over, held, "{load} N·m");
-        // The host may still request to hold the joint, because it stands.
+        // The host may request to hold the joint nevertheless, because it is at rest.
         assert!(yields.is_calm());
         yields.clear();
         assert!(yields.is_over());
@@ -251,14 +251,14 @@ fn moves(yields: &mut Yield, velocity: f64, ms: u16) -> f64 {
     let mut position = yields.set;
     for _ in 0..ms {
         position += velocity * DT;
-        // The model is against the load: gravity does not pull in the direction in which the joint sinks.
+        // The torque of the model opposes the load, so gravity does not pull in the direction in which the joint sinks.
         tick(yields, &at(&limits, position, velocity, -40.0));
     }
     yields.load()
 }
 
-/// Spring and damper have 40 N·m against a joint that nobody pushes: its own load drives it, so that load was a person leaning on the arm.
-/// The load goes within a second, and comes back if the joint sinks. A hand that leads the joint faster, or against its load, says nothing
+/// Spring and damper have 40 N·m against a joint without a push. Its own load drives it, so that load was a person who leaned on the arm.
+/// The load fades within a second, and returns if the joint sinks. If a hand leads the joint faster, or against its load, nothing follows
 /// about the load.
 #[test]
 fn j68_a_load_that_drives_the_joint_by_itself_goes() {
@@ -275,7 +275,8 @@ fn j68_a_load_that_drives_the_joint_by_itself_goes() {
     assert!((0.9 * 40.0..=40.0).contains(&back), "{back} N·m");
 }
 
-/// The position controller takes over what the spring leaves of the load, never more than the load and never the other way.
+/// The position controller takes over the part of the load that the spring has not opposed: never more than the load, and never with the
+/// opposite sign.
 #[test]
 fn j68_the_position_controller_takes_over_what_the_spring_leaves() {
     for (load, spring, left) in [

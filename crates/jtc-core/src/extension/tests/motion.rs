@@ -1,4 +1,4 @@
-//! Motions, and commands that end them: disable, silent hosts, jogs, gains of torque (J-53, J-58, J-59, J-61).
+//! Motions and commands that end them: Disable, silent hosts, jogs, torque gains (J-53, J-58, J-59, J-61).
 use super::*;
 
 #[test]
@@ -53,7 +53,7 @@ fn j59_hosts_that_are_silent_end_teaching_and_pause_the_path() {
         let leave = ends.then_some(TrajectoryState::Pause);
         assert_eq!(bench.controller.phase, Phase::Running { leave }, "{limit} {silent}");
     }
-    // A valid frame of any host is a sign of life; noise is not.
+    // A valid frame of any host ends the silence; noise does not.
     let frame = FrameRef::new_checked(&fixed::GET_INFO).expect("a good frame");
     let noise = LinkEvent::Noise(Response::bad(0, FrameStatus::IncorrectHeader, 0));
     for (event, left) in [(LinkEvent::Frame(frame), 0), (noise, 78)] {
@@ -81,13 +81,13 @@ fn j61_drives_are_asked_for_the_joint_torque_times_the_gain() {
         let expected = torque[j] * (1.0 + 0.1 * j as f64);
         assert!((asked[j] - expected).abs() < 0.02, "{} {expected}", asked[j]);
     }
-    // The torque that a drive reports is sent on as torque of the joint.
+    // The torque that a drive reports is converted to the torque of the joint before it is sent.
     let status = bench.controller.status(Response::NONE);
     let report = bench.controller.nodes.node(2).report.torque;
     assert!((f64::from(status.joints[2].torque) * 1.2 - report).abs() < 1e-6);
 }
 
-/// J-04, J-58: a Stop or a Pause also ends a jog, and a jog that was sent before it does not begin again.
+/// J-04, J-58: a Stop or a Pause also ends a jog. A Jog that was sent before it has no effect.
 #[test]
 fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
     for command in [UrgentCommand::Stop, UrgentCommand::Pause] {
@@ -116,14 +116,14 @@ fn j04_j58_a_stop_or_a_pause_ends_a_jog_and_cancels_those_before_it() {
         for _ in 0..520 {
             hold(&mut bench.controller);
             position = bench.controller.motion.set.point.position;
-            // The acceleration must turn first.
+            // The acceleration must change its sign first.
             assert!(bench.controller.motion.set.point.velocity[2] <= before + 0.1, "{before}");
         }
         assert!(!bench.controller.motion.set.jogging() && position[2] > 0.0);
     }
 }
 
-/// J-06: a command that changes the torque does so at standstill only.
+/// J-06: a command that changes the torque takes effect only at standstill.
 #[test]
 fn j58_parameters_and_resets_wait_for_the_end_of_a_jog() {
     let mut bench = Bench::new();

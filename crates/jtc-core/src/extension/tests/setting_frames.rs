@@ -1,4 +1,4 @@
-//! Settings that are read and set, and the states in which they may be set (J-53).
+//! Reading and changing settings, and the states in which settings may change (J-53).
 use super::*;
 
 #[test]
@@ -50,7 +50,7 @@ fn j53_settings_change_whole_and_without_torque_only() {
     }
 }
 
-/// Gravity decides the torque of the model from the next tick on.
+/// A new gravity changes the torque of the model from the next tick on.
 #[test]
 fn j53_gravity_that_is_set_is_computed_with() {
     let mut bench = Bench::new();
@@ -62,7 +62,7 @@ fn j53_gravity_that_is_set_is_computed_with() {
     assert!(before.iter().zip(after).all(|(b, a)| (b + a).abs() < 1e-9) && before[1].abs() > 10.0);
 }
 
-/// Parameters that were received must also fit the settings that come later.
+/// Later settings are refused if the received parameters are not valid with them.
 #[test]
 fn j53_settings_that_the_parameters_contradict_are_refused() {
     for (setting, value) in [(96, 7_000.0), (101, 0.5), (103, 0.001)] {
@@ -72,20 +72,20 @@ fn j53_settings_that_the_parameters_contradict_are_refused() {
         bench.use_defaults();
         assert_eq!(bench.set(setting, 0, value), DataStatus::IncorrectValue, "{setting}");
     }
-    // And the other way round.
+    // Parameters are also refused if they are not valid with the settings.
     let mut bench = Bench::new();
     bench.set(96, 0, 7_000.0);
     assert_eq!(bench.send(0, &fixed::PID_PARAM_USE_DEFAULT), DataStatus::IncorrectValue);
 }
 
-/// Parameters that were given are checked, also if they were withdrawn since.
+/// New settings are checked against the received parameters, even if these have been withdrawn since.
 #[test]
 fn j53_settings_fit_to_what_disable_has_withdrawn() {
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.controller.parameters.withdraw_all();
     assert_eq!(bench.set(96, 0, 7_000.0), DataStatus::IncorrectValue);
-    // Friction tables, too: one a tick.
+    // Friction tables are checked as well, one per tick.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.send(0, &fixed::FRICTION_TABLE_USE_DEFAULT);
@@ -95,7 +95,7 @@ fn j53_settings_fit_to_what_disable_has_withdrawn() {
     assert!(bench.controller.telemetry().tick - before >= 6);
 }
 
-/// In motion a few values are taken, not hundreds.
+/// In motion, only a few values per frame are accepted.
 #[test]
 fn j07_j53_settings_in_motion_are_few() {
     let value = SettingValue { setting: settings::SPEED, joint: 0, value: 0.5 };
@@ -109,7 +109,8 @@ fn j07_j53_settings_in_motion_are_few() {
     }
 }
 
-/// A setting of the arm that comes with a payload is treated as it is alone; the speed override may change with the payload.
+/// A setting of the arm in the same frame as a payload is treated as if it came alone. The speed override may change together with the
+/// payload.
 #[test]
 fn j53_j60_a_payload_is_set_wherever_the_arm_stands() {
     for (state, stands, bare) in [

@@ -1,8 +1,8 @@
-//! The arm that is stored over a loss of power (J-54).
+//! The stored arm, which survives a loss of power (J-54).
 use super::*;
 use crate::extension::arm::IMAGE_PER_TICK;
 
-/// An arm that is not the one built in, as a stored image.
+/// Returns the image of an arm that is not the built-in one, and its hash.
 fn other_arm() -> (Vec<u8>, u64) {
     let mut bench = Bench::new();
     assert_eq!(bench.set(33, 0, 3.0), DataStatus::NoError);
@@ -28,7 +28,7 @@ fn j54_a_stored_arm_is_what_the_defaults_mean_after_the_next_start() {
     assert_eq!((info.missing, info.arm.as_str(), info.defaults_stored), (7, "other", true));
     assert_eq!(bench.controller.config.gravity[1], 3.0);
     assert_ne!(info.hash, hash, "its parameters are not in use yet");
-    // The friction of the stored arm is a table for any default that an existing host requests.
+    // The friction of the stored arm is a table. It is used for both kinds of default friction that an existing host may request.
     bench.use_defaults();
     let info = bench.info(0);
     assert_eq!((info.hash, info.missing), (hash, 0));
@@ -42,7 +42,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     bench.info(0);
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "nobody gave parameters");
     bench.use_defaults();
-    // The parameters may have been withdrawn since, as Disable does.
+    // Disable, for example, may have withdrawn the parameters since.
     bench.controller.parameters.withdraw_all();
     for state in [ControllerState::HoldPos, ControllerState::Operate, ControllerState::Teaching] {
         bench.controller.state = state;
@@ -70,7 +70,7 @@ fn j54_storing_is_asked_of_the_board_once_and_in_init_or_error_only() {
     assert_eq!(bench.send(0, &fixed::STORE_ARM), DataStatus::NotAllowed, "it is busy");
 }
 
-/// Any image that is loaded is an arm that the controller would have taken frame by frame.
+/// Every image that is loaded contains an arm that the controller would also accept frame by frame.
 #[test]
 fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     let mut bench = Bench::new();
@@ -85,14 +85,14 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
             let before = bench.info(0);
             if bench.controller.load_arm(&image) {
                 if bench.asks_for_defaults().contains(&DataStatus::IncorrectValue) {
-                    // Its joints are too light for its gains (J-71), and it is not held.
+                    // The joints of this arm are too light for its gains (J-71), so the arm is not held.
                     let (own, config) = (&bench.controller.parameters, &bench.controller.config);
                     assert!(own.gains_were_too_much(config), "byte {at}");
                     assert_ne!(own.missing(), 0, "byte {at}");
                     continue;
                 }
                 let info = bench.info(0);
-                // A value that is given twice, and left out elsewhere if it is the default, makes the same arm.
+                // If the flipped bit makes a value appear twice, and the missing value is a default, the arm is still the same.
                 let same = bench.controller.config() == &Config::avena();
                 assert!(info.hash != hash || at >= image.len() - 32 || same, "byte {at}");
                 assert!(bench.controller.config.check().is_ok());
@@ -104,7 +104,7 @@ fn j54_an_image_with_any_bit_flipped_is_refused_or_another_arm_that_is_taken() {
     }
 }
 
-/// A stored arm that cannot be used is not replaced by the built-in one.
+/// If the stored arm cannot be used, the built-in arm does not replace it.
 #[test]
 fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     let (mut image, _) = other_arm();
@@ -114,7 +114,7 @@ fn j54_defaults_are_refused_where_the_stored_arm_cannot_be_used() {
     assert!(!bench.controller.load_arm(&image));
     let refused = |bench: &mut Bench| bench.send(0, &fixed::PID_PARAM_USE_DEFAULT);
     assert_eq!(refused(&mut bench), DataStatus::NotAllowed);
-    // An arm that could not be written is another arm after the next start.
+    // If the arm could not be written, the next start would use another arm.
     let mut bench = Bench::new();
     bench.use_defaults();
     bench.info(0);

@@ -1,11 +1,11 @@
-//! Two hosts on two lines that give different arms at the same time (J-04, J-50, J-53).
+//! Two hosts on two lines that send different arms at the same time (J-04, J-50, J-53).
 use std::collections::VecDeque;
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// All frames that make an arm, with numbers of this host; friction as a table takes many ticks.
+/// All frames of an arm, with the parameters of this host. Friction as a table takes many ticks.
 fn arm(host: u8) -> Vec<Vec<u8>> {
     let number = f64::from(host) + 1.0;
     let mut gains = vec![0; 126];
@@ -26,8 +26,8 @@ fn arm(host: u8) -> Vec<Vec<u8>> {
 }
 
 proptest! {
-    /// The parameters in use are those that were accepted last, frame by frame, from either host: two frames are never mixed, though each
-    /// may take many ticks. Each host has its own records and answers, in the order of its frames.
+    /// Of each kind of parameter, the frame that was accepted last is in use, whichever host sent it. Two frames are never mixed, though
+    /// each may take many ticks. Each host gets its own records and answers, in the order of its frames.
     #[test]
     fn j04_j53_two_hosts_with_different_arms_do_not_mix_within_a_frame(
         first in prop::collection::vec(any::<bool>(), 1..40),

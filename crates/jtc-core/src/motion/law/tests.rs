@@ -8,12 +8,12 @@ use crate::motion::{Found, Motion};
 use crate::parameters::Friction;
 use crate::pid::PidTorque;
 
-/// A bent arm: gravity loads joint 2 with some tens of N·m.
+/// A bent arm, in which gravity loads joint 2 with some tens of N·m.
 const POSE: [f64; JOINTS] = [0.1, 0.9, 0.4, -0.2, 0.3, 0.5];
 const MODES: [ControlMode; 4] =
     [ControlMode::Hold, ControlMode::Follow, ControlMode::Approach, ControlMode::Teach];
 
-/// An arm that is held with gains of its own.
+/// An arm that is held with its own gains.
 struct Arm {
     config: Config,
     dynamics: Dynamics,
@@ -25,7 +25,7 @@ struct Arm {
 
 impl Arm {
     /// Creates a held arm. Its measurements are compared with the set values of the same tick, so that one tick shows the result of the
-    /// law.
+    /// control law.
     fn held(gains: PidGains) -> Self {
         let config = Config { delay_ticks: 0, ..Config::avena() };
         let mut motion = Motion::default();
@@ -36,12 +36,12 @@ impl Arm {
         Self { config, dynamics, pid: [gains; JOINTS], polynomial, table: None, motion }
     }
 
-    /// A tick at the pose, with the measured `velocity` (rad/s): torques and errors.
+    /// Runs a tick at the pose, with the measured `velocity` (rad/s). Returns torques and findings.
     fn tick(&mut self, mode: ControlMode, braking: bool, velocity: f64) -> ([f64; JOINTS], [Found; JOINTS]) {
         self.tick_of(mode, braking, &Nodes::enabled_at(POSE, [velocity; JOINTS]))
     }
 
-    /// A tick of these nodes.
+    /// Runs a tick with these nodes.
     fn tick_of(
         &mut self,
         mode: ControlMode,
@@ -63,7 +63,7 @@ impl Arm {
 
 const NONE: PidGains = PidGains { kp: 0.0, ki: 0.0, kd: 0.0, int_min: -1.0, int_max: 1.0 };
 
-/// This also holds if set values move: a joint that comes to rest in HoldPos has a velocity.
+/// This is also true if set values move: a joint that comes to rest in HoldPos has a velocity.
 #[test]
 fn j40_j42_velocity_acceleration_and_friction_are_part_of_the_law_on_the_way_only() {
     for mode in MODES {
@@ -128,7 +128,7 @@ fn j25_a_load_that_nobody_has_found_is_not_carried() {
     assert_eq!(arm.motion.law.torque.map(|torque| torque.load), [0.0; JOINTS]);
 }
 
-/// While the integral unwinds, no load can be found. Absent joints find no load.
+/// While the integral gives back torque, no load can be found. Absent joints find no load.
 #[test]
 fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     let mut arm = taught(&[1.0; JOINTS]);
@@ -136,7 +136,7 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     law.torque = Default::default();
     law.torque.iter_mut().for_each(|torque| torque.pid.i = 1.0);
     assert!(law.knows_loads(&[true; JOINTS], config, false));
-    // A person leans on joint 2, or its integral has not settled: the limit is 0.04 of 180 N·m, 7.2 N·m.
+    // A person leans on joint 2, or its integral has not settled. The limit is 0.04 of 180 N·m, 7.2 N·m.
     for (p, known) in [(7.1, true), (-7.1, true), (7.3, false), (-7.3, false)] {
         law.torque[1].pid.p = p;
         assert_eq!(law.knows_loads(&[true; JOINTS], config, false), known, "{p} N·m");
@@ -150,7 +150,7 @@ fn j25_the_loads_are_known_when_each_joint_that_is_held_has_found_its_own() {
     assert!(!law.knows_loads(&[true, true, true, false, true, true], config, false));
 }
 
-/// With the tool speed limit the flange's speed brakes every joint that moves.
+/// Above the tool speed limit, the speed of the flange brakes every joint that moves.
 #[test]
 fn j25_above_the_tool_speed_limit_every_joint_is_braked_harder() {
     let brakes = |tool_speed_max: f64| {
@@ -165,14 +165,14 @@ fn j25_above_the_tool_speed_limit_every_joint_is_braked_harder() {
     let (off, below, at, twice) =
         (brakes(0.0), brakes(1.01 * speed), brakes(speed / 1.5), brakes(0.5 * speed));
     assert_eq!(off, below);
-    // Joints 4 to 6 have all the damping that they bear.
+    // Joints 4 to 6 already have all the damping that they tolerate.
     for j in 0..JOINTS {
         assert!(off[j] < 0.0 && at[j] <= off[j] && twice[j] <= at[j], "joint {}: {off:?} {at:?}", j + 1);
         assert!(j > 2 || twice[j] < off[j], "joint {}: {off:?} {twice:?}", j + 1);
     }
 }
 
-/// In motion errors below the resolution of an encoder add up as well.
+/// In motion, the integral also adds up errors below the resolution of an encoder.
 #[test]
 fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     for (velocity, acceleration, held) in
@@ -188,7 +188,7 @@ fn j41_the_integral_is_held_within_an_encoder_step_at_rest_only() {
     }
 }
 
-/// In all cases gravity is more than joint 2 can hold. The motion of the joint decides if this is an error.
+/// In each case gravity is more than joint 2 can hold. The motion of the joint decides whether this is an error.
 #[test]
 fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
     let along = Arm::held(NONE).dynamics.gravity_torque(&POSE)[1].signum();
@@ -198,7 +198,7 @@ fn j33_j43_torque_at_its_limit_is_excused_while_it_stops_a_joint() {
         (ControlMode::Hold, true, false, false, 0.0, false),
         (ControlMode::Follow, true, false, false, 0.0, true),
         (ControlMode::Hold, false, true, false, 0.0, false),
-        // Against the motion it stops the joint, along with it it drives the joint on.
+        // Torque against the motion stops the joint; torque along the motion accelerates it.
         (ControlMode::Hold, true, false, false, -0.06, false),
         (ControlMode::Hold, true, false, false, 0.06, true),
         (ControlMode::Hold, false, true, false, 0.06, true),
@@ -253,7 +253,7 @@ fn j40_j41_j42_the_torque_is_the_sum_of_its_parts() {
     assert_eq!((torque.correction(), torque.sum()), (127.0, 255.0));
 }
 
-/// The result is the wanted torque, or as much of it as the limit leaves, and never has the opposite sign.
+/// The result is the requested torque, or the part of it that the limit leaves. It never has the opposite sign.
 #[test]
 fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     for (wanted, torque, taken) in [
@@ -272,7 +272,7 @@ fn j25_a_brake_takes_what_the_limit_leaves_and_no_more() {
     }
 }
 
-/// A joint that is not enabled yet may be at any position and speed; the limits do not apply to it.
+/// A joint that is not enabled yet may have any position and speed. The limits do not apply to it.
 #[test]
 fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
     let off = 3;
@@ -287,7 +287,7 @@ fn j16_a_joint_that_is_not_enabled_has_no_torque_no_brake_and_no_error() {
             Some([TableOf { velocity: axis(0.1), temperature: axis(20.0), torque: [[3.0; 20]; 20] }; JOINTS]);
         let nodes = Nodes::enabled_at(POSE, [velocity; JOINTS]).with_torque_off(off);
         if mode == ControlMode::Teach {
-            // Before its first brake the law computes the inertia of the arm, and of each joint.
+            // Before its first brake the law computes the inertia of the arm and of each joint.
             (0..10).for_each(|_| {
                 arm.tick_of(mode, false, &nodes);
             });

@@ -2,31 +2,31 @@
 use crate::DT;
 use crate::remembered::remembered;
 
-/// Answers that a rate is taken from, and milliseconds over which it is taken at least.
+/// Number of answers over which a rate is computed, and least time for it, ms.
 const WINDOW: usize = 5;
 /// Slots of the ring: a power of two, so that an index needs no comparison.
 const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
-/// Inverse of the time that the rate is taken over while no answer is lost, 1/s.
+/// Inverse of the time over which the rate is computed while no answer is lost, 1/s.
 const PER_WINDOW: f64 = 1.0 / (WINDOW_MS as f64 * DT);
 
 /// A usable answer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answered {
-    /// rad.
+    /// Position, rad.
     pub position: f64,
-    /// Time at which it came, ms.
+    /// Time to which the answer belongs, ms.
     pub at_ms: u32,
 }
 
 impl Answered {
-    /// Returns the distance to a younger answer, rad; zero if both are the same.
+    /// Returns the distance to a younger answer, rad; zero if both are the same answer.
     fn way_to(&self, now: &Self) -> f64 {
         // The difference of such close numbers is exact.
         f64::from(now.position as f32 - self.position as f32)
     }
 
-    /// Returns the milliseconds since another answer.
+    /// Returns the time since another answer, ms.
     fn since(&self, other: &Self) -> u32 {
         self.at_ms.wrapping_sub(other.at_ms)
     }
@@ -35,18 +35,18 @@ impl Answered {
 /// A rate of positions.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rate {
-    /// rad/s.
+    /// The rate, rad/s.
     pub rad_s: f64,
-    /// Every answer after the one that the rate is taken from was close to its prediction.
+    /// Every answer after the first one of the rate was close to its prediction.
     pub as_predicted: bool,
 }
 
-/// Stored form of an answer. A single-precision number resolves 1/400 of the step of a 16-bit encoder.
+/// Stored form of an answer. Single precision resolves 1/400 of the step of a 16-bit encoder.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kept {
-    /// rad.
+    /// Position, rad.
     position: f32,
-    /// Time at which it came, ms.
+    /// Time to which the answer belongs, ms.
     at_ms: u32,
 }
 
@@ -54,11 +54,11 @@ struct Kept {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct History {
     answers: [Kept; SLOTS],
-    /// Slot of the next answer; the number wraps around.
+    /// Slot of the next answer. The number wraps around.
     next: u8,
-    /// Number of answers before the newest that came in turn, one in each millisecond: more than are kept, perhaps.
+    /// Number of answers before the newest one that came without a gap, one per millisecond. It may exceed the number of stored answers.
     in_turn: u8,
-    /// Answers that were close to their predictions, as a mask; the newest is bit 0.
+    /// Answers that were close to their predictions, as a mask. The newest answer is bit 0.
     as_predicted: u8,
 }
 
@@ -72,12 +72,12 @@ impl History {
         Self { answers: [kept; SLOTS], ..Self::default() }
     }
 
-    /// Keeps an answer. Returns the rate to it from the youngest answer that is old enough; `None` without such an answer.
+    /// Stores an answer. Returns the rate from the youngest answer that is old enough to this one; `None` if there is no such answer.
     #[inline(always)]
     pub fn take(&mut self, now: &Answered, as_predicted: bool) -> Option<Rate> {
         let turn = now.since(&self.nth(0)) == 1;
         self.in_turn = if turn { self.in_turn.saturating_add(1) } else { 0 };
-        // Nearly always an answer comes in each millisecond, so that only the oldest is old enough.
+        // Nearly always an answer comes in each millisecond, so that only the oldest one is old enough.
         let rate = if self.in_turn >= WINDOW as u8 {
             let rad_s = self.nth(WINDOW - 1).way_to(now) * PER_WINDOW;
             Some(Rate { rad_s, as_predicted: self.younger_as_predicted(WINDOW - 1) })
@@ -106,8 +106,8 @@ impl History {
         self.as_predicted & younger == younger
     }
 
-    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then, perhaps except the
-    /// last.
+    /// Returns the position `ms` milliseconds before `now_ms`, rad, if an answer came in each millisecond since then. The last answer may
+    /// be missing.
     pub fn before(&self, now_ms: u32, ms: u8) -> Option<f64> {
         let since_newest = now_ms.wrapping_sub(self.nth(0).at_ms);
         let n = u32::from(ms).checked_sub(since_newest)?;
@@ -120,12 +120,12 @@ impl History {
         self.nth(0)
     }
 
-    /// Returns the position of the answer that came at this time, rad, if it is kept.
+    /// Returns the position of the answer that belongs to this time, rad, if it is still stored.
     pub fn at(&self, at_ms: u32) -> Option<f64> {
         (0..SLOTS).map(|n| self.nth(n)).find(|answer| answer.at_ms == at_ms).map(|answer| answer.position)
     }
 
-    /// Returns the answer before which `n` younger ones came.
+    /// Returns the answer after which `n` younger ones came.
     #[inline(always)]
     fn nth(&self, n: usize) -> Answered {
         let Kept { position, at_ms } = self.answers[usize::from(self.next).wrapping_sub(1 + n) % SLOTS];
@@ -145,8 +145,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..Default::default() })]
 
-        /// The rate is the one found in a list of all answers: milliseconds since the answer before, mostly one, position, and `true` if it
-        /// was as predicted.
+        /// The rate equals the rate from a list of all answers. Each entry of the list has the milliseconds since the answer before, mostly
+        /// one, the position, and `true` if the answer was close to its prediction.
         #[test]
         fn j63_the_rate_is_from_the_youngest_kept_answer_that_is_old_enough(
             answers in prop::collection::vec((prop_oneof![6 => Just(1u32), 1 => 0..9u32], -3.0..3.0, prop::bool::weighted(0.9)), 1..40),

@@ -1,9 +1,9 @@
 //! Encoders that jump (J-35).
 //!
 //! A drive has two encoders: its position comes from the encoder of the joint, its speed from the encoder of the motor. The speed is the
-//! mean over a window, so the distance that the position moves within that window follows from the speed. If a position moves further
-//! within one answer, and stays there, this is not a motion: the encoder has jumped. The jump is subtracted from all further answers, so
-//! that the arm does not move.
+//! mean over a window, so it shows how far the position must move within that window. If a position moves further within one answer and
+//! stays there, the joint has not moved, but its encoder has jumped. The jump is subtracted from all further answers, so that the arm does
+//! not move.
 use jtc_wire::StopKind;
 
 use super::Reading;
@@ -12,70 +12,71 @@ use crate::DT;
 use crate::config::Config;
 use crate::remembered::remembered;
 
-/// Number of answers for which a difference must be constant to be a jump.
+/// Number of answers in which a difference must be constant before it is a jump.
 const CONSTANT: u8 = 5;
-/// Highest number of consecutive answers that may count as a jump, for any change of its size.
+/// Highest number of consecutive answers that may be treated as a possible jump, even if its size changes.
 const LOOKS: u8 = 15;
-/// Number of changes of a jump's size before the size stays: a size that changes more often comes from a gear that is twisted.
+/// Highest number of changes of a jump's size. If the size changes more often, the difference comes from a twisted gear.
 const CHANGES: u8 = 2;
-/// Longest time between an answer and the one before it within which a jump can have come, ms.
+/// Longest time between two consecutive answers for which a jump between them can be found, ms.
 const WITHIN_MS: u32 = 3;
-/// Steps of the encoder that do not count.
+/// Steps of the encoder that are tolerated.
 const STEPS: f64 = 3.0;
-/// Difference that does not count, rad, if [`STEPS`] configured steps of the encoder are less.
+/// Difference that is always tolerated, rad, even if [`STEPS`] configured steps of the encoder are less.
 const LEAST: f64 = 2e-5;
-/// Share of the way that does not count.
+/// Share of the distance that is tolerated.
 const SHARE: f64 = 0.1;
-/// Multiple of the difference that does not count, which a jump must exceed: drives whose clocks drift against the controller's answer with
-/// a reading that is one of their ticks older, or not, and two such slips are not a jump.
+/// Multiple of the tolerance that a jump must exceed. If the clock of a drive drifts against the controller's, some answers contain a
+/// reading that is one drive tick older. Two such slips are not a jump.
 const SLIPS: f64 = 2.0;
-/// From this share of its full scale on, a speed has no meaning.
+/// Share of the full scale from which on a reported speed is not usable.
 const SATURATED: f64 = 0.98;
 
-/// The jumps of an encoder.
+/// State of the jumps of an encoder.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Jumps {
     /// Jump that is subtracted from each answer, rad.
     taken_off: f64,
     /// Difference of the two encoders before the possible jump, rad.
     before: f32,
-    /// Size of the possible jump, rad. After a finding: the size of the jump, or the factor: positions move this many times as fast as the
-    /// speed says.
+    /// Size of the possible jump, rad. After a finding: the size of the jump, or the factor by which positions change faster than the
+    /// reported speed.
     value: f32,
     /// Number of answers with the possible jump.
     answers: u8,
-    /// Number of consecutive answers that counted as a jump.
+    /// Number of consecutive answers that were treated as a possible jump.
     looks: u8,
-    /// Number of changes of its size meanwhile.
+    /// Number of changes of the size in this time.
     changes: u8,
-    /// Finding since the drive was configured.
+    /// Fault that was found since the drive was configured.
     found: Option<StopKind>,
 }
 
 remembered!(Jumps { taken_off, before, value, answers, looks, changes, found });
 
-/// Meaning of an answer that was not expected.
+/// Meaning of an unexpected answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Seen {
-    /// A motion, or nothing is known of it.
+    /// A motion, or it cannot be decided.
     Motion,
-    /// Possibly a jump by this distance, rad. Until that is known, the answer counts as a jump.
+    /// Possibly a jump by this distance, rad. Until this is decided, the answer is treated as a jump.
     Perhaps(f64),
-    /// A jump by this way, rad.
+    /// A jump by this distance, rad.
     Jump(f64),
 }
 
-/// Way of a joint within the window of its drive's speed, as measured and as that speed has it.
+/// Distance of a joint within the window of its drive's speed: measured, and computed from the speed.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nodes) struct Ways {
-    /// Way of the answered positions, rad.
+    /// Distance between the answered positions, rad.
     pub measured: f64,
-    /// Way that the reported speed stands for, rad.
+    /// Distance that corresponds to the reported speed, rad.
     pub reported: f64,
 }
 
 impl Ways {
-    /// Returns the ways of an answer, and the position (rad) a window before it; `None` if the speed is beyond its scale.
+    /// Returns the two distances for an answer and the position (rad) one window before it. Returns `None` if the speed is close to its
+    /// full scale.
     pub(super) fn of(answer: &Reading, from: f64, config: &Config) -> Option<Self> {
         if answer.velocity.abs() > SATURATED * config.velocity_full_scale {
             return None;
@@ -84,12 +85,12 @@ impl Ways {
         Some(Self { measured: answer.position - from, reported: answer.velocity * window })
     }
 
-    /// Returns the way that the speed does not explain, rad.
+    /// Returns the distance that the speed does not explain, rad.
     pub fn unexplained(&self) -> f64 {
         self.measured - self.reported
     }
 
-    /// Returns the unexplained way that does not count, rad.
+    /// Returns the unexplained distance that is tolerated, rad.
     pub fn tolerance(&self, config: &Config) -> f64 {
         (STEPS * config.encoder_step).max(LEAST) + SHARE * self.reported.abs()
     }
@@ -101,37 +102,37 @@ impl Jumps {
         self.taken_off
     }
 
-    /// Returns the finding since the drive was configured, with the size of a jump (rad) or the factor of a speed.
+    /// Returns the fault that was found since the drive was configured, with the size of a jump (rad) or the factor of a speed.
     pub fn found(&self) -> Option<(StopKind, f64)> {
         self.found.map(|kind| (kind, self.value.into()))
     }
 
-    /// Returns `true` while it is not known if a possible jump is a jump.
+    /// Returns `true` while it is not decided whether a possible jump is a jump.
     #[inline(always)]
     pub fn watching(&self) -> bool {
         self.answers > 0
     }
 
-    /// Takes note of an answer that came as expected.
+    /// Records that an answer came as expected.
     #[inline(always)]
     pub fn as_expected(&mut self) {
         self.answers = 0;
     }
 
-    /// Takes this way (rad) off each answer from now on.
+    /// Subtracts this distance (rad) from each answer from now on.
     pub fn take_off(&mut self, way: f64) {
         self.taken_off += way;
         self.found = Some(StopKind::EncoderJump);
     }
 
-    /// Stores that positions move `factor` times as fast as the speed says.
+    /// Stores that positions change `factor` times as fast as the reported speed.
     pub fn find_factor(&mut self, factor: f32) {
         (self.value, self.answers) = (factor, 0);
         self.found = Some(StopKind::SpeedScale);
     }
 
-    /// An answer came at `at_ms` that was not expected: `velocity` (rad/s) was reported in the one before it. `twist`: largest twist of the
-    /// gear, rad. By less than that a joint that is struck gets away from its motor in some answers, and stays there.
+    /// Evaluates an unexpected answer at `at_ms`. `velocity`: velocity that the answer before it reported, rad/s. `twist`: largest twist of
+    /// the gear, rad. A joint that is struck can move away from its motor within some answers, and stay there, but by less than this twist.
     pub fn look(
         &mut self,
         answer: &Reading,
@@ -151,7 +152,7 @@ impl Jumps {
             Ways::of(answer, from, config)
         };
         let Some(now) = ways(answer, at_ms) else {
-            // The answer of then was lost: what is watched goes on to be.
+            // The answer at the start of the window was lost, so the possible jump remains undecided.
             self.answers = watched;
             return if watched > 0 { Seen::Perhaps(self.value.into()) } else { Seen::Motion };
         };
@@ -169,7 +170,7 @@ impl Jumps {
         }
         let size = now.unexplained() - f64::from(self.before);
         if watched == 0 || (size - f64::from(self.value)).abs() > tolerance {
-            // The jump has come within this answer, or has become another one.
+            // The possible jump has begun with this answer, or its size has changed.
             (self.value, same) = (size as f32, 0);
             self.changes += u8::from(watched > 0);
             let twisted = self.changes > CHANGES || (self.changes > 0 && size.abs() <= twist);

@@ -1,16 +1,16 @@
 //! Lateness of the answers of a joint (J-63).
 //!
-//! An answer does not name the Move that it answers, but the answers of a node keep their order. So the newest answer is late by the number
-//! of Moves sent after the Move that it answers: the *outstanding* Moves. A missing answer may be late or lost, and the answers that came
-//! do not distinguish the two, until two answers come in one tick: the first of them was late. For a second after such *evidence*
-//! unanswered Moves count as outstanding, never more of them than have come in together; without evidence, as lost. Evidence may be wrong:
-//! a frame that the bus repeats comes twice. An answer that was lost nevertheless shows in the long run, because the count does not come
-//! back to zero: the lowest count of a window is subtracted.
+//! An answer does not identify the Move that it answers, but the answers of a node keep their order. So the lateness of the newest answer
+//! is the number of Moves that were sent after its own Move: the *outstanding* Moves. A missing answer may be late or lost. Both look the
+//! same until two answers come in one tick: the first of them was late. For a second after such *evidence*, unanswered Moves are counted as
+//! outstanding, at most as many as have come in together. Without evidence they are counted as lost. Evidence may be wrong, because a frame
+//! that the bus repeats comes twice. A lost answer is found in the long run, because the count does not return to zero: the lowest count of
+//! a window is subtracted.
 use crate::remembered::remembered;
 
-/// Time for which evidence counts, ms.
+/// Time for which evidence is valid, ms.
 const LASTS_MS: u16 = 1_000;
-/// Ticks within which the count must come back to zero.
+/// Ticks within which the count must return to zero.
 const WINDOW: u8 = 64;
 /// Highest lateness of an answer, ticks.
 const MOST: u8 = 7;
@@ -18,30 +18,30 @@ const MOST: u8 = 7;
 /// Unanswered Moves of a node.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Lateness {
-    /// Time for which the last evidence still counts, ms.
+    /// Time left for which the last evidence is valid, ms.
     left_ms: u16,
     /// Moves whose answers may still come.
     outstanding: u8,
-    /// Upper bound of `outstanding`: the highest number of answers in one tick, less the last, while evidence counts.
+    /// Upper bound of `outstanding`: the highest number of answers in one tick, minus one, while evidence is valid.
     most: u8,
-    /// Fewest outstanding Moves in this window, and ticks that the window has had.
+    /// Lowest `outstanding` in this window, and number of ticks in the window so far.
     fewest: u8,
     window: u8,
-    /// Ticks in which a Move was sent, as a mask of the last ones; the newest is bit 0.
+    /// Recent ticks in which a Move was sent, as a mask. The newest tick is bit 0.
     moves: u8,
 }
 
 remembered!(Lateness { left_ms, outstanding, most, fewest, window, moves });
 
 impl Lateness {
-    /// Returns `true` if no answer counts as late and the `answers` of a tick, at most one, are not evidence: this tick need not be
-    /// counted.
+    /// Returns `true` if no answer is considered late and the `answers` of a tick, at most one, are not evidence. [`Self::count`] need not
+    /// be called for this tick.
     pub fn stands(&self, answers: u8) -> bool {
         self.left_ms == 0 && answers <= 1
     }
 
-    /// Counts one tick, `elapsed_ms` after the last, with this number of `answers`; `asked`: a Move was sent for it. Returns the lateness
-    /// of the newest answer, ticks.
+    /// Counts one tick, `elapsed_ms` after the last one, with this number of `answers`. `asked`: a Move was sent for it. Returns the
+    /// lateness of the newest answer, ticks.
     pub fn count(&mut self, asked: bool, answers: u8, elapsed_ms: u32) -> u8 {
         if self.left_ms == 0 {
             *self = Self { moves: u8::MAX, ..Self::default() };
@@ -51,10 +51,10 @@ impl Lateness {
             self.most = self.most.max(answers - 1).min(MOST);
         }
         self.left_ms = self.left_ms.saturating_sub(elapsed_ms.min(LASTS_MS.into()) as u16);
-        // The Move was sent in the previous tick, which may be any time ago.
+        // The Move was sent in the previous tick, whose time is not limited.
         let moves = self.moves << 1 | u8::from(asked);
         self.moves = moves.checked_shl(elapsed_ms.saturating_sub(1)).unwrap_or(0);
-        // If there are more answers than Moves, some of them had counted as lost.
+        // If there are more answers than outstanding Moves, some of them had been counted as lost.
         let outstanding = (self.outstanding + u8::from(asked)).saturating_sub(answers);
         self.outstanding = outstanding.min(self.most);
         self.fewest = self.fewest.min(self.outstanding);
@@ -73,7 +73,7 @@ impl Lateness {
         self.fewest = self.fewest.min(self.outstanding);
     }
 
-    /// Returns the age of the Move after which as many Moves were sent as are outstanding, ticks.
+    /// Returns the age in ticks of the newest Move that has been answered: all outstanding Moves were sent after it.
     fn age(&self) -> u8 {
         let (mut behind, mut age) = (self.outstanding, 0);
         while age < MOST && (behind > 0 || self.moves >> age & 1 == 0) {
@@ -93,10 +93,10 @@ mod tests {
 
     use super::*;
 
-    /// A Move that is sent or not, and its answer: lost, or so late.
+    /// One tick: `true` if a Move was sent, `true` if its answer is lost, and the lateness of the answer.
     type Sent = (bool, bool, u8);
 
-    /// Returns for each tick the counted lateness, and the real lateness of the newest answer, if there is one.
+    /// Returns for each tick the counted lateness, and the real lateness of the newest answer, if any.
     fn counted(sent: &[Sent]) -> Vec<(u8, Option<u8>)> {
         let mut lateness = Lateness::default();
         let (mut due, mut last) = (Vec::new(), 0);
@@ -116,8 +116,8 @@ mod tests {
         all
     }
 
-    /// A burst that shows how late answers may be, and then any; in every 24th tick all that is on its way has come. Some Moves are not
-    /// sent, and `lost` of a hundred answers are lost in these `ticks`.
+    /// Begins with a burst that shows the highest lateness; after that, any lateness may occur. In every 24th tick all outstanding answers
+    /// have come. Some Moves are not sent, and `lost` of 100 answers are lost in these `ticks`.
     fn sent(most: u8, lost: u32, ticks: usize) -> impl Strategy<Value = Vec<Sent>> {
         let any = (prop::bool::weighted(0.9), 0..100u32, 0..=most);
         prop::collection::vec(any, ticks).prop_map(move |any| {
@@ -133,7 +133,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// If no answer is lost, the counted lateness of every answer after the burst is the real one.
+        /// If no answer is lost, the counted lateness of every answer after the burst is correct.
         #[test]
         fn j63_unanswered_moves_are_how_late_an_answer_is(sent in (1..=MOST).prop_flat_map(|most| sent(most, 0, 700))) {
             for (tick, (age, late)) in counted(&sent).into_iter().enumerate().skip(2 * usize::from(MOST)) {
@@ -141,10 +141,10 @@ mod tests {
             }
         }
 
-        /// If some answers were lost, every count is right again when the windows of the loss are over.
+        /// If some answers were lost, every count is correct again after the windows of the loss.
         #[test]
         fn j63_what_was_lost_is_taken_off(
-            // With as many outstanding as possible, one more makes no difference: so there are fewer.
+            // If the highest number of answers is outstanding, a lost one makes no difference. Therefore fewer are outstanding here.
             some in (1..=MOST).prop_flat_map(|most| (sent(most, 20, 240), sent(most - 1, 0, 480))),
         ) {
             let (with, without) = some;
@@ -155,7 +155,7 @@ mod tests {
             }
         }
 
-        /// Without two answers in a tick, every missing answer counts as lost.
+        /// Without two answers in a tick, every missing answer is counted as lost.
         #[test]
         fn j63_without_evidence_nothing_is_late(lost in prop::collection::vec(any::<bool>(), 300)) {
             let sent: Vec<Sent> = lost.into_iter().map(|lost| (true, lost, 0)).collect();
@@ -163,7 +163,7 @@ mod tests {
         }
     }
 
-    /// Ticks that did not come make an answer later.
+    /// Ticks that were missed make an answer later.
     #[test]
     fn j63_an_answer_is_as_late_as_the_ticks_were_long() {
         for long in 1..=u32::from(MOST) {
@@ -172,7 +172,7 @@ mod tests {
             assert_eq!(lateness.count(true, 1, 1), 0);
             lateness.count(true, 0, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8);
-            // And the answer to the Move of the tick before.
+            // This tick also gets the answer to the Move of the tick before.
             lateness.count(true, 2, 1);
             assert_eq!(lateness.count(true, 1, long), long as u8 - 1);
         }
@@ -187,7 +187,7 @@ mod tests {
             lateness.count(true, 1, 1);
         }
         assert!(lateness.stands(0) && lateness.stands(1) && !lateness.stands(2));
-        // A long tick is as many.
+        // A long tick is counted as several ticks.
         lateness.count(true, 2, 1);
         lateness.count(true, 1, u32::from(LASTS_MS) + 7);
         assert!(lateness.stands(1));

@@ -1,4 +1,4 @@
-//! Tests of the measurement, and of the prediction in its place (J-35, J-63).
+//! Tests of the measurement and of its prediction (J-35, J-63).
 extern crate std;
 
 use super::*;
@@ -6,7 +6,7 @@ use super::*;
 mod late;
 
 const VELOCITY_MAX: f64 = 2.0;
-/// Error of a prediction, rad, or of a rate, rad/s, because the history has single precision.
+/// Error of a prediction (rad) or of a rate (rad/s), because the history has single precision.
 const ROUNDED: f64 = 1e-6;
 
 fn tick(answer: Option<f64>, velocity: f64) -> Tick {
@@ -34,7 +34,7 @@ fn step(joint: &mut Measurement, tick: &Tick) -> bool {
     joint.step(tick, past, &Config::avena()) == Outcome::Used
 }
 
-/// A joint that has moved at this velocity for a while; it is at 0 now.
+/// A joint that has moved at this velocity for a while. It is at position 0 now.
 fn moving(velocity: f64) -> Measurement {
     let mut joint = Measurement::default();
     for k in -20..=0 {
@@ -53,7 +53,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
             assert_eq!(joint.used().velocity, velocity);
         }
     }
-    // The change of the commanded velocity is followed.
+    // The prediction follows a change of the commanded velocity.
     let mut joint = moving(0.4);
     let slower = Tick { commanded: 0.1, ..tick(None, 0.4) };
     step(&mut joint, &slower);
@@ -61,7 +61,7 @@ fn j63_a_missing_answer_is_predicted_from_the_motion() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-12);
 }
 
-/// A joint that was thrown is not carried on as fast as it flew.
+/// The prediction of a joint that was thrown is slower than the throw.
 #[test]
 fn j63_no_more_is_carried_on_than_a_little_over_the_velocity_limit() {
     for (velocity, carried) in [(1.7, 1.7), (2.5, 1.2 * VELOCITY_MAX), (-2.5, -1.2 * VELOCITY_MAX)] {
@@ -127,7 +127,7 @@ fn j63_the_return_of_the_answers_makes_no_step_and_ends_at_the_answer() {
         }
     }
     assert_eq!(last, Reading { position: 0.01, velocity: 0.5 });
-    // Most of it within the setting, 100 ms.
+    // Most of the offset has faded within the configured time, 100 ms.
     assert!(
         (0.01 - after_100_ms.position).abs() < 0.2 * 0.01 && (0.5 - after_100_ms.velocity).abs() < 0.2 * 0.5
     );
@@ -140,8 +140,8 @@ fn j63_a_long_tick_is_predicted_for_its_length() {
     assert!((joint.used().position - 0.4 * 3.0 * DT).abs() < ROUNDED);
 }
 
-/// A joint at `rate` that reports another velocity, until an answer comes `off` the way, `since` more go on from there, and the
-/// next is missing: how much is carried on.
+/// A joint moves at `rate` but reports another velocity. Then an answer is `off` its position, `since` more answers follow from there, and
+/// the next answer is missing. Returns the rate of its prediction.
 fn carried_after(rate: f64, reported: f64, off: f64, since: u8) -> f64 {
     let mut joint = Measurement::default();
     let answer = |k: f64, off: f64| Tick {
@@ -165,11 +165,11 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     for (rate, reported, off, since, carried) in [
         (0.4, 0.5, 0.0, 0, 0.4),
         (0.4, 0.3, 0.0, 0, 0.4),
-        // The way of 5 ms is now longer by a tenth of the implausible way of one millisecond.
+        // The distance in 5 ms is now longer by a tenth of the implausible distance of one millisecond.
         (0.0, 0.0, unexpected, 0, unexpected / (5.0 * DT)),
         (0.0, 0.0, 1.01 * unexpected, 0, 0.0),
         (0.0, 0.1, -1.01 * unexpected, 0, 0.1),
-        // The reported velocity is carried on until the rate comes from answers after the jump alone.
+        // The reported velocity is used until the rate contains only answers after the jump.
         (0.4, 0.5, 2.0 * unexpected, 0, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 4, 0.5),
         (0.4, 0.5, 2.0 * unexpected, 5, 0.4),
@@ -180,7 +180,7 @@ fn j63_the_rate_of_the_positions_is_carried_on_unless_they_jumped() {
     }
 }
 
-/// The predicted velocity follows the commands; its difference from the answer fades.
+/// The predicted velocity follows the commands. Its difference from the answer fades.
 #[test]
 fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     let mut joint = moving(0.4);
@@ -191,7 +191,7 @@ fn j63_commands_during_a_loss_make_no_step_when_it_ends() {
     assert!((joint.used().velocity - 0.1).abs() < 1e-9, "{:?}", joint.used());
 }
 
-/// An answer that is missing, or unusable, leaves a difference that fades; one that no Move has requested is not missing.
+/// A missing or unusable answer leaves a difference that fades. An answer that no Move has requested is not missing.
 #[test]
 fn j63_only_what_was_expected_or_came_can_be_missing() {
     for (lost, jumps) in [
@@ -216,7 +216,7 @@ fn j16_the_speed_is_seen_where_the_reported_velocity_is_wrong() {
     assert!((joint.speed() - 0.3).abs() < ROUNDED);
 }
 
-/// The offset decays like the double pole, for any ticks and any state.
+/// The offset decays like the double pole, for any length of the ticks and from any state.
 #[test]
 fn j63_an_offset_fades_like_a_critically_damped_filter() {
     let config = Config::avena();
@@ -232,11 +232,11 @@ fn j63_an_offset_fades_like_a_critically_damped_filter() {
             assert!((fading.slope - exact.1).abs() < 1e-4 * 1e-3, "{ms} ms: {fading:?} {exact:?}");
         }
     }
-    // However little is left: none of it is dropped at once.
+    // A small remainder is not dropped at once either.
     let mut little = Fading { left: 1e-6, slope: 0.0 };
     little.step(1, &config);
     assert!(little.left > 0.9e-6, "{little:?}");
-    // In no time nothing fades; what is dropped is less than the bound, of the offset and of its slope.
+    // Without elapsed time nothing fades. An offset is dropped only if both its value and its slope are below the bound.
     for (left, slope, dropped) in [
         (FADED, 0.0, false),
         (0.0, -FADED, false),

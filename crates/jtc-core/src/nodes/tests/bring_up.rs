@@ -1,4 +1,4 @@
-//! Requests to a drive, and its diagram in docs/protocol-jtc.md.
+//! Requests to a drive, and the diagram of them in docs/protocol-jtc.md.
 extern crate std;
 use std::format;
 use std::string::String;
@@ -7,7 +7,7 @@ use std::vec::Vec;
 use super::*;
 use crate::drawn::is_in_the_protocol;
 
-/// States of a drive that need no more than time, the request that leads to each, and its name.
+/// States of a drive that it leaves after some time, the request that leads to each, and its name.
 const STATES: [(NodeState, Target, &str); 5] = [
     (NodeState::START, Target::NoChange, "Start"),
     (NodeState::INIT, Target::Init, "Init"),
@@ -17,7 +17,7 @@ const STATES: [(NodeState, Target, &str); 5] = [
 ];
 const GOALS: [(Goal, &str); 3] =
     [(Goal::Ready, "in Init"), (Goal::Enabled, "with torque"), (Goal::Down, "in Error")];
-/// Knowledge of a node's configuration.
+/// Possible knowledge about the configuration of a node.
 const KNOWN: [(bool, bool, &str); 3] =
     [(false, false, "unknown"), (false, true, "refused"), (true, false, "accepted")];
 
@@ -55,7 +55,7 @@ fn j16_j20_the_diagram_is_what_is_requested() {
     is_in_the_protocol("bring-up", &diagram());
 }
 
-/// For any other knowledge of the drive.
+/// Tests all other combinations of the knowledge about a drive.
 #[test]
 fn j16_only_a_drive_that_is_ready_and_wanted_enabled_is_enabled() {
     for (goal, known) in GOALS.iter().flat_map(|(goal, _)| KNOWN.map(|known| (*goal, known))) {

@@ -22,7 +22,7 @@ fn j16_j20_what_a_node_is_asked_for() {
             for (expected, is_configured) in [(unconfigured, false), (configured, true)] {
                 let mut expected = expected;
                 if refused && !is_configured && state == NodeState::READY {
-                    // The node takes its configuration in Init only.
+                    // The node accepts its configuration only in Init.
                     expected[0] = Init;
                 }
                 let got = [Goal::Ready, Goal::Enabled, Goal::Down]
@@ -73,7 +73,7 @@ enum Sent {
     ResetAll,
 }
 
-/// Sends one frame to nodes that `change` made of ready ones, `moves` Moves after the last other frame.
+/// Sends one frame to ready nodes that `change` has modified. `moves`: number of Moves since the last other frame.
 fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     let (config, mut nodes) = (Config::avena(), ready());
     nodes.moves = moves;
@@ -88,7 +88,7 @@ fn sent(goal: Goal, moves: u8, change: impl FnOnce(&mut Nodes)) -> Sent {
     }
 }
 
-/// Node `n` waits for its configuration, in Init.
+/// Puts node `n` into Init, where it waits for its configuration.
 fn waits(nodes: &mut Nodes, n: usize) {
     (nodes.nodes[n].configured, nodes.nodes[n].valid, nodes.nodes[n].report.state) =
         (false, false, NodeState::INIT);
@@ -105,7 +105,7 @@ fn j12_at_most_one_tick_of_four_sends_another_frame_than_move() {
     assert_eq!(sent(Goal::Ready, 3, |nodes| nodes.reset(0x7F)), Sent::ResetAll);
 }
 
-/// Without a gripper the joints are all there is.
+/// Without a gripper the joints are the only nodes.
 #[test]
 fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     for (gripper, mask, frame) in [
@@ -128,7 +128,7 @@ fn j20_j23_an_absent_gripper_is_neither_reset_nor_cleared() {
     }
 }
 
-/// Under torque, a frame that only the gripper needs comes in one tick of twenty.
+/// Under torque, a frame for the gripper alone is sent in one tick of twenty.
 #[test]
 fn j23_a_gripper_is_brought_up_on_the_side() {
     let (wait, many) = (|nodes: &mut Nodes| waits(nodes, GRIPPER), 19);
@@ -153,22 +153,22 @@ fn j23_a_gripper_is_brought_up_on_the_side() {
         nodes.nodes[GRIPPER].silent = 5;
     };
     assert_eq!(sent(Goal::Ready, many, silent), Sent::Move, "it is not there to be configured");
-    // A joint that must be enabled does not wait that long.
+    // A joint that must be enabled does not wait for so many ticks.
     let still = |nodes: &mut Nodes| nodes.still_ms = Config::avena().enable_still_ms;
     assert_eq!(sent(Goal::Enabled, 3, still), Sent::ControllerState);
     assert_eq!(sent(Goal::Enabled, 3, |_| ()), Sent::Move, "J-16: the arm falls");
 }
 
-/// Configurations and changes of state take turns, but a node that is enabled refuses the former.
+/// Configurations and changes of state take turns, but a node that is enabled refuses a configuration.
 #[test]
 fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     for (state, seen, configured_last, frame) in [
         (NodeState::ENABLED, true, false, Sent::ControllerState),
         (NodeState::ENABLED, true, true, Sent::ControllerState),
-        // To be brought from Init to Ready, which can wait.
+        // The node must be brought from Init to Ready, which can wait.
         (NodeState::INIT, true, false, Sent::Mode),
         (NodeState::INIT, true, true, Sent::ControllerState),
-        // After a restart, earlier reports of the node have no meaning.
+        // After a restart, earlier reports of the node are not valid.
         (NodeState::ENABLED, false, false, Sent::Mode),
         (NodeState::ENABLED, false, true, Sent::Mode),
     ] {
@@ -181,7 +181,7 @@ fn j20_nodes_that_are_enabled_are_disabled_before_others_are_configured() {
     }
 }
 
-/// If no other frame must be sent, one configuration may follow another; a node that must stay enabled has nothing to wait for.
+/// If no other frame must be sent, one configuration may follow another. A node that must stay enabled does not need to wait.
 #[test]
 fn j20_configurations_and_changes_of_state_take_turns() {
     let enabling = |nodes: &mut Nodes| {
@@ -206,8 +206,8 @@ fn j20_configurations_and_changes_of_state_take_turns() {
     }
 }
 
-/// Returns the request to a gripper in this state while the joints are in the state of the goal; a frame that requests no change of state
-/// requests none of the gripper.
+/// Returns the request to a gripper in this state while the joints are in the state of the goal. A frame without a change of state contains
+/// no request to the gripper.
 fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool, clear: bool) -> Target {
     let mut nodes = ready();
     if goal == Goal::Enabled {
@@ -222,7 +222,7 @@ fn gripper_asked(config: &Config, goal: Goal, state: NodeState, configured: bool
     }
 }
 
-/// A gripper that keeps its part is left alone while the arm has no torque, but not against its own clear, nor for ever.
+/// A gripper that keeps its part does not change while the arm has no torque, except for its own clear, and not for ever.
 #[test]
 fn j23_what_a_gripper_is_asked_for() {
     use Target::{Enable, Init, NoChange, Ready};
@@ -232,13 +232,13 @@ fn j23_what_a_gripper_is_asked_for() {
         (Goal::Ready, NodeState::ENABLED, true, false, Ready, NoChange),
         (Goal::Down, NodeState::ENABLED, true, true, Ready, Ready),
         (Goal::Ready, NodeState::ENABLED, true, true, Ready, Ready),
-        // Enabled, but its configuration is lost: it takes one in Ready only.
+        // Enabled, but the configuration is lost: the gripper accepts a new one only in Ready.
         (Goal::Enabled, NodeState::ENABLED, false, false, Ready, Ready),
         (Goal::Enabled, NodeState::READY, true, false, Enable, Enable),
         (Goal::Enabled, NodeState::READY, false, false, NoChange, NoChange),
         (Goal::Enabled, NodeState::START, false, false, Init, Init),
         (Goal::Enabled, NodeState::INIT, true, false, Ready, Ready),
-        // In Error nothing is brought up.
+        // In Error no node is brought up.
         (Goal::Ready, NodeState::START, false, false, Init, Init),
         (Goal::Down, NodeState::START, false, false, NoChange, NoChange),
     ] {

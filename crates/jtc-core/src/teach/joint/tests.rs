@@ -10,7 +10,7 @@ fn limits() -> JointConfig {
     Config::avena().joints[1]
 }
 
-/// At rest at `position` (rad), with this Coulomb friction (N·m).
+/// A joint at rest at `position` (rad), with this Coulomb friction (N·m).
 fn begun(position: f64, coulomb: f64) -> TaughtJoint {
     let mut joint = TaughtJoint::begin(position, &limits(), (-1.5, 1.5));
     joint.set_inertia(INERTIA);
@@ -30,7 +30,7 @@ fn tick(joint: &mut TaughtJoint, position: f64, velocity: f64) -> TaughtTorque {
     tick_of(joint, &limits(), position, velocity)
 }
 
-/// A joint that moves at `velocity` (rad/s) around 0 for a second.
+/// Moves a joint at `velocity` (rad/s) around 0 for a second, and returns its last torque.
 fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
     let mut joint = begun(-velocity, coulomb);
     let mut torque = TaughtTorque::default();
@@ -41,8 +41,8 @@ fn moving(velocity: f64, coulomb: f64) -> TaughtTorque {
 }
 
 proptest! {
-    /// Together with the damping neither the friction that is taken away nor the dry friction ever drives a joint on, and the torque
-    /// against the motion never falls with the speed.
+    /// Together with the damping, neither the friction compensation nor the dry friction ever drives a joint, and the torque against the
+    /// motion never falls with the speed.
     #[test]
     fn j25_the_faster_a_joint_is_the_more_torque_it_has_against_it(
         slow in 0.001..1.4f64, more in 0.001..0.3f64, coulomb in 0.0..10.0f64, sign in prop_oneof![Just(-1.0), Just(1.0)],
@@ -60,7 +60,7 @@ proptest! {
         let limits = JointConfig { teach_damping: damping, rotor_inertia: 0.05, ..limits() };
         let mut joint = begun(0.0, 0.0);
         joint.set_inertia(inertia);
-        // Fast enough to be beyond dry friction, slow enough not to be braked harder.
+        // This speed is too high for dry friction, and too low for increased damping.
         joint.grip = 0.0;
         let torque = tick_of(&mut joint, &limits, 0.0, 0.39).brake;
         let expected = damping.min(90.0 * inertia) * 0.39;
@@ -75,7 +75,7 @@ fn j25_a_joint_at_rest_is_held_by_dry_friction_up_to_its_breakaway_torque() {
         let mut joint = begun(0.2, coulomb);
         let at_rest = tick(&mut joint, 0.2, 0.0);
         assert!(at_rest.brake.abs() < 1e-3 && at_rest.friction == 0.0, "no step at the begin");
-        // Pulled away slowly the joint slips, and is then held at its new position.
+        // A joint that is pulled slowly slips, and is then held at its new position.
         let slips = tick(&mut joint, 0.25, 0.0).brake;
         assert!((slips + breakaway).abs() < 1e-3, "{slips} N·m, not {breakaway}");
         let back = tick(&mut joint, 0.2, 0.0).brake;
@@ -100,7 +100,7 @@ fn j25_the_dry_friction_lets_go_of_a_joint_that_moves_and_takes_hold_again() {
     assert!(held < -0.9 * 0.03 * limits().torque_max, "{held} N·m after 300 ms");
 }
 
-/// Half of the Coulomb part, smoothed within 0.1 rad/s, gone from 0.6 rad/s on; less if the damping does not bear its slope.
+/// Half of the Coulomb friction, smoothed within 0.1 rad/s, and zero from 0.6 rad/s on. It is less if the damping does not allow its slope.
 #[test]
 fn j25_a_share_of_the_coulomb_friction_is_taken_away() {
     for (velocity, share) in
@@ -124,13 +124,13 @@ fn j25_at_a_soft_end_a_joint_is_pushed_back_and_one_that_begins_there_is_not() {
         let torque = tick(&mut joint, position, 0.0).brake;
         assert!((torque + part * share).abs() < 1e-3, "{torque} N·m at {position} rad");
     }
-    // A joint that is found in there, or beyond, is not moved; further out it meets the spring.
+    // A joint that begins inside the soft end, or beyond the limit, is not moved. Further out, the spring acts.
     for (found, further) in [(1.45, 1.5), (1.7, 1.75), (-1.45, -1.5)] {
         let mut joint = begun(found, 8.0);
         assert!(tick(&mut joint, found, 0.0).brake.abs() < 1e-3, "{found}");
         let torque = tick(&mut joint, further, 0.0).brake;
         assert!((torque + 0.5 * share * f64::signum(found)).abs() < 1e-3, "{torque} N·m at {further} rad");
-        // Led inwards and out again the joint has no margin of its own any more.
+        // After it was led inwards and out again, the spring acts on the joint from the start of the soft end.
         tick(&mut joint, 0.0, 0.0);
         let torque = tick(&mut joint, 1.45, 0.0).brake;
         assert!((torque + 0.5 * share).abs() < 1e-3, "{torque} N·m");

@@ -1,30 +1,30 @@
-//! Answers that come late, and some that are lost among them (J-63).
+//! Late answers, and lost answers among them (J-63).
 use std::vec::Vec;
 
 use proptest::prelude::*;
 
 use super::*;
 
-/// A step of the encoders.
+/// One step of the encoders, rad.
 const ENCODER: f64 = 96e-6;
 
-/// A joint that goes to and fro.
+/// A joint that moves to and fro.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
-    /// rad.
+    /// Amplitude, rad.
     amplitude: f64,
-    /// 1/s.
+    /// Angular frequency, 1/s.
     rate: f64,
-    /// Share of it that is commanded: the rest is what the joint does of itself.
+    /// Commanded share of the motion. The rest of the motion is not commanded.
     commanded: f64,
 }
 
 /// Difference between the values used in a millisecond, and the real position and speed of the joint.
 #[derive(Clone, Copy, Debug)]
 struct Off {
-    /// rad.
+    /// Position, rad.
     position: f64,
-    /// rad/s.
+    /// Velocity, rad/s.
     velocity: f64,
 }
 
@@ -51,7 +51,7 @@ impl Motion {
         }
     }
 
-    /// Each millisecond; `came`: its answers.
+    /// Runs all milliseconds. `came`: the numbers of the answers in each of them.
     fn off(&self, came: &[Vec<u32>]) -> Vec<Off> {
         self.off_with(came, &Config::avena())
     }
@@ -85,7 +85,8 @@ impl Motion {
     }
 }
 
-/// The numbers of the answers that come in each millisecond: each so late, in order; `lost` ones never.
+/// Returns the numbers of the answers that come in each millisecond. `late`: lateness of each answer; the answers keep their order. `lost`:
+/// answers that never come.
 fn arrivals(late: &[u32], lost: &[u32]) -> Vec<Vec<u32>> {
     let mut came = std::vec![Vec::new(); late.len()];
     let mut last = 0;
@@ -98,12 +99,13 @@ fn arrivals(late: &[u32], lost: &[u32]) -> Vec<Vec<u32>> {
     came
 }
 
-/// rad.
+/// Returns the largest position error, rad.
 fn most(off: &[Off]) -> f64 {
     off.iter().fold(0.0, |most, off| most.max(off.position.abs()))
 }
 
-/// Lateness of each answer: twenty in time, then a burst that shows how late they may be, then any, and all in time in every 24th tick.
+/// Lateness of each answer: twenty answers in time, then a burst that shows the highest lateness, then any lateness. In every 24th tick all
+/// answers have come.
 fn lateness(most: u32) -> impl Strategy<Value = Vec<u32>> {
     let burst = (0..=20).map(|_| 0).chain((0..=most).rev());
     let burst: Vec<u32> = burst.collect();
@@ -124,19 +126,20 @@ fn motion() -> impl Strategy<Value = Motion> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// A late answer, once it is known that there are some, is worth one in time but for what the joint has done since: steps of the
-    /// encoder, and what the rate carried on is off by. Taken for one in time, it would be off by its lateness times the speed, 3 mrad.
+    /// Once it is known that answers may be late, the position from a late answer differs from the real one only by encoder steps and by
+    /// the error of the predicted rate. If the answer were used as if it came in time, the error would be its lateness times the speed, 3
+    /// mrad.
     #[test]
     fn j63_late_answers_are_used_as_of_the_time_at_which_they_were_due(
         motion in motion(),
         late in (1u32..=5).prop_flat_map(lateness),
     ) {
         let off = motion.off(&arrivals(&late, &[]));
-        // The differences of the burst itself have been bridged, and fade.
+        // The differences during the burst have been bridged, and fade.
         prop_assert!(most(&off[300..]) <= 4.0 * ENCODER, "{} rad", most(&off[300..]));
     }
 
-    /// Late velocities: a joint that follows its command has the velocity that was reported, plus the change of the commanded velocity
+    /// The velocity of a joint that follows its command is the velocity in its late answer, plus the change of the commanded velocity
     /// since.
     #[test]
     fn j63_late_velocities_are_taken_on_by_what_was_commanded(motion in motion(), late in lateness(3)) {
@@ -146,15 +149,15 @@ proptest! {
         }
     }
 
-    /// However many answers are lost among the late ones, the position used is off by the way of the highest lateness, and by the bridged
-    /// difference when that is seen, which is as much. No part of it stays.
+    /// However many answers are lost among the late ones, the position error is at most the distance in the highest lateness, plus the
+    /// bridged difference when the loss is detected, which is equally large. No part of the error remains.
     #[test]
     fn j63_answers_lost_among_late_ones_are_taken_for_late_for_a_while_only(
         motion in motion(),
         late in lateness(3),
         lost in prop::collection::vec(30u32..300, 0..20),
     ) {
-        // None is late in the end, but what was lost shows there all the same.
+        // No answer is late in the second half, but the losses are detected there as well.
         let late: Vec<u32> = late.iter().enumerate().map(|(n, late)| if n < 400 { *late } else { 0 }).collect();
         let off = motion.off(&arrivals(&late, &lost));
         let way = 4.0 * motion.speed() * DT;
@@ -163,8 +166,8 @@ proptest! {
     }
 }
 
-/// If a joint is fast, the answer after a lost one is at its predicted position, and does not lag by the way of a millisecond: the loss is
-/// seen before the rest of the window is over.
+/// The answer of a fast joint after a lost one is at its predicted position, and does not lag by the distance of a millisecond. So the loss
+/// is detected before the window is over.
 #[test]
 fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -174,7 +177,7 @@ fn j63_a_fast_joint_shows_at_once_that_an_answer_was_lost() {
     assert!(most(&off[190..250]) <= 3.0 * ENCODER, "{:?}", &off[190..250]);
 }
 
-/// Answers that were late before that was known make no step: they are bridged, and the difference fades.
+/// Late answers before the first evidence make no step: the difference is bridged, and fades.
 #[test]
 fn j63_the_first_late_answers_make_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -187,7 +190,7 @@ fn j63_the_first_late_answers_make_no_step() {
     }
 }
 
-/// A lateness that shifts, once lateness is known, makes no step either, also if the encoder is configured as coarse.
+/// Once answers are known to be late, a change of the lateness makes no step, even if the encoder is configured as coarse.
 #[test]
 fn j63_a_lateness_that_shifts_makes_no_step() {
     let motion = Motion { amplitude: 0.6, rate: 1.0, commanded: 1.0 };
@@ -204,8 +207,8 @@ fn j63_a_lateness_that_shifts_makes_no_step() {
     }
 }
 
-/// A constant delay is not seen by this (it is what `delay_ticks` is for), and answers that are all late by the same are followed
-/// without an offset that stays.
+/// A constant delay is not detected; `delay_ticks` exists for it. If all answers have the same lateness, the position follows them without
+/// a permanent offset.
 #[test]
 fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     let motion = Motion { amplitude: 0.5, rate: 2.0, commanded: 1.0 };
@@ -219,7 +222,7 @@ fn j63_answers_that_are_all_as_late_are_taken_as_they_come() {
     }
 }
 
-/// The bridged difference of an answer off its prediction does not add up if the answers return to their place in small steps.
+/// If answers leave their prediction and return to it in small steps, the bridged differences do not add up.
 #[test]
 fn j63_what_was_bridged_is_taken_back() {
     let mut joint = moving(0.0);
@@ -238,7 +241,7 @@ fn j63_what_was_bridged_is_taken_back() {
     }
 }
 
-/// Toward nothing, and not beyond it.
+/// The remainder changes towards zero, and not beyond it.
 #[test]
 fn j63_only_what_is_left_is_taken_back() {
     for (left, by, remains) in [

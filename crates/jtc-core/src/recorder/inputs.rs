@@ -76,7 +76,7 @@ pub(super) mod head {
     pub const QUIET: u32 = 1 << 2;
     /// Each expected node has answered, in order. Words with the distances of the joints follow.
     pub const ORDERED: u32 = 1 << 3;
-    /// The distance of a joint is too large for [`WAY_BITS`], so the words contain all positions.
+    /// The distance of a joint is too large for [`super::WAY_BITS`], so the words contain all positions.
     pub const FAR: u32 = 1 << 4;
     /// Other values than the motion have changed.
     pub const CHANGED: u32 = 1 << 5;

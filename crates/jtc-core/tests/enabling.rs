@@ -1,5 +1,4 @@
-//! Joints are enabled only in an arm that hardly moves. If a joint moves nevertheless, it comes to rest without a
-//! torque step (J-16).
+//! Joints are enabled only while the arm hardly moves. If a joint moves nevertheless, it comes to rest without a torque step (J-16).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, Target};
@@ -9,12 +8,12 @@ use rig::Rig;
 
 const JOINT: usize = 1;
 
-/// Swings joint 1 in Error, after the cause has ended and was cleared. `report` maps its true position and velocity to
-/// the reported ones.
+/// Swings joint 1 in Error, after the cause of the error has ended and was cleared. `report` maps its true position and velocity to the
+/// reported ones.
 fn swing(rig: &mut Rig, ticks: usize, speed: f64, report: Report) {
     let start = rig.nodes[JOINT].report.position;
     for k in 0..ticks {
-        // To and fro, 0.2 s each way, so that the joint stays near.
+        // The joint moves to and fro, 0.2 s in each direction, so that it stays near its position.
         let phase = (k % 400) as f64;
         let (way, sign) = if phase < 200.0 { (phase, 1.0) } else { (400.0 - phase, -1.0) };
         let (position, velocity) = report(speed * way * 0.001, sign * speed);
@@ -33,7 +32,7 @@ fn asked_to_enable(requests: &[Request]) -> bool {
         .any(|r| matches!(r, Request::ChangeFsm { target } if target[..6].contains(&Target::Enable)))
 }
 
-/// Returns a rig in Error without an error left to clear.
+/// Returns a rig in Error that has no error to clear any more.
 fn stopped(config: Config) -> Rig {
     let mut rig = Rig::new(config);
     rig.defaults();
@@ -46,7 +45,7 @@ fn stopped(config: Config) -> Rig {
 
 #[test]
 fn j16_no_joint_is_enabled_while_one_moves() {
-    // True values; a drive that reports no velocity; a drive that reports it while the position is still the old one.
+    // A drive that reports the true values; one that reports no velocity; one that reports the velocity but still the old position.
     let reports: [Report; 3] = [|q, v| (q, v), |q, _| (q, 0.0), |_, v| (0.0, v)];
     for report in reports {
         for speed in [0.3, 1.5] {
@@ -55,7 +54,7 @@ fn j16_no_joint_is_enabled_while_one_moves() {
             swing(&mut rig, 100, speed, report);
             rig.send(FrameType::ClearCurrentErrors, &[1, 0x7F, 0, 0]);
             let from = rig.sent.len();
-            // The time limit of enabling counts only while enabling is requested.
+            // The time limit of enabling runs only while enabling is requested.
             swing(&mut rig, 3000, speed, report);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{speed} rad/s");
             assert!(!asked_to_enable(&rig.sent[from..]), "{speed} rad/s");
@@ -92,7 +91,7 @@ fn j16_the_speed_and_the_time_are_settings() {
 #[test]
 fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step() {
     for velocity in [0.2, -0.7, 1.4] {
-        // The motor takes long to start, and meanwhile the joint begins to fall.
+        // The motor takes long to start, and the joint begins to fall meanwhile.
         let mut rig = stopped(Config::avena());
         rig.nodes[JOINT].slow_enable = true;
         rig.clear(true, 0x7F);
@@ -107,7 +106,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         rig.nodes[JOINT].report.state = NodeState::ENABLED;
         let (start, mut last) = (rig.nodes[JOINT].report.position, 0.0);
         for tick in 0..900 {
-            // An arm that moves as commanded; its present answer is seen two ticks after that command (J-62).
+            // The arm moves as commanded. The controller receives its present answer two ticks after that command (J-62).
             let t = rig.controller.telemetry().joints[JOINT];
             if t.set_velocity != 0.0 {
                 rig.nodes[JOINT].report.velocity = t.set_velocity;
@@ -128,7 +127,7 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
         let t = rig.controller.telemetry().joints[JOINT];
         let way = t.set_position - start;
         assert_eq!(t.set_velocity, 0.0);
-        // 200 ms, or 3 rad/s² at most.
+        // The stop takes 200 ms, or as long as 3 rad/s² require.
         let seconds = f64::max(0.2, 1.5 * f64::abs(velocity) / 3.0);
         assert!(
             (way - 0.5 * seconds * velocity).abs() < 0.01,
@@ -137,8 +136,8 @@ fn j16_a_joint_that_moves_when_it_is_enabled_comes_to_rest_without_a_torque_step
     }
 }
 
-/// The motor control of a drive rests after a stop. If enabling were requested earlier, the joint would be enabled at
-/// the end of that rest, regardless of the arm's motion at that time.
+/// The motor control of a drive pauses after a stop. If enabling were requested earlier, the joint would be enabled at the end of that
+/// pause, whatever the motion of the arm is then.
 #[test]
 fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     let mut rig = Rig::holding();
@@ -150,7 +149,7 @@ fn j16_joints_are_not_asked_while_their_drives_rest_after_a_stop() {
     assert!((400..=410).contains(&ticks), "{ticks} ms");
 }
 
-/// A joint that leaves OperationEnable after it has been enabled is still an error, for any motion of the arm.
+/// A joint that leaves OperationEnable after it has been enabled is still an error, whether the arm moves or not.
 #[test]
 fn j16_the_gate_hides_no_joint_that_leaves_operation_enable() {
     let mut rig = Rig::holding();

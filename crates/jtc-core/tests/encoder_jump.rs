@@ -1,4 +1,4 @@
-//! Encoders that jump, slip, or have a scale other than the setting, on a simulated arm (J-35, J-66, J-69).
+//! Encoders on a simulated arm that jump, slip, or have another scale than configured (J-35, J-66, J-69).
 use crate::plant::{LuGre, POSES, Plant, Random};
 use crate::rig::{Rig, floats, pieces};
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -33,7 +33,7 @@ fn cause(rig: &mut Rig) -> Option<StopCause> {
     rig.info().reactions.expect("reported").stop.map(|(cause, _)| cause)
 }
 
-/// A held arm does not follow an encoder that jumps: it makes a held stop and shows the cause.
+/// A held arm does not follow an encoder that jumps: the jump leads to a held stop, and its cause is shown.
 #[test]
 fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     let mut random = Random(35);
@@ -59,7 +59,7 @@ fn j35_j66_an_encoder_that_jumps_does_not_move_a_held_arm() {
     }
 }
 
-/// An arm in motion does not follow either: it comes to rest on its true path.
+/// An arm in motion does not follow the jump either. It comes to rest on its true path.
 #[test]
 fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     for (joint, size) in [(0, 0.01), (0, -0.2), (1, 0.006), (2, -0.02), (4, 0.1)] {
@@ -87,8 +87,8 @@ fn j35_j69_an_encoder_that_jumps_in_motion_stops_the_arm_on_its_path() {
     }
 }
 
-/// Commands that the controller accepts until the drive has been configured again. Its positions are right, those of
-/// the drive are not.
+/// Tests which commands are accepted until the drive has been configured again. The controller has the correct positions, the drive does
+/// not.
 #[test]
 fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);
@@ -108,7 +108,7 @@ fn j35_after_a_jump_only_slow_jogs_and_teaching_are_taken() {
     assert_eq!(rig.state(), ControllerState::Teaching);
     assert_eq!(rig.ask(FrameType::TeachingModeDisable, &[]), DataStatus::NoError);
     arm.run(&mut rig, 1_000);
-    // The drive is configured again: its position counts.
+    // The drive has been configured again, so its position is used.
     rig.send(FrameType::Disable, &[]);
     arm.run(&mut rig, 100);
     assert_eq!(rig.state(), ControllerState::Init);
@@ -134,7 +134,7 @@ fn j35_a_glitch_shorter_than_five_answers_is_no_jump() {
     }
 }
 
-/// A hand that leads the arm feels nothing: Teaching ends, and the arm is held at its present position.
+/// A person who leads the arm does not feel the jump: Teaching ends, and the arm is held at its present position.
 #[test]
 fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -148,8 +148,7 @@ fn j35_j66_an_encoder_that_jumps_ends_teaching() {
     assert_eq!(cause(&mut rig).map(|cause| cause.kind), Some(StopKind::EncoderJump));
 }
 
-/// A drive whose speed has another full scale than the setting is detected in the first motion, and the factor is
-/// reported.
+/// If the speed of a drive has another full scale than configured, this is detected in the first motion, and the factor is reported.
 #[test]
 fn j35_a_speed_of_another_scale_is_a_held_stop() {
     for (scale, reported) in
@@ -171,7 +170,7 @@ fn j35_a_speed_of_another_scale_is_a_held_stop() {
     }
 }
 
-/// A moving encoder of a motor that stands cannot be used for holding: the drive misbehaves, which is an error.
+/// A joint cannot be held if its encoder moves while the motor is at rest. The drive misbehaves, which is an error.
 #[test]
 fn j35_an_encoder_that_slips_is_an_external_error() {
     let (mut arm, mut rig) = held(POSES[0], 1.0);
@@ -187,7 +186,7 @@ fn j35_an_encoder_that_slips_is_an_external_error() {
     panic!("not found: {:?}", rig.controller.telemetry().joints[3]);
 }
 
-/// If the check is switched off, nothing is compared.
+/// If the check is switched off, positions and speeds are not compared.
 #[test]
 fn j35_without_a_window_nothing_is_compared() {
     let mut arm = arm([0.0; 6], 1.0);
@@ -198,11 +197,11 @@ fn j35_without_a_window_nothing_is_compared() {
     assert_eq!((rig.errors(), cause(&mut rig)), (0, None));
 }
 
-/// A jump is rarely clean: it may pass a value in between, come in two parts, with lost answers, in two joints at once,
-/// and go back.
+/// A jump is rarely a single step. It may pass through a value in between, come in two parts, coincide with lost answers or a jump of
+/// another joint, and go back.
 #[test]
 fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
-    // Offsets of joints 2 and 4 from the true position, rad, each from a time in ms on; and ticks whose answers are
+    // Each row: offsets of joints 2 and 4 from the true position, rad, each with its start time in ms; and the ticks whose answers are
     // lost.
     type Course = (&'static [(usize, f64, f64)], &'static [usize]);
     let courses: [Course; 7] = [
@@ -236,8 +235,8 @@ fn j35_a_jump_in_parts_or_with_lost_answers_does_not_move_the_arm() {
     }
 }
 
-/// An answer with a wrong position and a wrong speed is not a jump: it is not used, like a wrong position without a
-/// speed to compare it with.
+/// An answer with a wrong position and a wrong speed is not a jump. It is not used, like a wrong position without a speed to compare it
+/// with.
 #[test]
 fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     for (position, velocity) in [(0.3, 1.9), (-0.3, 1.2), (0.02, -1.5)] {
@@ -260,8 +259,8 @@ fn j35_j63_neither_position_nor_speed_of_garbage_is_used() {
     }
 }
 
-/// Drives have clocks of their own: near the boundary an answer has a reading of this millisecond or of the last one.
-/// That is neither a jump nor another scale, also at full speed.
+/// Drives have their own clocks. Near the boundary of a tick, an answer contains the reading of this millisecond or of the previous one.
+/// That is neither a jump nor another scale, even at full speed.
 #[test]
 fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     for seed in 0..6u64 {
@@ -293,7 +292,7 @@ fn j35_answers_of_drives_whose_clocks_drift_are_no_jump() {
     }
 }
 
-/// A hand winds up the gears of a taught arm before the motors break away: the encoder does not slip.
+/// A hand twists the gears of a taught arm before the motors start to turn. This must not be taken for a slipping encoder.
 #[test]
 fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     for stiffness in [3_400.0, 10_000.0] {
@@ -304,7 +303,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
         rig.send(FrameType::TeachingModeEnable, &[]);
         arm.run(&mut rig, 500);
         assert_eq!(rig.state(), ControllerState::Teaching);
-        // Readings of the link's encoder, with the motor at rest: to and fro within 60 ms.
+        // Readings of the link's encoder while the motor is at rest: to and fro within 60 ms.
         for k in 0..600 {
             let part = 0.5 - 0.5 * (f64::from(k) * core::f64::consts::TAU / 120.0).cos();
             for (node, breakaway) in rig.nodes.iter_mut().zip([18.0, 18.0, 16.0, 8.0, 8.0, 8.0]) {
@@ -320,7 +319,7 @@ fn j25_j35_a_gear_that_a_hand_twists_is_no_slip() {
     }
 }
 
-/// A speed of another scale blocks all fast motions until the drives were configured with the right scale.
+/// After a wrong scale was found, fast motions are refused until the drives have been configured with the right scale.
 #[test]
 fn j35_a_speed_of_another_scale_is_not_trusted_until_the_setting_is_right() {
     let (mut arm, mut rig) = held([0.0; 6], 1.0);

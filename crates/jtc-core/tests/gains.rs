@@ -1,5 +1,5 @@
-//! Gains that are changed while the arm is held, on a simulated arm: gains that would drop the arm are refused, and
-//! gains that it cannot bear are taken back (J-71).
+//! Changing the gains while the arm is held, on a simulated arm. Gains that would drop the arm are refused, and gains that make it unstable
+//! are replaced by the earlier ones (J-71).
 use jtc_bus::NodeState;
 use jtc_core::{Config, ControllerState, Parameters, PidGains, error, joint_error};
 use jtc_wire::{DataStatus, FrameType, SettingValue, StopKind, StoreState};
@@ -33,7 +33,7 @@ fn body(gains: &Gains) -> Vec<u8> {
     floats(gains.iter().flat_map(|g| [g.kp, g.ki, g.kd, g.int_min, g.int_max].map(|x| x as f32)))
 }
 
-/// Returns an arm without brakes that carries 2 kg which the model lacks, held at rest.
+/// Returns an arm without brakes, held at rest, with 2 kg that the model lacks.
 fn held_with(friction: f64) -> (Plant, Rig) {
     let model = loaded(Parameters::avena().model, 2.0);
     let friction = if friction > 0.0 { LuGre::of_avena_times(friction) } else { [LuGre::NONE; 6] };
@@ -63,7 +63,7 @@ fn farthest(arm: &mut Plant, rig: &mut Rig, from: &[f64; 6], ms: usize) -> f64 {
     farthest
 }
 
-/// Earlier versions accepted all of these gains, and the arm fell by a radian, or moved by 42 mrad.
+/// Earlier versions accepted all of these gains. The arm then fell by one radian, or moved by 42 mrad.
 #[test]
 fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     for (factor, expected) in [
@@ -84,8 +84,7 @@ fn j71_gains_that_drop_the_arm_are_refused_while_it_is_held() {
     }
 }
 
-/// Without an integral the position error must hold the load that the integral had found: that is allowed while the
-/// error is small.
+/// Without an integral the position error must hold the load that the integral had found. This is accepted if the error is small.
 #[test]
 fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     for (kp, expected) in [(1.0, DataStatus::NoError), (0.08, DataStatus::IncorrectValue)] {
@@ -100,7 +99,7 @@ fn j71_an_integral_is_given_up_where_the_joint_sags_little() {
     }
 }
 
-/// Gains of such arms that are in use, and gains on an arm that they are not for.
+/// Gains that are in use on such arms, and the same gains on an arm for which they are not made.
 #[test]
 fn j71_gains_in_use_are_taken_by_the_arm_they_are_for() {
     let stronger = of([
@@ -152,11 +151,11 @@ fn causes(rig: &mut Rig) -> u16 {
     rig.status().joints.iter().fold(0, |all, joint| all | joint.internal)
 }
 
-/// The swing has no external cause: the integral is too strong for the inertia, which no check of the controller
-/// detects. The arm swings within the two seconds of the trial, and the gains before come back.
+/// The swing has no external cause: the integral is too strong for the inertia, which the checks of the controller cannot detect in
+/// advance. The arm swings within the two seconds of the trial, and the earlier gains are restored.
 #[test]
 fn j71_gains_that_make_the_arm_swing_are_taken_back() {
-    // The torque of the last ones stays so small that only the swing is detected.
+    // The last gains cause so little torque that only the swing is detected.
     for [kp, ki, kd] in
         [[8000.0, 50_000.0, 20.0], [2000.0, 50_000.0, 20.0], [8000.0, 14_000.0, 5.0], [400.0, 4000.0, 0.0]]
     {
@@ -164,7 +163,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         let from = arm.q;
         let swinging = of([[kp, ki, kd]; 6]);
         assert_eq!(give(&mut arm, &mut rig, &swinging), DataStatus::NoError);
-        // The trial begins at rest, and a touch is enough.
+        // The trial begins at rest. A touch is sufficient to start the swing.
         arm.run(&mut rig, 550);
         arm.push = [10.0, 20.0, 15.0, 5.0, 4.0, 4.0];
         arm.run(&mut rig, 30);
@@ -175,7 +174,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
         assert_eq!(rig.state(), ControllerState::HoldPos, "{kp} {ki} {kd}");
         assert_eq!(found(&rig), StopKind::Gains, "{kp} {ki} {kd}: causes {causes:#x}");
         assert!(farthest < 0.05, "{kp} {ki} {kd}: {farthest} rad");
-        // Held again, by the gains before.
+        // The arm is held again with the earlier gains.
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
         arm.run(&mut rig, 1_000);
         let before = shipped();
@@ -188,8 +187,7 @@ fn j71_gains_that_make_the_arm_swing_are_taken_back() {
     }
 }
 
-/// A joint that a push overloads while gains are on trial must not keep these gains. After the trial, a push does not
-/// concern the gains.
+/// If a push overloads a joint while gains are on trial, these gains must not be kept. After the trial, a push does not affect the gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     for (wait, taken_back) in [(600, true), (1_700, true), (2_300, false)] {
@@ -205,7 +203,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
         let kind = if taken_back { StopKind::Gains } else { StopKind::Push };
         assert_eq!(found(&rig), kind, "after {wait} ms");
         assert_eq!(rig.clear(true, 0), DataStatus::NoError);
-        // A position error, to measure the stiffness.
+        // A position error, from which the stiffness is measured.
         arm.push[0] = 15.0;
         arm.run(&mut rig, 20);
         let expected = if taken_back { 8000.0 } else { 4000.0 };
@@ -213,8 +211,8 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_pushed() {
     }
 }
 
-/// A joint that swings with a growing amplitude, far below its torque limit: gains on trial are taken back. Gains that
-/// were in use before are kept.
+/// A joint swings with a growing amplitude, far below its torque limit. Gains on trial are replaced by the earlier ones; gains that have
+/// passed their trial are kept.
 #[test]
 fn j71_a_swing_that_grows_ends_the_trial() {
     for (wait, taken_back) in [(600, true), (2_300, false)] {
@@ -236,7 +234,7 @@ fn j71_a_swing_that_grows_ends_the_trial() {
     }
 }
 
-/// The torque makes no step when gains change, for any share of the integral in it.
+/// The torque does not step when gains change, whatever share of it comes from the integral.
 #[test]
 fn j71_gains_come_in_without_a_step_of_the_torque() {
     let worst_step = |gains: Option<Gains>| {
@@ -258,14 +256,14 @@ fn j71_gains_come_in_without_a_step_of_the_torque() {
         println!(
             "{worst:.2} N·m a tick, {quiet:.2} without new gains; integral {integral:.1}, then {kept:.1} N·m"
         );
-        // A step of the encoder causes the same torque, with one and a half times the gains.
+        // A step of the encoder causes the same change of torque, with gains that are one and a half times as high.
         let encoder = 1.5 * (8000.0 + 80.0 / 0.005) * plant::ENCODER_STEP;
         assert!(worst <= encoder + 0.1, "{worst} N·m, a step of the encoder makes {encoder}");
         assert!((kept - integral).abs() < 1.0, "{integral}, then {kept} N·m");
     }
 }
 
-/// A loop that is unstable when the joints are enabled: no earlier gains exist, and softer gains hold the arm.
+/// A loop is unstable when the joints are enabled. There are no earlier gains, and softer gains hold the arm.
 #[test]
 fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     let model = Parameters::avena().model;
@@ -287,7 +285,7 @@ fn j66_a_joint_whose_loop_is_unstable_gets_softer_gains() {
     assert_eq!(rig.state(), ControllerState::HoldPos);
     assert_eq!(found(&rig), StopKind::Unstable, "{causes:#x}");
     assert!(farthest < 0.09, "{farthest} rad");
-    // The softer gains hold it: a touch causes no lasting swing.
+    // The softer gains hold the arm: a touch causes no lasting swing.
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     arm.run(&mut rig, 2_000);
     arm.push[1] = 20.0;
@@ -307,7 +305,7 @@ fn stiffness_when_pushed(arm: &mut Plant, rig: &mut Rig) -> f64 {
     stiffness(rig, 0)
 }
 
-/// The operator presses the safety input because the arm shakes, or a drive gives up: the arm is not enabled again with these gains.
+/// The operator presses the safety input because the arm shakes, or a drive reports a fault. The arm is not enabled again with these gains.
 #[test]
 fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     for (wait, taken_back) in [(1_000, true), (2_300, false)] {
@@ -339,7 +337,7 @@ fn j71_gains_on_trial_are_taken_back_when_the_arm_is_released() {
     }
 }
 
-/// Teaching does not test gains: the trial continues after it.
+/// Teaching does not test the gains, so the trial continues after it.
 #[test]
 fn j71_teaching_does_not_end_a_trial() {
     let (mut arm, mut rig) = held_with(1.0);
@@ -363,8 +361,7 @@ fn j71_teaching_does_not_end_a_trial() {
     assert_eq!(found(&rig), StopKind::Gains);
 }
 
-/// An arm whose joints are too light for its gains with the present settings is not stored, if Disable has kept its
-/// parts.
+/// If Disable has kept parts that do not match, the arm is not stored: its joints are too light for its gains with the present settings.
 #[test]
 fn j71_an_arm_that_would_be_refused_is_not_stored() {
     use FrameType::{Disable, SetSettings, StoreArm};
@@ -379,8 +376,8 @@ fn j71_an_arm_that_would_be_refused_is_not_stored() {
     assert_eq!(rig.ask(StoreArm, &[]), DataStatus::IncorrectValue);
 }
 
-/// Gains, model and settings that do not fit together are refused in any order, and change nothing. After Disable
-/// another arm can be uploaded in any order.
+/// Gains, model and settings that do not match are refused, whichever comes last, and change nothing. After Disable another arm can be
+/// uploaded in any order.
 #[test]
 fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     use FrameType::{
@@ -394,14 +391,14 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     let mut rig = Rig::holding();
     rig.press_stop(5);
     assert_eq!(rig.state(), ControllerState::Error);
-    // Light rotors cannot bear the gains in use; lighter gains must come first.
+    // Light rotors are refused with the gains in use. Lower gains must be set first.
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(3.0))), bad);
     assert_eq!(rig.ask(PidParam, &body(&times(0.1))), good);
     assert_eq!(rig.ask(SetSettings, &rotors(0.05)), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), bad);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), good);
-    // Without the last arm there is nothing to compare with, until both are there again.
+    // After Disable there is nothing to compare with, until gains and model have both been received again.
     assert_eq!(rig.ask(Disable, &[]), good);
     assert_eq!(rig.ask(PidParamUseDefault, &[]), good);
     assert_eq!(rig.ask(ArmModelUseDefault, &[]), bad);
@@ -410,13 +407,13 @@ fn j71_j53_parts_that_do_not_go_together_are_refused_whichever_comes_last() {
     assert_eq!(rig.ask(FrictionPolynomialUseDefault, &[]), good);
     rig.clear(true, 0);
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // Never a long tick: each of the slices of a model takes one.
+    // Each slice of a model takes a tick of its own, so that no tick becomes too long.
     rig.send(ArmModelUseDefault, &[]);
     let ticks = rig.until(100, |rig| rig.waiting() == 0);
     assert!((18..=20).contains(&ticks), "{ticks}");
 }
 
-/// An arm without physics whose first joint jerks: each jerk takes the torque to both limits, for too short a time to overload the joint.
+/// Jerks the first joint of an arm without physics. Each jerk takes the torque to both limits, but is too short to overload the joint.
 fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     rig.follow = false;
     for pause in pauses_ms {
@@ -427,8 +424,8 @@ fn jerks(rig: &mut Rig, pauses_ms: &[usize]) {
     }
 }
 
-/// Two joints swing under new gains. The gains before come back, and the earlier swing of the second joint does not
-/// count against them.
+/// Two joints swing under new gains. The earlier gains are restored. They are not made softer because of the swing of the second joint
+/// before that.
 #[test]
 fn j66_j71_gains_that_came_back_are_not_softened_for_what_was_before_them() {
     let mut config = Config::avena();
@@ -464,13 +461,13 @@ fn j66_a_torque_that_goes_from_limit_to_limit_gets_softer_gains() {
     let holding = || {
         let mut config = Config::avena();
         config.joints[0].torque_max = 10.0;
-        // Such a joint has more friction than torque.
+        // With these bounds, a joint may have more friction than torque.
         (config.parameter_bounds.friction_max, config.parameter_bounds.slow_friction_max) = (10.0, 10.0);
         let mut rig = Rig::holding_with(config);
         rig.run(1_000);
         rig
     };
-    // Jerks that are far apart are not a swing of the loop.
+    // Single jerks with long pauses are not a swing of the loop.
     let mut rig = holding();
     jerks(&mut rig, &[250, 250, 250]);
     assert_eq!(causes(&mut rig), 0);

@@ -1,5 +1,5 @@
-//! The gripper: it is brought up in parallel with the arm, never takes its torque away, and never starts its pump by
-//! itself (J-14, J-23).
+//! The gripper is brought up in parallel with the arm. It never takes the torque of the arm away, and never starts its pump by itself
+//! (J-14, J-23).
 use crate::rig;
 
 use jtc_bus::{NodeState, Request};
@@ -41,7 +41,7 @@ fn pump(rig: &mut Rig, on: bool) {
     rig.run(2);
 }
 
-/// Runs, and checks that the arm is not disturbed: no error, no other state, only Move in 19 of 20 ticks.
+/// Runs, and checks that the arm is not disturbed: no error, no other state, and a Move in 19 of 20 ticks.
 fn undisturbed(rig: &mut Rig, ticks: usize, state: ControllerState) {
     let from = rig.sent.len();
     for _ in 0..ticks {
@@ -63,7 +63,7 @@ fn j23_a_gripper_that_falls_silent_is_shown_and_nothing_more() {
         let status = rig.status();
         assert_eq!((status.can_error, status.can_current, status.can_occurred), (0, FLAG, FLAG));
         assert_eq!((status.errors, status.occurred, status.node_init), (0, 0, 1 << GRIPPER));
-        // The gripper has been enabled all the time, and so has its pump: it keeps its part.
+        // The gripper and its pump have been on all the time, so the gripper has kept its part.
         rig.nodes[GRIPPER].silent = false;
         undisturbed(&mut rig, 300, state);
         let status = rig.status();
@@ -99,7 +99,7 @@ fn j23_a_gripper_that_leaves_operation_enable_is_enabled_again_without_its_pump(
         rig.nodes[GRIPPER].report.state = NodeState::READY;
         undisturbed(&mut rig, 100, state);
         assert_eq!((rig.nodes[GRIPPER].report.state, rig.pump), (NodeState::ENABLED, false));
-        // A fault of the gripper is shown, and is cleared like that of any node.
+        // A fault of the gripper is shown, and is cleared like a fault of any node.
         rig.nodes[GRIPPER].fault();
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.status().gripper.unwrap().state, NodeState::FAULT);
@@ -119,7 +119,7 @@ fn j23_joints_are_not_reset_while_the_arm_may_move() {
         undisturbed(&mut rig, 100, state);
         assert_eq!(rig.nodes[GRIPPER].resets, 1, "a refused frame changes nothing at all");
         assert!(rig.pump);
-        // A reset of the gripper alone is different.
+        // A reset of the gripper alone switches the pump off.
         assert_eq!(rig.ask(FrameType::ResetCanDevices, &[0x40, 0, 0, 0]), DataStatus::NoError);
         undisturbed(&mut rig, 400, state);
         assert_eq!((rig.nodes[GRIPPER].resets, rig.nodes[GRIPPER].report.state), (2, NodeState::ENABLED));
@@ -143,7 +143,7 @@ fn j23_the_pump_does_not_start_by_itself_after_a_reset() {
         pump(&mut rig, true);
         assert!(rig.pump);
     }
-    // Also not after a joint took the controller back to Init.
+    // The pump does not start either after a joint has taken the controller back to Init.
     let mut rig = powered(ControllerState::HoldPos);
     rig.nodes[2].configured = false;
     rig.nodes[2].report.state = NodeState::INIT;
@@ -166,7 +166,7 @@ fn j14_a_gripper_that_is_not_there_is_no_error_and_keeps_the_controller_in_init(
     assert_eq!((rig.state(), rig.status().can_current), (ControllerState::HoldPos, 0));
 }
 
-/// An error and the way back to HoldPos.
+/// Causes an error, and returns to HoldPos.
 fn error_and_clear(rig: &mut Rig) {
     rig.safety_input = false;
     rig.run(100);
@@ -209,7 +209,7 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert_eq!(rig.state(), ControllerState::HoldPos);
         assert!(held(&rig));
-        // Also through Init.
+        // The same after Init.
         rig.nodes[2].configured = false;
         rig.nodes[2].report.state = NodeState::INIT;
         rig.run(400);
@@ -224,7 +224,7 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
         rig.run(400);
         assert!(!rig.pump, "it does not start by itself");
     }
-    // A pump that did not run when the error came does not start after it.
+    // If the pump was not running when the error came, it does not start afterwards.
     let mut rig = Rig::holding_with(config);
     rig.nodes[GRIPPER].report.state = NodeState::new(12);
     rig.nodes[GRIPPER].slow_enable = true;
@@ -240,8 +240,7 @@ fn the_gripper_keeps_its_part_over_an_error_where_the_setting_says_so() {
     );
 }
 
-/// A command that comes while the gripper is brought up is carried out after that; a command from before its reset is
-/// not.
+/// A command that arrives while the gripper is brought up is executed afterwards. A command from before its reset is not.
 #[test]
 fn j23_a_pump_command_in_init_holds_until_the_gripper_restarts() {
     let mut rig = Rig::new(Config::avena());

@@ -1,5 +1,5 @@
-//! Hand guiding of arms (J-25): the default arm, a UR5 and a Z1 as imported, with masses and friction that differ
-//! slightly from those of their models.
+//! Hand guiding (J-25) of the default arm, a UR5 and a Z1 as imported. Their true masses and friction differ slightly from those of their
+//! models.
 use crate::plant::{ArmFile, Plant, Random, heavier, loaded};
 use crate::rig::Rig;
 use jtc_core::ControllerState;
@@ -96,8 +96,8 @@ fn j25_an_arm_with_a_payload_that_the_model_lacks_stays_where_it_was_found() {
     }
 }
 
-/// A hand leads the arm to another place at 0.2 rad/s and lets go. Friction holds the torque that neither the found
-/// load nor the model explains there, or the arm creeps.
+/// A hand leads the arm to another place at 0.2 rad/s and lets go. Friction holds the torque that neither the load found nor the model
+/// explains there; otherwise the arm creeps.
 #[test]
 fn j25_where_a_hand_lets_go_the_arm_stays_or_creeps() {
     for arm in arms() {
@@ -136,7 +136,7 @@ pub fn highest_speed(plant: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     speed
 }
 
-/// A push of a person who leans on an arm.
+/// A person who leans on an arm.
 struct Lean {
     mass: f64,
     friction: f64,
@@ -162,7 +162,7 @@ fn after_lean(arm: &ArmFile, q: [f64; 6], lean: &Lean) -> Option<f64> {
     None
 }
 
-/// A push that lasts 2 s is not learned as a load; a push that lasts 12 s is.
+/// A push of 2 s is not learned as a load; a push of 12 s is learned.
 #[test]
 fn j25_a_lean_that_ends_drives_no_joint_fast() {
     let (ur5, z1, avena) = (ArmFile::ur5(), ArmFile::z1(), ArmFile::avena());
@@ -187,7 +187,7 @@ fn j25_a_lean_that_ends_drives_no_joint_fast() {
     }
 }
 
-/// All joints at once, up to the torque that is taken for a load.
+/// All joints are pushed at once, up to the highest torque that is learned as a load.
 #[test]
 fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     println!("seed 3");
@@ -207,7 +207,7 @@ fn j25_after_random_leans_no_joint_is_faster_than_0_6_rad_s() {
     assert!(taught > 30, "{taught} of 96");
 }
 
-/// A hand pushes a joint and lets go: the joint never comes near the over-speed of the drives, and is at rest soon.
+/// A hand pushes a joint and lets go. The joint stays far below the over-speed of the drives, and is at rest soon.
 #[test]
 fn j25_a_push_dies_out() {
     for (arm, joint, torque, ms) in [
@@ -232,8 +232,8 @@ fn j25_a_push_dies_out() {
     }
 }
 
-/// A quarter of the torque limit, against three tenths of it; an eighth in wrists, whose rotors are so light that more would bring them to
-/// over-speed.
+/// The push is a quarter of the torque limit, against three tenths of it. In wrists it is an eighth: their rotors are so light that a
+/// stronger push would cause over-speed.
 #[test]
 fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     for arm in arms() {
@@ -258,8 +258,7 @@ fn j25_a_hand_does_not_lead_a_joint_out_of_its_range() {
     }
 }
 
-/// Teaching ends at the end of a push: set values are at rest within 500 ms, no joint reaches its torque limit, and no
-/// error is raised.
+/// Teaching ends at the end of a push. The set values are at rest within 500 ms, no joint reaches its torque limit, and no error is raised.
 #[test]
 fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     for friction in [0.7, 1.0, 1.3] {
@@ -301,7 +300,7 @@ fn j25_j33_teaching_is_left_within_500_ms_and_within_the_torque_limits() {
     }
 }
 
-/// Returns the highest rate (1/s) at which damping of these joints (N·m·s/rad) reduces a speed: power iteration.
+/// Returns the highest rate (1/s) at which the damping of these joints (N·m·s/rad) reduces a speed. It is computed by power iteration.
 fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6]) -> f64 {
     let dynamics = jtc_dynamics::Dynamics::new(&arm.model, [0.0; 3]);
     let (mut v, mut rate) = ([1.0, -0.9, 0.8, -0.7, 0.6, 0.5], 0.0);
@@ -314,8 +313,8 @@ fn highest_rate(arm: &ArmFile, q: &[f64; 6], rotor: &[f64; 6], damping: &[f64; 6
     rate
 }
 
-/// For any load of a joint, and any true rotor inertia from a fifth of the proposed value on, no damper comes near the
-/// 200 1/s that are unstable with measured speeds that are 8 ms old.
+/// For any load of a joint, and any true rotor inertia of at least a fifth of the proposed value, the damping stays far below 200 1/s. That
+/// rate is unstable, because measured speeds are 8 ms old.
 #[test]
 fn j25_no_damping_is_too_much_for_a_joint() {
     println!("seed 5");

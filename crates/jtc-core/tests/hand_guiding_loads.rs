@@ -1,4 +1,4 @@
-//! Loads in hand guiding (J-25): moved to other poses, set, removed, lifted, and arms with wrong parameters.
+//! Loads in hand guiding (J-25): loads that are led to other poses, configured, removed or lifted, and arms with wrong parameters.
 use jtc_core::{ControllerState, Payload, settings};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType};
@@ -19,7 +19,7 @@ fn give(plant: &mut Plant, rig: &mut Rig, mass: f64) {
     plant.run(rig, 1);
 }
 
-/// A hand leads a joint by `way` (rad) at `speed` (rad/s) while the others are free, and lets go.
+/// A hand leads a joint by `way` (rad) at `speed` (rad/s) while the other joints are free, and lets go.
 pub fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64) {
     let (from, ms) = (plant.q[joint], (way.abs() / speed * 1000.0) as usize);
     for k in 0..ms + 500 {
@@ -31,7 +31,7 @@ pub fn lead(plant: &mut Plant, rig: &mut Rig, joint: usize, way: f64, speed: f64
     assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
 }
 
-/// Replaces the mass at the flange; the state of the arm stays.
+/// Replaces the mass at the flange without changing the state of the arm.
 fn reload(plant: &mut Plant, arm: &ArmFile, mass: f64) {
     let now = std::mem::replace(plant, Plant::of(arm, &loaded(arm.model, mass), plant.friction, plant.q));
     (plant.v, plant.rotor, plant.speeds, plant.brakes) = (now.v, now.rotor, now.speeds, now.brakes);
@@ -53,8 +53,8 @@ fn j25_j60_a_payload_that_is_given_and_taken_away_leaves_no_load() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// A payload that was found in a pose with its full load on a joint, and then set in the upright pose without load, is
-/// carried once.
+/// A payload is found in a pose in which its full load acts on a joint, and configured in the upright pose, in which it causes no load. It
+/// is carried only once.
 #[test]
 fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.3), 4_000);
@@ -69,7 +69,7 @@ fn j25_j60_a_payload_given_at_another_pose_is_carried_once() {
     assert!(speed < 0.1, "{way} rad, {speed} rad/s");
 }
 
-/// Over most of the range: the payload needs another torque everywhere.
+/// The arm is led over most of its range. The payload needs another torque in each pose.
 #[test]
 fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     for (mass, from, way, speed) in [
@@ -95,8 +95,7 @@ fn j25_an_unknown_payload_that_is_led_far_does_not_drive_the_arm() {
     }
 }
 
-/// The load that a damper had needed was learned while it was lowered (J-70), for any cause; then the load is
-/// removed.
+/// A load was lowered (J-70), whatever its cause was, and the torque of the damper was learned. Then the load is removed.
 #[test]
 fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_range() {
     let arm = ArmFile::avena();
@@ -144,7 +143,7 @@ fn j25_j70_a_load_that_was_lowered_and_is_taken_away_drives_no_joint_out_of_its_
     assert!(taught >= 10 && lowered >= 3, "{taught}, {lowered}");
 }
 
-/// Arms with rotors lighter than proposed: nothing swings, also at the soft ends and above the tool speed limit.
+/// Arms with rotors lighter than proposed do not swing, not even at the soft ends and above the tool speed limit.
 #[test]
 fn j25_an_arm_with_light_rotors_does_not_swing() {
     let mut ended = 0;
@@ -172,8 +171,8 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
             let about = format!("{} rotors {rotors} joint {}", arm.name, joint + 1);
             assert!(back < 0.4 && most < 1.8, "{about}: {back} rad/s against the hand, {most} rad/s");
             if rig.state() == ControllerState::HoldPos {
-                // The joint was too fast to be damped, and is held by gains for five times the rotor, which is not
-                // tested here.
+                // The joint was too fast for the damping. It is now held by gains for five times the rotor inertia, which is not tested
+                // here.
                 assert!(rotors < 0.5, "{about} is held");
                 ended += 1;
                 continue;
@@ -193,7 +192,7 @@ fn j25_an_arm_with_light_rotors_does_not_swing() {
     assert!(ended <= 4, "{ended} of 144 ended Teaching");
 }
 
-/// A hand lifts a payload that the controller was not told of, and knocks against it.
+/// A hand lifts a payload that is not configured, and knocks against it.
 #[test]
 fn j25_a_payload_that_is_lifted_is_still_carried() {
     for (arm, mass, joint, way) in [
@@ -203,13 +202,13 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
         (ArmFile::ur5(), 2.0, 1, 0.5),
     ] {
         let unit = Dynamics::new(&arm.model, arm.config.gravity).flange_torque(&pose(&arm));
-        // Against gravity.
+        // The motion goes against gravity.
         let way = if unit[joint] > 0.0 { way } else { -way };
         for speed in [0.15, 0.25, 0.4, 0.8] {
             let (mut plant, mut rig) = held(&arm, 1.0, mass, 1.0, pose(&arm), 4_000);
             teach(&mut plant, &mut rig);
             lead(&mut plant, &mut rig, joint, way, speed);
-            // A knock of 20 ms.
+            // A knock that lasts 20 ms.
             for _ in 0..20 {
                 plant.push[joint] = 0.5 * arm.config.joints[joint].torque_max * way.signum();
                 plant.tick(&mut rig);
@@ -223,7 +222,7 @@ fn j25_a_payload_that_is_lifted_is_still_carried() {
     }
 }
 
-/// A small payload is set in HoldPos: the remainder of the load is found before Teaching begins.
+/// A small payload is configured in HoldPos. The rest of the load must be found before Teaching begins.
 #[test]
 fn j25_j60_teaching_waits_until_a_load_is_found_again() {
     let (mut plant, mut rig) = held(&ArmFile::avena(), 1.0, 3.0, 1.0, at(1.2), 4_000);
@@ -260,7 +259,7 @@ fn j25_friction_that_is_not_there_leaves_an_arm_damped() {
     }
 }
 
-/// While the arm comes to rest, the next motion is refused, and so are gains.
+/// While the arm comes to rest, the next motion and new gains are refused.
 #[test]
 fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     let arm = ArmFile::avena();
@@ -282,7 +281,7 @@ fn j25_nothing_is_executed_before_an_arm_that_was_led_is_at_rest() {
     assert_eq!(rig.ask(FrameType::PidParamUseDefault, &[]), DataStatus::NoError);
 }
 
-/// Any payload up to 3 kg that the controller was not told of, led from any pose to any other.
+/// Any payload up to 3 kg that is not configured is led from any pose to any other.
 #[test]
 fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     println!("seed 11");
@@ -323,8 +322,8 @@ fn j25_unknown_payloads_that_are_led_anywhere_stay_or_creep() {
     assert!(most < 0.6 && worst < 0.2, "{most} rad/s, then {worst} rad/s");
 }
 
-/// A person leans on an arm whose rotors have a fifth of the proposed inertia, long enough to be taken for a load, and
-/// lets go.
+/// A person leans on an arm whose rotors have a fifth of the proposed inertia, and lets go. The contact lasted long enough to be learned as
+/// a load.
 #[test]
 fn j25_a_lean_on_an_arm_with_light_rotors_drives_no_joint_to_over_speed() {
     println!("seed 13");
@@ -369,7 +368,7 @@ fn j25_a_payload_that_is_hung_on_in_teaching_sinks_slowly() {
     assert!(way > 0.3 && speed < 0.6, "{way} rad, {speed} rad/s");
 }
 
-/// The carried load is the load that was found, and all of it at rest.
+/// The carried load equals the load that was found, and is complete at rest.
 #[test]
 fn j25_the_load_that_was_found_is_carried() {
     let arm = ArmFile::avena();
@@ -383,8 +382,7 @@ fn j25_the_load_that_was_found_is_carried() {
     }
 }
 
-/// A payload that the controller was not told of is put down: the arm rises slowly, until the controller detects that
-/// nothing else drives it.
+/// A payload that is not configured is put down. The arm rises slowly, until the controller detects that only the load drives it.
 #[test]
 fn j25_an_arm_whose_payload_is_put_down_rises_slowly_and_stops() {
     for (mass, friction) in [1.0, 3.0].into_iter().flat_map(|m| [0.7, 1.0, 1.3].map(|f| (m, f))) {

@@ -1,5 +1,4 @@
-//! Functions that begin only once the arm is held: Teaching (J-25) and the approach to a path (J-34), also with a load
-//! that the model lacks.
+//! Teaching (J-25) and the approach to a path (J-34) begin only when the arm is held, even if it carries a load that the model lacks.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -10,7 +9,7 @@ use rig::{Rig, floats};
 
 const POSE: [f64; 6] = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
 
-/// An arm with `mass` kg that its model lacks, and its controller before the joints are enabled.
+/// An arm with `mass` kg that its model lacks, and its controller, before the joints are enabled.
 fn carrying(mass: f64, factor: f64) -> (Plant, Rig) {
     let friction = LuGre::of_avena_times(factor);
     let arm = Plant::new(&loaded(Parameters::avena().model, mass), friction, POSE);
@@ -25,8 +24,7 @@ fn way(arm: &Plant) -> f64 {
     (0..6).map(|j| (arm.q[j] - POSE[j]).abs()).fold(0.0, f64::max)
 }
 
-/// If Teaching began in the first tick of HoldPos, or while the load swings, the load of the arm would not be known
-/// yet.
+/// In the first tick of HoldPos, or while the load swings, the load of the arm is not known yet, so Teaching must not begin.
 #[test]
 fn j25_teaching_waits_until_the_load_is_held() {
     for factor in [0.3, 1.0] {
@@ -39,7 +37,7 @@ fn j25_teaching_waits_until_the_load_is_held() {
             rig.send(FrameType::TeachingModeEnable, &[]);
             arm.run(&mut rig, 3_000);
             assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0), "after {after} ms");
-            // With a third of the friction of the model, the remaining load creeps.
+            // With a third of the friction of the model, the arm creeps under the rest of the load.
             let most = if factor == 1.0 { 0.03 } else { 0.1 * 3.0 };
             assert!(way(&arm) < most, "after {after} ms, friction times {factor}: {} rad", way(&arm));
         }
@@ -79,7 +77,7 @@ fn j25_teaching_that_waits_can_be_called_off_does_not_wait_for_ever_and_starts_n
     assert_eq!(rig.state(), ControllerState::HoldPos, "after ten seconds nobody expects it");
 }
 
-/// A drive is enabled seconds later than the others; its load swings, and moves the loads of the others again.
+/// A drive is enabled seconds later than the others. Its load swings, and moves the loads of the other joints again.
 #[test]
 fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     for late in [1, 2] {
@@ -98,7 +96,7 @@ fn j43_a_joint_that_is_enabled_late_lets_the_others_catch_again() {
     }
 }
 
-/// The gains make a loop unstable, without an external load to swing against. The catch must not allow the swing.
+/// The gains make a loop unstable although no external load swings. The catch must not tolerate this swing.
 #[test]
 fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
     for [kp, ki, kd] in [[200.0, 14_000.0, 80.0], [1_000.0, 50_000.0, 0.0]] {
@@ -121,12 +119,12 @@ fn j43_a_loop_that_drives_its_joint_to_and_fro_is_no_catch() {
         };
         let (without, with) = (fastest(0), fastest(1_000));
         println!("{kp} {ki} {kd}: {without} without a catch, {with} rad/s with one");
-        // Below the velocity limit, far below what trips a drive.
+        // The speed stays below the velocity limit, and far below the speed at which a drive trips.
         assert!(with < 1.5, "{kp} {ki} {kd}: {with} rad/s, {without} without a catch");
     }
 }
 
-/// A hand leads the stretched arm down and teaching ends: stopping it takes more than the torque limit for a while.
+/// A hand leads the stretched arm downwards, and teaching ends. Stopping the arm needs more than the torque limit for a while.
 #[test]
 fn j25_leaving_teaching_in_motion_is_no_error_where_the_torque_is_at_its_limit() {
     for speed in [0.4, 0.6, 0.8] {

@@ -1,5 +1,5 @@
-//! Arms as imported, with proposed gains: a UR5 and a Z1 are jogged (J-58) and begin paths (J-34) in random poses.
-//! Their loads are known, and no joint reaches its torque limit.
+//! A UR5 and a Z1 as imported, with proposed gains. They are jogged (J-58) and begin paths (J-34) in random poses. Their loads are known,
+//! and no joint reaches its torque limit.
 use jtc_core::{Config, ControllerState, TrajectoryState};
 use jtc_dynamics::Dynamics;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
@@ -7,7 +7,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use crate::plant::{ArmFile, Plant, Random, highest};
 use crate::rig::{Rig, floats, raw, rest};
 
-/// Poses of each arm; 500 were tested once.
+/// Number of poses of each arm. 500 poses were tested once.
 const TRIALS: usize = 120;
 const START_TOLERANCE: f64 = 0.3;
 

@@ -6,7 +6,7 @@ use jtc_wire::{DataStatus, FrameType, UrgentCommand};
 use plant::{LuGre, Plant, Random, highest, loaded, pose, shares};
 use rig::{Rig, floats};
 
-/// Random poses; 500 of them were tested.
+/// Number of random poses.
 const TRIALS: usize = 500;
 
 /// End of a jog while the joint still accelerates.
@@ -18,12 +18,12 @@ enum End {
     Rate(f32),
 }
 
-/// Jogs a joint at `rate` (rad/s) from zero for `ms`, ends the jog, and watches until the joint stands.
+/// Jogs a joint at `rate` (rad/s) from standstill for `ms`, ends the jog, and runs until the joint is at rest.
 fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Result<(), String> {
-    // The joints of the bench are at the commanded positions of the tick before.
+    // The joints of the rig are at the commanded positions of the previous tick.
     let mut rig = Rig::new(Config { delay_ticks: 1, ..config.clone() });
     rig.defaults();
-    // The default friction is for slower joints.
+    // The default friction is only valid for slower joints.
     rig.send(FrameType::FrictionPolynomial, &floats([0.0; 24]));
     rig.run(700);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -54,8 +54,8 @@ fn jogged(config: &Config, joint: usize, rate: f32, ms: usize, end: End) -> Resu
     Ok(())
 }
 
-/// Joint 1 of the shipped arm at 1.5 rad/s: each end between 599 and 695 ms once released the arm, and likewise with
-/// other joints and arms.
+/// Joint 1 of the shipped arm at 1.5 rad/s: a jog that ended between 599 and 695 ms once released the arm. The same happened with other
+/// joints and arms.
 #[test]
 fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_arm() {
     let fast = |velocity_max: f64, acceleration_max: f64| {
@@ -66,7 +66,7 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
         }
         config
     };
-    // The last two are not values of the wire: a client sends the next value above or below the limit.
+    // The last two limits are not representable in the wire format. A client sends the next value above or below the limit.
     for (config, first, last) in
         [(Config::avena(), 590, 700), (fast(3.15, 20.0), 735, 850), (fast(3.2, 20.0), 735, 850)]
     {
@@ -93,8 +93,8 @@ fn j58_a_jog_at_the_velocity_limit_that_ends_while_it_accelerates_releases_no_ar
     }
 }
 
-/// A Stop, a Pause, a released key and silence end a jog as a Stop ends a motion on the path: within 520 ms, also from
-/// the limit.
+/// A Stop, a Pause, a released key and silence end a jog like a Stop ends a motion on the path: within 520 ms, even from the velocity
+/// limit.
 #[test]
 fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     for share in [0.1, 0.7, 1.0] {
@@ -127,8 +127,7 @@ fn j33_j58_a_jog_stands_within_the_time_of_a_stop() {
     }
 }
 
-/// A Stop on another line while a key is pressed: the arm comes to rest, and moves again only after the key was
-/// released.
+/// A Stop arrives on another line while a key is pressed. The arm comes to rest, and moves again only after the key was released.
 #[test]
 fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     for (line, command) in [(0, UrgentCommand::Stop), (1, UrgentCommand::Stop), (1, UrgentCommand::Pause)] {
@@ -152,7 +151,7 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
             let speed = rig.controller.telemetry().joints[0].set_velocity;
             assert!(ms < 520 || speed == 0.0, "{ms} ms: {speed} rad/s");
         }
-        // The end of a jog is accepted, and does not mean that a key is pressed.
+        // The command that ends a jog is accepted, and does not mean that a key is still pressed.
         rig.run(400);
         assert_eq!(rig.ask(FrameType::Jog, &body(0.0)), DataStatus::NoError);
         rig.run(110);
@@ -162,8 +161,8 @@ fn j58_a_key_that_is_held_down_moves_nothing_after_a_stop() {
     }
 }
 
-/// A simulated arm with a load that the controller knows, in random poses, jogged at any rate: one joint at its limit,
-/// or all. No torque reaches its limit, and the arm stands in time. If a jog is refused, little torque is left.
+/// A simulated arm with a load that the controller knows, in random poses, is jogged at any rate: one joint at its limit, or all joints. No
+/// torque reaches its limit, and the arm is at rest in time. If a jog is refused, little torque remains.
 #[test]
 fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     let seed = 11;
@@ -223,16 +222,17 @@ fn j58_a_jog_never_takes_all_the_torque_in_any_pose() {
     println!("{refused} of {TRIALS} refused; at most {:.0} % of a torque limit", 100.0 * most);
 }
 
-/// Joint 2 needs nearly all of its limit to hold its load. Lifting it, lowering it towards more load, and moving joint
-/// 3 outwards are each refused. Lowering that unloads it is accepted. With half of the limit left every jog is carried
-/// out as commanded.
+/// Joint 2 needs nearly all of its torque limit to hold its load. Lifting the load, lowering it towards a higher load, and moving joint 3
+/// outwards are refused. Lowering that reduces the load is accepted. With half of the torque limit left, every jog is executed as
+/// commanded.
 #[test]
 fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unloads_it_is_taken() {
     let model = Parameters::avena().model;
     let hold = |q: [f64; 6]| plant::standing(&model, &q)[1];
     let moved =
         |q: [f64; 6], j: usize, way: f64| core::array::from_fn(|k| if k == j { q[k] + way } else { q[k] });
-    // Stretched out above the horizontal, and bent below it: there lowering unloads joint 2.
+    // In one pose the arm is stretched out above the horizontal; in the other it is bent below it, so that lowering reduces the load of
+    // joint 2.
     let (above, below) = ([0.0, 1.2, 0.2, 0.0, 0.0, 0.0], [0.0, 1.4, -1.6, 0.0, 0.0, 0.0]);
     let down = |q: [f64; 6]| -hold(q).signum();
     assert!(hold(moved(above, 1, 0.1 * down(above))).abs() > hold(above).abs());
@@ -269,8 +269,8 @@ fn j58_a_jog_that_loads_a_joint_with_nothing_left_is_refused_and_one_that_unload
     }
 }
 
-/// A Stop on a path or the end of a jog is over when the next jog continues, even if a joint is touched meanwhile: the
-/// jog is not a stop that has failed.
+/// A Stop on a path, or the end of a jog, is over when the next jog continues, even if a joint is touched meanwhile. This jog must not be
+/// taken for a stop that has failed.
 #[test]
 fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     let body = |rate: f32| floats([rate, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -290,7 +290,7 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
             rig.urgent(0, UrgentCommand::Stop);
             rig.until(600, |rig| rig.trajectory() == TrajectoryState::Stop);
         }
-        // Slower than the speed that releases the arm.
+        // This speed is below the one that releases the arm.
         rig.nodes[4].report.velocity = 0.03;
         for tick in 0..1_500 {
             if tick == 400 {
@@ -307,8 +307,8 @@ fn j33_j58_a_jog_behind_a_stop_is_no_stop_that_failed() {
     }
 }
 
-/// A key that is held down moves joint 2 of an arm with 3.5 or 4 kg outwards to a position at which it stays, without an error, and with
-/// enough torque left to come back.
+/// A key is held down and moves joint 2 of an arm with 3.5 or 4 kg outwards, until the joint stops by itself. There is no error, and enough
+/// torque remains for the way back.
 #[test]
 fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     for (mass, seconds) in [(3.5, 20), (4.0, 20)] {
@@ -336,7 +336,7 @@ fn j58_a_held_key_takes_no_joint_to_where_it_cannot_come_back_from() {
     }
 }
 
-/// The margin of a jog is computed, therefore only one jog is served in a tick, refused or not.
+/// Computing the margin of a jog takes time. Therefore only one jog is served per tick, whether it is refused or not.
 #[test]
 fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     let pose = [0.0, 1.2, 0.2, 0.0, 0.0, 0.0];
@@ -346,7 +346,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
         config.joints[1].torque_max = held.abs() / share;
         let mut rig = Rig::held_at(config, pose);
         rig.run(1_000);
-        // Upwards.
+        // The jog goes upwards.
         let rate = 0.3 * held.signum() as f32;
         let jog = floats([0.0, rate, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(rig.ask(FrameType::Jog, &jog), answer, "{share}");
@@ -358,7 +358,7 @@ fn j58_one_jog_is_served_in_a_tick_also_where_it_is_refused() {
     }
 }
 
-/// A joint that is set absent holds nothing, for any model.
+/// A joint that is marked as absent holds nothing, whatever the model is.
 #[test]
 fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     let pose = [0.0, 1.4, 0.2, 0.0, 0.0, 0.0];
@@ -384,8 +384,8 @@ fn j53_j58_an_absent_joint_keeps_no_other_from_being_jogged() {
     }
 }
 
-/// Keys of several joints pressed, changed and released in random poses: the flange is never faster than the tool speed
-/// limit, and one joint alone reaches it. The speed is computed from the pose of the flange from tick to tick.
+/// Keys of several joints are pressed, changed and released in random poses. The flange never exceeds the tool speed limit, and a single
+/// joint reaches it. The speed is computed from the poses of the flange in consecutive ticks.
 #[test]
 fn j58_a_jog_keeps_to_the_tool_speed_limit() {
     const LIMIT: f64 = 0.25;

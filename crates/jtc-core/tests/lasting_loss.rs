@@ -1,5 +1,5 @@
-//! Answers of one joint are lost repeatedly, but never enough consecutive ones for an error: the position loop stays
-//! closed, and the arm behaves as with every answer (J-14, J-63).
+//! Answers of one joint are lost repeatedly, but never enough consecutive ones for an error. The position loop stays closed, and the arm
+//! behaves as if no answer were lost (J-14, J-63).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error};
@@ -12,9 +12,9 @@ const JOINT: usize = 1;
 /// Pattern of the lost answers of the joint.
 #[derive(Clone, Copy, Debug)]
 enum Loss {
-    /// A good answer, then this number of lost ones, repeated for ever.
+    /// One good answer followed by this number of lost ones, repeated for ever.
     Periodic(u32),
-    /// On average every second answer at random, at most four consecutive ones; the seed.
+    /// On average every second answer is lost at random, with at most four consecutive losses. The value is the seed.
     Random(u32),
 }
 
@@ -29,7 +29,7 @@ const LOSSES: [Loss; 7] = [
 ];
 
 impl Loss {
-    /// Returns the pattern of the next `ticks` answers: `true` if lost.
+    /// Returns the pattern of the next `ticks` answers. `true`: the answer is lost.
     fn pattern(self, ticks: u32) -> Vec<bool> {
         match self {
             Self::Periodic(lost) => (0..ticks).map(|k| k % (1 + lost) < lost).collect(),
@@ -52,7 +52,8 @@ fn arm(mass: f64, q: [f64; 6]) -> Plant {
     Plant::new(&loaded(Parameters::avena().model, mass), LuGre::of_avena_times(1.0), q)
 }
 
-/// 0.2 s up to 0.25 rad/s, 2 s at it, 0.2 s down. Without accelerations: the loop has an error to correct.
+/// The path accelerates to 0.25 rad/s in 0.2 s, keeps this speed for 2 s, and stops in 0.2 s. Its points contain no accelerations, so the
+/// loop has an error to correct.
 fn path() -> Vec<RawPoint> {
     let points = pieces(JOINT, &[(1.25, 20), (0.0, 200), (-1.25, 20)]);
     points.into_iter().map(|point| RawPoint { acceleration: [0; 6], ..point }).collect()
@@ -81,8 +82,7 @@ fn on_the_path(lost: &[bool]) -> f64 {
     worst
 }
 
-/// Holds an arm with 1 kg that the model lacks, and pushes it with 20 N·m for 100 ms; returns the distance that it
-/// moves, rad.
+/// Holds an arm with 1 kg that the model lacks, and pushes it with 20 N·m for 100 ms. Returns the distance that it moves, rad.
 fn pushed(lost: &[bool]) -> f64 {
     let mut arm = arm(1.0, [0.3, 0.8, -0.9, 0.4, 0.7, 0.2]);
     let mut rig = arm.holding(Config::avena());
@@ -119,8 +119,8 @@ fn j63_a_push_is_answered_while_answers_are_lost_for_ever() {
     }
 }
 
-/// Returns the milliseconds until a joint that is blocked on the path is detected, and the error of the position that
-/// the control law used until then, rad.
+/// Returns the time until a joint that is blocked on the path is detected, ms, and the error of the position that the control law used
+/// until then, rad.
 fn blocked(velocity: f64, lost: &[bool]) -> (usize, f64) {
     const FROM: usize = 200;
     let mut rig = Rig::holding();
@@ -151,8 +151,8 @@ fn j66_a_blocked_joint_is_seen_as_early_while_answers_are_lost_for_ever() {
     }
 }
 
-/// A joint that is stuck did not follow its command. If the arm loses its torque because of it, and the next answers
-/// are missing, the prediction must not move the joint back.
+/// A joint that is stuck has not followed its command. If the arm loses its torque as a result, and the next answers are missing, the
+/// prediction must not move the joint back.
 #[test]
 fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     for velocity in [0.25, -0.25] {
@@ -175,8 +175,8 @@ fn j63_a_stuck_joint_is_not_predicted_to_move_when_torque_goes() {
     }
 }
 
-/// Missing acknowledges in four of five ticks are not a transmit timeout. A joint that is dead meanwhile is not
-/// predicted for longer than otherwise.
+/// Missing acknowledgements in four of five ticks are not a transmit timeout. If a joint fails meanwhile, it is not predicted for longer
+/// than usual.
 #[test]
 fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
     for start in 0..5 {
@@ -194,7 +194,7 @@ fn j63_a_dead_joint_is_not_predicted_longer_while_acknowledges_are_missing() {
                 }
             }
             if dead {
-                // A tick on the bus, then five Moves.
+                // One tick with an acknowledgement, followed by five Moves.
                 assert_eq!(seen, Some(5), "{start}");
                 assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
                 assert_eq!(rig.torque, [0.0; 6]);

@@ -1,5 +1,4 @@
-//! Missing answers, and answers that no arm can have given: no torque step when they begin, and none when they end
-//! (J-35, J-63).
+//! Missing answers, and answers with impossible positions. The torque does not step when they begin or end (J-35, J-63).
 use crate::rig;
 
 use jtc_bus::Request;
@@ -10,7 +9,7 @@ use rig::{Rig, pieces};
 const JOINT: usize = 1;
 const NODE_ERROR: u16 = error::EXTERNAL | error::EXTERNAL_JOINTS;
 
-/// How fast the arm moves, rad/s.
+/// Motion of the arm, with its speed in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Motion {
     /// HoldPos, pushed at this velocity.
@@ -38,7 +37,7 @@ enum Fault {
     Lost { ms: usize },
 }
 
-/// 0.2 s up to a velocity, 0.6 s at it, 0.2 s down.
+/// The path accelerates to a velocity in 0.2 s, keeps it for 0.6 s, and stops in 0.2 s.
 fn path(velocity: f64) -> Vec<RawPoint> {
     pieces(JOINT, &[(5.0 * velocity, 20), (0.0, 60), (-5.0 * velocity, 20)])
 }
@@ -51,7 +50,7 @@ fn roomy() -> Config {
     config
 }
 
-/// The joint's telemetry over 400 ticks, the fault in the middle of a motion.
+/// Returns the joint's telemetry over 400 ticks. The fault occurs in the middle of a motion.
 fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     let mut rig = Rig::holding_with(roomy());
     let state = match motion {
@@ -71,7 +70,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
     for tick in 0..400 {
         let velocity = match motion {
             Motion::Operate(_) => rig.controller.telemetry().joints[JOINT].set_velocity,
-            // Pushed away, and let go.
+            // The joint is pushed away and released.
             Motion::Held(velocity) => {
                 if (170..220).contains(&tick) {
                     velocity
@@ -83,7 +82,7 @@ fn run(motion: Motion, fault: Fault) -> Vec<JointTelemetry> {
         };
         match motion {
             Motion::Operate(_) => {}
-            // Pushed away, and let go.
+            // The joint is pushed away and released.
             Motion::Held(_) => {
                 rig.follow = velocity == 0.0;
                 rig.nodes[JOINT].report.position += if tick < 220 { velocity * 0.001 } else { 0.0 };
@@ -140,7 +139,7 @@ fn j63_lost_answers_make_no_torque_step() {
             let faulty = run(motion, Fault::Lost { ms });
             let worst = worst_step(&clean, &faulty);
             assert!(worst < 1.0, "{motion:?}, {ms} answers lost: {worst} N·m");
-            // The position was correct all the time.
+            // The position was correct throughout.
             for (clean, faulty) in clean.iter().zip(&faulty) {
                 let off = (clean.position - faulty.position).abs();
                 assert!(off < 2e-4, "{motion:?}, {ms} answers lost: {off} rad");
@@ -159,7 +158,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
         }
         rig.run(3);
         rig.nodes[JOINT].glitch = 0.3;
-        // A tick on the bus, then five answers.
+        // One tick without a fault, followed by five answers.
         rig.run(5);
         assert_eq!((rig.state(), rig.errors()), (state, 0));
         assert!(rig.controller.telemetry().joints[JOINT].position.abs() < 1e-9);
@@ -176,7 +175,7 @@ fn j35_a_position_that_stays_implausible_is_an_error_of_the_joint_and_is_then_ta
     }
 }
 
-/// The setting limits the number of consecutive unusable answers of a joint, missing or implausible.
+/// The setting limits the number of consecutive answers of a joint that are not usable, whether missing or implausible.
 #[test]
 fn j63_silence_and_implausible_answers_count_together() {
     for max in [3, 5, 20] {
@@ -200,7 +199,7 @@ fn j63_silence_and_implausible_answers_count_together() {
     }
 }
 
-/// A drive that does not know its exact position yet may correct it by a sector later.
+/// A drive that does not know its exact position yet may later correct it by a sector.
 #[test]
 fn j35_a_position_that_becomes_accurate_may_jump() {
     let mut rig = Rig::new(Config::avena());
@@ -224,7 +223,7 @@ fn j14_five_unanswered_moves_are_a_receive_timeout() {
         let from = rig.sent.len();
         rig.until(30, |r| r.state() == ControllerState::Error);
         assert_eq!(rig.status().can_current, 1 << (8 + node));
-        // The answer to the last Move before the silence still arrives; then five are missed.
+        // The answer to the last Move before the silence still arrives. Then five answers are missing.
         let moves = rig.sent[from..].iter().take_while(|r| matches!(r, Request::Move { .. })).count();
         assert!(moves >= 5);
         let mut rig = Rig::holding();

@@ -25,7 +25,7 @@ fn j35_a_joint_above_its_speed_for_5_ms_is_an_error_in_every_state_with_torque()
     for speed in [-1.85, 1.85] {
         for mut rig in powered() {
             rig.nodes[3].report.velocity = speed;
-            // A tick until the speed is reported, then four consecutive ticks that are too fast.
+            // The speed is reported one tick later. Then four consecutive ticks are above the limit.
             rig.run(5);
             assert_eq!(rig.errors(), 0, "{:?}", rig.state());
             rig.run(1);
@@ -53,7 +53,7 @@ fn j35_a_glitch_or_a_speed_within_the_limit_is_no_error() {
 #[test]
 fn j35_answers_that_are_missing_neither_count_nor_excuse() {
     let mut config = Config { overspeed_ms: 3, ..Config::avena() };
-    // The prediction of the missing answers requires torque, which is not tested here.
+    // The prediction of the missing answers needs torque, whose limit is not tested here.
     config.joints[3].torque_max = 1e6;
     let mut rig = Rig::holding_with(config);
     rig.nodes[3].report.velocity = 1.9;
@@ -94,7 +94,7 @@ fn j35_an_arm_that_is_faster_than_its_drives_can_report_or_do_is_refused() {
     let trip = ConfigError::SpeedTrip { joint: 3, value: 1.2 * 1.6, limit: 1.8 };
     assert_eq!(config.check(), Err(trip));
     assert!(trip.to_string().contains("joint 3") && trip.to_string().contains("1.920"), "{trip}");
-    // Without the trip, up to the scale of the drives' velocity.
+    // Without the trip, the threshold may be as high as the full scale of the drives' velocity.
     config.joint_config_bits = 0x07;
     assert_eq!(config.check(), Ok(()));
     config.joints[2].velocity_max = 1.7;
@@ -113,7 +113,7 @@ fn j43_position_limits_outside_the_working_area_are_refused() {
         let error = ConfigError::Position { joint: 6, value, limit: 2.9905 };
         assert_eq!(config.check(), Err(error));
         assert!(error.to_string().contains("joint 6"), "{error}");
-        // Drives that do not keep to their working area have none.
+        // If the drives do not keep to a working area, there is no such limit.
         config.joint_config_bits &= !0x01;
         assert_eq!(config.check(), Ok(()));
     }

@@ -1,5 +1,5 @@
-//! Pairs of an activity of the controller and an event: each pair must end in a state that docs/safety.md names.
-//! `UPDATE_DOCS=1` updates the page.
+//! Pairs of an activity of the controller and an event. Each pair must end in the state that docs/safety.md lists. `UPDATE_DOCS=1` updates
+//! the page.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_dynamics::Payload;
 use jtc_wire::{ExecCommand, FrameType, UrgentCommand};
@@ -10,10 +10,10 @@ use crate::rig::{Rig, floats};
 
 /// Time after which the end state is checked, ms.
 const WATCH_MS: usize = 6_000;
-/// Silence that host supervision tolerates, ms: longer than the activities take to begin.
+/// Silence that host supervision tolerates, ms. It is longer than the activities take to begin.
 const HOST_TIMEOUT_MS: u16 = 1_500;
 
-/// An arm of metal without brakes, and its controller.
+/// A simulated arm without brakes, and its controller.
 pub struct Bench {
     pub arm: Plant,
     pub rig: Rig,
@@ -108,7 +108,7 @@ pub const UNDER_WAY: [(&str, Begin); 11] = [
         bench
     }),
     ("holds the path back (J-75)", |mut config| {
-        // Just enough for a slow motion.
+        // The torque is just sufficient for a slow motion.
         let friction = LuGre::avena(1, 1.2).coulomb;
         config.joints[1].torque_max =
             standing(&Parameters::avena().model, &POSES[0])[1].abs() + friction + 12.0;
@@ -189,7 +189,7 @@ pub const UNDER_WAY: [(&str, Begin); 11] = [
     }),
 ];
 
-/// Half of the arm's gains.
+/// Sends half of the arm's gains.
 fn gains(bench: &mut Bench) {
     let all = Parameters::avena().pid;
     let numbers =

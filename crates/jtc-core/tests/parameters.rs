@@ -1,4 +1,4 @@
-//! Gains and models that are accepted, and when; none of them may throw an arm that is held (J-06).
+//! Gains and models that are accepted, and the states in which they are. None of them may throw an arm that is held (J-06).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState};
@@ -7,7 +7,7 @@ use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, UrgentCommand};
 use proptest::prelude::*;
 use rig::{Rig, floats, model_body, rest, segment_body};
 
-/// Gravity along y: the arm in its zero position carries a large load.
+/// Gravity acts along y, so that the arm in its zero position carries a large load.
 fn on_a_wall() -> Rig {
     Rig::holding_with(Config { gravity: [0.0, 9.81, 0.0], ..Config::avena() })
 }
@@ -20,7 +20,7 @@ fn torques(rig: &Rig) -> [u64; 6] {
     rig.controller.telemetry().joints.map(|j| j.torque.to_bits())
 }
 
-/// Checks that the frame is refused, and that the arm is held with the same bits as without the frame.
+/// Checks that the frame is refused, and that the arm is held bit for bit as without the frame.
 fn refused_without_a_trace(frame_type: FrameType, body: &[u8], what: &str) {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -61,7 +61,7 @@ fn j06_gains_that_would_throw_the_arm_are_refused_whole() {
     ] {
         let mut gains = good;
         gains[place] = value;
-        // In the last joint only: the others must not be taken either.
+        // Only the last joint has a wrong value, but the other joints must not change either.
         let body = floats((0..6).flat_map(|j| if j == 5 { gains } else { [100.0, 0.0, 0.0, -1.0, 1.0] }));
         refused_without_a_trace(FrameType::PidParam, &body, &format!("{gains:?}"));
     }
@@ -80,7 +80,7 @@ fn j06_gains_in_use_are_taken() {
         let mut rig = Rig::holding();
         assert_eq!(rig.ask(FrameType::PidParam, &gains_body(gains)), DataStatus::NoError, "{gains:?}");
     }
-    // An arm with heavier joints can bear these.
+    // These gains are accepted for an arm with heavier joints.
     let mut config = Config::avena();
     config.joints.iter_mut().for_each(|joint| joint.rotor_inertia = 2.0);
     let mut rig = Rig::holding_with(config);
@@ -152,7 +152,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
     let mut rig = Rig::holding();
     check(&mut rig, ControllerState::HoldPos, DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::TeachingModeEnable, &[]), DataStatus::NoError);
-    // The load that was found for the last model is given back first.
+    // First the integral gives back the load that was found with the last model.
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     check(&mut rig, ControllerState::Teaching, DataStatus::NotAllowed);
     rig.ask(FrameType::TeachingModeDisable, &[]);
@@ -167,7 +167,7 @@ fn j06_parameters_are_settable_in_init_holdpos_and_error_only() {
 
 #[test]
 fn j30_a_segment_is_not_copied_on_after_an_error() {
-    // At every stage of the copy.
+    // The error occurs at every stage of the copy.
     for ticks in [1, 5, 15, 25, 29, 33, 37] {
         let mut rig = Rig::holding();
         let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
@@ -212,7 +212,7 @@ fn j24_nothing_of_a_trajectory_survives_an_error_or_init() {
     }
 }
 
-/// Returns an arm with a drive that takes long to be enabled; Execute was sent.
+/// Returns an arm with a drive that takes long to enable. Execute has been sent.
 fn waiting_for_a_drive() -> Rig {
     let mut rig = Rig::with_a_slow_drive(Config::avena());
     rig.run(50);
@@ -271,8 +271,8 @@ fn j16_stop_and_pause_cancel_an_execute_that_waits_for_a_drive() {
     }
 }
 
-/// Checks that the arm is held through a change of parameters: no error, no torque beyond the limits, no step; or
-/// nothing changes at all.
+/// Checks that the arm is held during a change of parameters: without an error, without torque above the limits, and without a step. If the
+/// change is refused, nothing may change.
 fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseError> {
     let (mut asked, mut quiet) = (on_a_wall(), on_a_wall());
     for rig in [&mut asked, &mut quiet] {
@@ -289,7 +289,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
         for (j, limits) in Config::avena().joints.iter().enumerate() {
             let torque = t.joints[j].torque;
             prop_assert!(torque.abs() <= limits.torque_max);
-            // Smooth over 100 ms: never faster than 1.5 times the straight line over the whole range.
+            // The change is smooth over 100 ms: at most 1.5 times as steep as a straight line over the whole range.
             let step = (torque - last[j]).abs();
             prop_assert!(step <= 2.0 * limits.torque_max * 0.015 + 0.1, "joint {}: {} N·m", j + 1, step);
             last[j] = torque;
@@ -297,7 +297,7 @@ fn holds(frame_type: FrameType, body: &[u8], error: f64) -> Result<(), TestCaseE
     }
     if !accepted {
         quiet.run(300);
-        // The ticks until the record had come differ; the hold does not.
+        // The number of ticks until the record came may differ, but the position hold is the same.
         let (a, b) = (asked.controller.telemetry(), quiet.controller.telemetry());
         for j in 0..6 {
             prop_assert!((a.joints[j].torque_model - b.joints[j].torque_model).abs() < 1e-9);
@@ -320,7 +320,7 @@ proptest! {
             *gain *= if sign == 0 { -1.0 } else { 1.0 };
         }
         gains[3] = -gains[3];
-        // At rest at the commanded position: the new gains act on an error of zero.
+        // The arm is at rest at its commanded position, so the new gains act on an error of zero.
         holds(FrameType::PidParam, &gains_body(gains), 0.0)?;
     }
 

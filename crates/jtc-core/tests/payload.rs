@@ -1,4 +1,4 @@
-//! A payload that the host sets (J-60): how it is blended into the torque, when it is accepted, and how long it stays.
+//! A payload that the host sets (J-60): its blend into the torque, the states in which it is accepted, and how long it remains set.
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -21,7 +21,7 @@ fn set(rig: &mut Rig, payload: &Payload) -> DataStatus {
     rig.ask(FrameType::SetSettings, &body)
 }
 
-/// Returns a rig that is held at `pose`, without physics: joints are at their commanded positions.
+/// Returns a rig that is held at `pose`, without physics: the joints are at their commanded positions.
 fn holding_at(pose: &[f64; 6]) -> Rig {
     let mut rig = Rig::new(Config::avena());
     for (node, q) in rig.nodes.iter_mut().zip(pose) {
@@ -53,8 +53,8 @@ fn cubes() -> impl Strategy<Value = Payload> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(40) })]
 
-    /// For any sequence of payloads, in HoldPos and in Teaching, also while one is being blended in: a tick changes the
-    /// torque by at most a five hundredth of the requested change, and finally the joints carry the payload.
+    /// Any sequence of payloads is set in HoldPos and in Teaching, also while an earlier one is being blended in. A tick changes the torque
+    /// by at most 1/500 of the requested change, and in the end the joints carry the payload.
     #[test]
     fn j60_a_payload_makes_no_step_in_torque(
         q in prop::array::uniform6(-1.2..1.2f64), list in prop::collection::vec((cubes(), 1..700usize), 1..4), taught: bool,
@@ -108,7 +108,7 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
                 .fold(0.0, |a: f64, t| a.max(t.abs()))
         };
         let before = missing(&rig);
-        // Friction holds a share of it.
+        // Friction holds a part of the load.
         assert!(before > 4.0, "{before} N·m at {pose:?}");
         assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
         let from = arm.q;
@@ -123,7 +123,7 @@ fn j60_a_payload_that_is_given_takes_the_load_from_the_integral() {
     }
 }
 
-/// A payload that Teaching has found by itself stays balanced when it is set.
+/// If Teaching has found a payload and the host then sets it, the arm stays balanced.
 #[test]
 fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found() {
     for pose in [POSES[0], POSES[2]] {
@@ -139,7 +139,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
         let from = arm.q;
         arm.run(&mut rig, 3_000);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::Teaching, 0));
-        // The found load is correct to within the friction.
+        // The load found is correct except for the friction.
         let most = was_found.iter().fold(0.0, |most: f64, found| most.max(found.abs()));
         let telemetry = rig.controller.telemetry();
         for j in 0..6 {
@@ -151,7 +151,7 @@ fn j25_j60_a_payload_given_in_teaching_takes_the_place_of_the_one_that_was_found
     }
 }
 
-/// A small correction must not drop the remaining load: half of the found load, and several corrections in a row.
+/// A small correction must not drop the rest of the load. The test sets half of the load found, and several corrections in succession.
 #[test]
 fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
     for pose in [POSES[0], POSES[2]] {
@@ -160,7 +160,7 @@ fn j25_j60_a_small_payload_given_in_teaching_drops_nothing() {
         arm.run(&mut rig, 4_000);
         taught(&mut arm, &mut rig);
         arm.run(&mut rig, 1_000);
-        // The second comes while the first is being blended in.
+        // The second payload arrives while the first one is being blended in.
         for (mass, wait) in [(0.1, 1_000), (0.5, 200), (1.0, 3_000), (0.8, 3_000)] {
             let way = set_and_wait(&mut arm, &mut rig, &point_mass(mass), wait);
             assert!(way < 0.005 && rig.state() == ControllerState::Teaching, "{mass} kg: {way} rad");
@@ -173,12 +173,12 @@ fn j60_teaching_waits_until_the_payload_is_in_the_model() {
     let mut rig = holding_at(&POSES[0]);
     assert_eq!(set(&mut rig, &point_mass(1.0)), DataStatus::NoError);
     rig.send(FrameType::TeachingModeEnable, &[]);
-    // And until the integral has given back the part that it had found for the payload, 3 s later.
+    // Teaching also waits until the integral has given back the torque that it had found for the payload, 3 s later.
     let waited = rig.until(4_000, |r| r.state() == ControllerState::Teaching);
     assert!((BLEND + 2_900..=BLEND + 3_100).contains(&waited), "{waited} ms");
 }
 
-/// Also for a paused path, because the model must not change on a path.
+/// This is also true for a paused path, because the model must not change on a path.
 #[test]
 fn j60_an_execute_waits_until_the_payload_is_in_the_model() {
     let mut rig = Rig::holding();
@@ -222,7 +222,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);
     let q = rig.controller.telemetry().joints.map(|joint| joint.position);
     let model = Parameters::avena().model;
-    // By the Jacobian of the flange alone: what is left of the limits, per kg.
+    // Torque that remains within the limits, per kg, computed from the Jacobian of the flange alone.
     let dynamics = Dynamics::new(&model, Config::avena().gravity);
     let (arm, unit) = (dynamics.gravity_torque(&q), dynamics.flange_torque(&q));
     let most = (0..6)
@@ -245,7 +245,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
         assert_eq!(set(&mut rig, &bad), DataStatus::IncorrectValue, "{bad:?}");
         assert_eq!(rig.controller.config().payload, good);
     }
-    // A reduction of a payload that is too heavy is accepted: it is being blended out.
+    // A reduction of a payload that is too heavy is accepted. The payload is being blended out.
     rig.run(BLEND);
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.until(4_000, |r| r.state() == ControllerState::Teaching);
@@ -254,8 +254,7 @@ fn j60_a_payload_is_taken_whole_or_refused() {
     assert_eq!(set(&mut rig, &Payload::NONE), DataStatus::NoError);
 }
 
-/// The payload stays through errors and new models, changes at once if there is no torque, and is not a part of the
-/// arm.
+/// The payload remains set after errors and new models, changes at once if there is no torque, and is not part of the arm.
 #[test]
 fn j60_the_payload_stays_through_errors_and_new_models() {
     let payload = point_mass(1.5);
@@ -286,7 +285,7 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body), DataStatus::NoError);
     rig.run(300);
     let model = rig.controller.telemetry().joints.map(|joint| joint.torque_model);
-    // The frame has six digits.
+    // The frame carries six digits.
     assert!((0..6).all(|j| (model[j] - wanted[j]).abs() < 1e-3), "{model:?} {wanted:?}");
     assert_eq!(rig.controller.config().payload, payload);
     let arm = |config: &Config| settings::values(config, 0, true).collect::<Vec<_>>();
@@ -294,7 +293,7 @@ fn j60_the_payload_stays_through_errors_and_new_models() {
     assert_eq!(arm(rig.controller.config()), arm(&of_the_bench));
 }
 
-/// A model that cannot be held with the present payload is refused like a model that cannot be held without.
+/// A model that cannot be held with the present payload is refused, like a model that cannot be held without a payload.
 #[test]
 fn j06_j60_a_model_is_held_with_its_payload() {
     let mut rig = holding_at(&POSES[1]);
@@ -315,7 +314,7 @@ fn j06_j60_a_model_is_held_with_its_payload() {
     assert_eq!(rig.ask(FrameType::ArmModel, &body(low + 2.01)), DataStatus::IncorrectValue);
 }
 
-/// The farthest that a joint moves within `ms`, rad.
+/// Returns the largest motion of a joint within `ms`, rad.
 fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     let from = arm.q;
     let mut farthest = 0.0f64;
@@ -326,7 +325,7 @@ fn drift(arm: &mut Plant, rig: &mut Rig, ms: usize) -> f64 {
     farthest
 }
 
-/// Sets a payload; returns the largest motion of a joint within `ms` afterwards, rad.
+/// Sets a payload. Returns the largest motion of a joint within the following `ms`, rad.
 fn set_and_wait(arm: &mut Plant, rig: &mut Rig, payload: &Payload, ms: usize) -> f64 {
     let body: Vec<u8> = settings::payload_values(payload).flat_map(|value| value.emit()).collect();
     rig.send(FrameType::SetSettings, &body);
@@ -344,8 +343,8 @@ fn taught(arm: &mut Plant, rig: &mut Rig) {
     panic!("no Teaching: {:?}", rig.controller.telemetry());
 }
 
-/// The load that the integral had found is not carried twice if it has just been set as the payload, or in a new model:
-/// an arm that no hand leads keeps its position.
+/// If the load that the integral had found has just been set as the payload or in a new model, it is not carried twice. An arm that no hand
+/// leads keeps its position.
 #[test]
 fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     for (mass, pose) in [(2.0, 0), (2.0, 1), (2.0, 2), (2.0, 3), (4.0, 0), (4.0, 3)] {
@@ -377,7 +376,7 @@ fn j25_j60_an_arm_that_is_taught_right_after_its_load_was_given_stays() {
     }
 }
 
-/// A centre of mass without a mass is not a payload: it does not reduce the load that Teaching carries.
+/// A centre of mass without a mass is not a payload. It does not reduce the load that Teaching carries.
 #[test]
 fn j60_no_payload_at_another_place_drops_nothing_in_teaching() {
     let mut arm = Plant::new(&loaded(Parameters::avena().model, 2.0), LuGre::of_avena_times(0.3), POSES[0]);

@@ -1,4 +1,4 @@
-//! Plain lines, without any extension request: hosts that know only the protocol of existing devices (J-30, J-51).
+//! Plain lines, on which no extension request was received: their hosts know only the protocol of existing devices (J-30, J-51).
 use crate::rig;
 
 use jtc_core::recorder::{Block, Log, Outcome, Recorder, Replay, SNAPSHOT_MS};
@@ -8,7 +8,7 @@ use rig::{Rig, point, rest, segment_body};
 
 const SEGMENT: FrameType = FrameType::Trajectory;
 
-/// A path over 4 s, with joint 1 at up to 0.4 rad/s: points of two cosines, 10 ms apart.
+/// A path of 4 s in which joint 1 reaches 0.4 rad/s. Its points are the sum of two cosines, 10 ms apart.
 fn path() -> Vec<RawPoint> {
     let w = core::f64::consts::TAU / 4.0;
     (0..=400)
@@ -25,7 +25,7 @@ fn path() -> Vec<RawPoint> {
         .collect()
 }
 
-/// Returns segment 0 of one, which begins at the present position of the arm.
+/// Returns segment 0 of a trajectory with one segment, which begins at the present position of the arm.
 fn first(rig: &Rig) -> Vec<u8> {
     let mut there = RawPoint::default();
     for (raw, joint) in there.position.iter_mut().zip(rig.controller.telemetry().joints) {
@@ -82,8 +82,8 @@ fn places() -> Vec<(&'static str, Rig)> {
     places
 }
 
-/// An existing proxy repeats a refused segment for ever, and forwards nothing else. Therefore the segment stops the
-/// arm, and is accepted when the arm stands.
+/// An existing proxy repeats a refused segment for ever, and forwards no other frame meanwhile. Therefore the segment stops the arm, and is
+/// accepted when the arm is at rest.
 #[test]
 fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
     for (n, (name, mut rig)) in places().into_iter().enumerate() {
@@ -114,7 +114,7 @@ fn j30_segment_0_on_a_plain_line_stops_the_arm_and_is_taken_when_it_stands() {
     }
 }
 
-/// The segment acts as a Stop does, in each tick.
+/// In each tick, the segment has the effect of a Stop.
 #[test]
 fn j30_segment_0_on_a_plain_line_acts_as_a_stop_does() {
     for ((name, mut stopped), (_, mut rig)) in places().into_iter().zip(places()) {
@@ -138,7 +138,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
     let empty: &[RawPoint] = &[];
     for (plain, segment, points, stops, data) in [
         (true, 0, &[rest(0); 3][..], true, DataStatus::IncorrectValue),
-        // With any error in it: its host keeps repeating it.
+        // The segment acts as a Stop even if it contains an error, because its host keeps repeating it.
         (true, 0, empty, true, DataStatus::IncorrectValue),
         (true, 0, &[rest(32_767); 1500], true, DataStatus::IncorrectValue),
         (true, 1, &[rest(0); 3], false, DataStatus::IncorrectValue),
@@ -153,7 +153,7 @@ fn j30_only_segment_0_on_a_plain_line_and_only_in_operate_stops_anything() {
         let to = if stops { TrajectoryState::Stop } else { TrajectoryState::Execute };
         assert_eq!(rig.trajectory(), to, "plain {plain}, segment {segment}, {} points", points.len());
     }
-    // Without a motion a plain line behaves like any other.
+    // If the arm does not move, a plain line behaves like any other line.
     for (name, leave) in [
         ("Teaching", (|rig: &mut Rig| rig.send(FrameType::TeachingModeEnable, &[])) as fn(&mut Rig)),
         ("Error", |rig| rig.press_stop(1)),
@@ -237,8 +237,7 @@ fn of_three(segment: u16) -> Vec<u8> {
     segment_body(9, segment, 3, 10, &[rest(5_000); 20])
 }
 
-/// The data status values that segment 0 decided apply to the whole upload, whether or not the line is plain for later
-/// frames.
+/// Segment 0 decides which data statuses are used for the whole upload, even if the line changes its kind before later frames.
 #[test]
 fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     use DataStatus::{IncorrectSegmentOrder, IncorrectValue, NoError, NotAllowed, StartPositionMismatch};
@@ -261,11 +260,11 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
                 let data = rig.exec(ExecCommand::Execute);
                 assert_eq!(data, in_words(plain, StartPositionMismatch), "{case}");
             }
-            // Other frames follow the state of the line at their own time.
+            // The data statuses of other frames depend on the state of the line when they arrive.
             rig.plain = at(3);
             let data = rig.exec(ExecCommand::Stop);
             assert_eq!(data, in_words(at(3), NotAllowed), "{case}");
-            // The state forbids the segments of an upload that has been begun.
+            // The segments of an upload that has begun are forbidden in this state.
             rig.plain = plain;
             assert_eq!(rig.ask(SEGMENT, &of_three(0)), NoError);
             rig.press_stop(1);
@@ -276,7 +275,7 @@ fn j51_segment_0_decides_the_numbers_of_its_upload_and_its_execute() {
     }
 }
 
-/// A drop is reported with the data status that segment 0 decided.
+/// If an upload is dropped, its client gets the data status that was decided by segment 0.
 #[test]
 fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     let mut rig = Rig::holding();
@@ -287,7 +286,7 @@ fn j51_a_drop_is_told_to_a_client_that_was_silent_for_2_s() {
     assert_eq!(rig.ask(SEGMENT, &of_three(1)), DataStatus::NotAllowed, "not 6, as for wrong points");
 }
 
-/// After its Execute a trajectory may be executed by another client, which has not shown that it knows values above 6.
+/// After its Execute, a trajectory may be executed by another client. It is not known whether that client can handle values above 6.
 #[test]
 fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     for plain in [true, false] {
@@ -303,7 +302,7 @@ fn j51_the_execute_of_another_client_has_the_numbers_of_its_own() {
     }
 }
 
-/// Returns points that break J-36, with the error that the joint with index 3 would have in motion.
+/// Returns points that violate J-36, with the error that the joint with index 3 would have in motion.
 fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
     let (still, at) = (rest(0), |q, v, a| point(3, q, v, a));
     let long = |bad: RawPoint, place: usize| {
@@ -321,7 +320,7 @@ fn broken() -> Vec<(&'static str, Vec<RawPoint>, u16)> {
     ]
 }
 
-/// Uploads in this many segments. Returns the answers.
+/// Uploads the points in this number of segments. Returns the data statuses.
 fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStatus> {
     let parts: Vec<_> = points.chunks(points.len().div_ceil(segments)).collect();
     assert_eq!(parts.len(), segments);
@@ -331,7 +330,7 @@ fn uploaded(rig: &mut Rig, points: &[RawPoint], segments: usize) -> Vec<DataStat
         .collect()
 }
 
-/// Existing hosts wait for ever for a segment that is refused, for any reason.
+/// Existing hosts wait for ever if a segment is refused, whatever the reason is.
 #[test]
 fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     for (name, points, error) in broken() {
@@ -367,7 +366,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
                 }
             }
             assert!(rig.controller.violation().is_some_and(|v| v.joint == 3), "{case}");
-            // A Stop is answered as for any trajectory that is not executed, and the next upload is possible.
+            // A Stop is answered as for any trajectory that is not executed. The next upload is possible.
             assert_eq!(rig.exec(ExecCommand::Stop), DataStatus::IncorrectValue);
             assert_eq!(uploaded(&mut rig, &vec![rest(0); 60], segments), vec![DataStatus::NoError; segments]);
             assert_eq!(rig.controller.violation(), None);
@@ -377,7 +376,7 @@ fn j36_a_refused_trajectory_on_a_plain_line_is_taken_and_not_executed() {
     }
 }
 
-/// The decision at segment 0 applies to the whole upload, and its verdict applies to every client that executes it.
+/// Segment 0 decides for the whole upload. The result of its check applies to every client that executes the trajectory.
 #[test]
 fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     let (_, points, error) = broken().remove(0);
@@ -396,7 +395,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
                 continue;
             }
             assert_eq!(rig.ask(SEGMENT, &body(2)), DataStatus::NoError);
-            // On either line, and also for a client that knows all values: 6 is the value for wrong content.
+            // The answer is the same on both lines, and also for a client that knows all values: 6 means wrong content.
             for (line, plain) in [(0, true), (0, false), (1, true), (1, false)] {
                 rig.plain = plain;
                 rig.statuses.clear();
@@ -411,7 +410,7 @@ fn j36_segment_0_decides_whether_a_refused_trajectory_is_taken() {
     }
 }
 
-/// Frames that are not a valid trajectory are also refused on a plain line: counts, order, step time.
+/// Frames that are not a valid trajectory are refused on a plain line as well: wrong counts, order or step time.
 #[test]
 fn j30_j36_only_content_is_taken_on_a_plain_line() {
     use DataStatus::{
@@ -432,7 +431,7 @@ fn j30_j36_only_content_is_taken_on_a_plain_line() {
     }
 }
 
-/// The verdict is in the snapshots of the flight recorder: a replay refuses the Execute, too.
+/// The snapshots of the flight recorder contain the result of the check, so a replay also refuses the Execute.
 #[test]
 fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     let (_, points, error) = broken().remove(0);
@@ -448,7 +447,7 @@ fn j36_j56_a_replay_knows_the_verdict_on_a_refused_trajectory() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::IncorrectValue);
     rig.run(100);
     let blocks: Vec<Block> = rig.recorder.as_ref().unwrap().blocks().copied().collect();
-    // The points are not in the log; the verdict is.
+    // The log does not contain the points, but the result of their check.
     let other = Rig::holding().controller;
     let mut last = None;
     let mut replay = Replay::new(Log::new(&blocks), other, None);

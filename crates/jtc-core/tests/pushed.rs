@@ -1,4 +1,4 @@
-//! Pushes, walls and loads that are too heavy (J-66, J-68, J-70): the arm yields and stays held.
+//! Pushes, walls and loads that are too heavy (J-66, J-68, J-70): the arm yields and is still held.
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, error, joint_error};
@@ -48,7 +48,7 @@ fn fastest(arm: &Plant) -> f64 {
     arm.v.iter().fold(0.0, |fastest, v| v.abs().max(fastest))
 }
 
-/// Returns a pose of this arm within its ranges, rad, in which it stands with half of each torque limit at most.
+/// Returns a pose of this arm within its ranges, rad, in which at most half of each torque limit holds it.
 fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     loop {
         let pose = core::array::from_fn(|j| {
@@ -62,8 +62,8 @@ fn pose_of(arm: &ArmFile, random: &mut Random) -> [f64; 6] {
     }
 }
 
-/// Random pushes with a `share` of 60 to 100 % of the torque that a joint has left in addition to its load, for 50 ms
-/// to 1 s, on an arm with errors of 10 % in its masses and of 20 % in its friction.
+/// Random pushes on an arm whose masses are wrong by 10 % and whose friction is wrong by 20 %. Each push lasts 50 ms to 1 s, and its torque
+/// is a `share` of 60 to 100 % of the torque that the joint has left.
 #[derive(Clone, Copy)]
 struct Pushes {
     seed: u64,
@@ -83,11 +83,11 @@ struct Pushed {
     rig: Rig,
     /// Motion of the joint that was pushed, rad.
     way: f64,
-    /// Largest motion of another joint, rad.
+    /// Largest motion of any other joint, rad.
     aside: f64,
-    /// Speed of the fastest joint right before the push, rad/s.
+    /// Speed of the fastest joint just before the push, rad/s.
     before: f64,
-    /// The arm was released by the over-speed of the joint that was pushed.
+    /// The over-speed of the pushed joint released the arm.
     released: bool,
 }
 
@@ -95,8 +95,8 @@ const HELD: Pushes = Pushes { seed: 7, moving: false, share: 1.0, rotors: 1.0, g
 const MOVING: Pushes = Pushes { seed: 9, moving: true, ..HELD };
 
 impl Pushes {
-    /// Runs 48 pushes on an arm with rigid gears. Returns the number of pushes that released the arm; checks that
-    /// over-speed is the only cause.
+    /// Runs 48 pushes on an arm with rigid gears. Returns the number of pushes that released the arm, and checks that over-speed is the
+    /// only cause.
     fn released(self, file: &ArmFile) -> usize {
         let checked = self.push(file).map(|mut pushed| {
             self.check(&mut pushed);
@@ -164,7 +164,7 @@ impl Pushes {
         Pushed { about, joint, arm, rig, way, aside, before: speed, released }
     }
 
-    /// Checks that an arm that was pushed stays held, at rest, and names the joint that was pushed.
+    /// Checks that an arm that was pushed is still held, at rest, and that the cause contains the pushed joint.
     fn check(self, pushed: &mut Pushed) {
         let Pushed { about, joint, arm, rig, way, aside, before: _, released } = pushed;
         let still = !self.moving && self.rotors == 1.0;
@@ -194,9 +194,9 @@ fn j66_j68_a_moving_arm_that_is_pushed_yields_and_stays_held() {
     assert_eq!(MOVING.released(&ArmFile::avena()), 0);
 }
 
-/// Arms as they are imported: their gains are weak, because their rotors were not measured. A push of 100 to 180 rad/s²
-/// takes such a joint to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without
-/// supervision of the speed more than 80 of these 192 pushes release the arm, and 18 if only the reported speed counts.
+/// Arms as they are imported. Their gains are weak, because their rotors were not measured. A push of 100 to 180 rad/s² takes such a joint
+/// to its over-speed within 12 ms, and the speed that its drive reports is 8 ms old. Without supervision of the speed, more than 80 of
+/// these 192 pushes release the arm; with supervision of the reported speed alone, 18 do.
 #[test]
 fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a_push() {
     let released =
@@ -205,8 +205,8 @@ fn j66_j68_light_arms_with_weak_gains_stay_held_as_far_as_their_drives_can_see_a
     assert!(released.iter().flatten().sum::<usize>() <= 2, "{released:?}");
 }
 
-/// The rotors are only proposed. If they are half as heavy, or a third, the yielding loop is too stiff for them: it
-/// becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
+/// The rotor inertias are only proposals. If the rotors are half as heavy, or a third, the loop of a yielding joint is too stiff for them.
+/// It becomes softer and does not swing, and pushes of 24 to 40 % of the remaining torque do not release the arm.
 #[test]
 fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     for (arm, rotors) in [ArmFile::ur5(), ArmFile::z1()].iter().flat_map(|arm| [(arm, 0.33), (arm, 0.5)]) {
@@ -216,8 +216,8 @@ fn j68_a_joint_that_is_lighter_than_its_file_says_does_not_swing() {
     }
 }
 
-/// Elastic gears under the same pushes: the results are printed, and a release is caused by over-speed. In arms without
-/// friction only the controller damps the gears: some swing before they are pushed.
+/// Elastic gears under the same pushes. The results are printed, and over-speed must be the only cause of a release. In arms without
+/// friction only the controller damps the gears, so some of them swing before the push.
 #[test]
 fn j66_j68_arms_with_elastic_gears_are_pushed() {
     let slick = [ArmFile::avena(), ArmFile::ur5(), ArmFile::z1()].map(|arm| (arm.slick(), 3e4));
@@ -242,8 +242,8 @@ fn j66_j68_arms_with_elastic_gears_are_pushed() {
     }
 }
 
-/// A person who pushes repeatedly, or to and fro, still meets the full torque: this is not a swing of a joint that is
-/// lighter than its file says.
+/// A person who pushes repeatedly, or to and fro, still gets the full opposing torque. This must not be taken for the swing of a joint that
+/// is lighter than in its file.
 #[test]
 fn j68_a_joint_that_is_shaken_stays_held() {
     for (file, joint) in [(ArmFile::ur5(), 5), (ArmFile::z1(), 4), (ArmFile::avena(), 4)] {
@@ -277,8 +277,8 @@ fn j68_a_joint_that_is_shaken_stays_held() {
     }
 }
 
-/// A wall of 3,000 or 20,000 N·m/rad in the way of a joint: from 200 ms after detection on, the drive presses the joint
-/// against it with no more than its share, and the stop is a held stop.
+/// A joint hits a wall of 3,000 or 20,000 N·m/rad. From 200 ms after the detection, the drive presses the joint against the wall with at
+/// most its share of the torque limit. The stop is a held stop.
 #[test]
 fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
     let model = Parameters::avena().model;
@@ -300,7 +300,7 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 arm.tick(&mut rig);
                 noticed = noticed.or((rig.errors() != 0).then_some(k));
                 assert_ne!(rig.state(), ControllerState::Error, "{about}");
-                // The controller brakes a joint that the wall throws back.
+                // A joint that bounces off the wall is braked by the controller; such ticks are not evaluated.
                 if depth > 0.0 && arm.v[joint].abs() < 0.1 && noticed.is_some_and(|ms| k > ms + 200) {
                     most = most.max((rig.torque[joint] - standing(&model, &arm.q)[joint]) * sign);
                 }
@@ -314,15 +314,15 @@ fn j68_j69_an_arm_that_meets_a_wall_stops_and_does_not_clamp_what_it_met() {
                 "{about}"
             );
             assert_ne!(t.joints[joint].internal, 0, "{about}");
-            // The share, and the friction that the integral had found.
+            // The limit is the share plus the friction that the integral had found.
             assert!(most < 0.3 * LIMITS(joint) + 12.0, "{about}: {most} N·m");
             assert!(fastest(&arm) < 0.02, "{about}: {} rad/s", fastest(&arm));
         }
     }
 }
 
-/// A hand leads joint 2 up through 1 rad in 5 s, at the end of a stiff spring: the joint resists with no more than its
-/// share, and the arm stays when the hand lets go.
+/// A hand leads joint 2 up by 1 rad in 5 s, through a stiff spring. The joint resists with at most its share of the torque limit, and the
+/// arm stays where the hand lets go.
 #[test]
 fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     let model = Parameters::avena().model;
@@ -344,8 +344,8 @@ fn j68_a_hand_leads_a_joint_with_a_share_of_its_torque() {
     assert!((arm.q[1] - there).abs() < 0.06 && fastest(&arm) < 0.01, "{} rad", arm.q[1] - there);
 }
 
-/// Loads of 90 to 110 % of a torque limit are lowered slowly, with the whole limit against the motion if needed, to a
-/// position in which the arm is in balance; the joint is never released.
+/// Loads of 90 to 110 % of a torque limit are lowered slowly, if needed with the whole limit against the motion, until the arm is in
+/// balance. The joint is never released.
 #[test]
 fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     let model = |mass: f64| loaded(Parameters::avena().model, mass);
@@ -387,7 +387,7 @@ fn j70_a_load_that_is_too_heavy_sinks_slowly_and_is_never_dropped() {
     }
 }
 
-/// Gains that make the loop unstable, or too weak, for a held arm with 2 kg that the controller was not told of.
+/// An arm with 2 kg that is not configured is held with gains that are too weak, or that make the loop unstable.
 #[test]
 fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     for times in [
@@ -414,7 +414,8 @@ fn j66_gains_that_do_not_hold_the_arm_do_not_drop_it() {
     }
 }
 
-/// Random motions that need 95 % of a torque limit by the model, on arms that are heavier and have more friction than it: none is released.
+/// Random motions need 95 % of a torque limit according to the model. The true arms are heavier and have more friction, and none of them is
+/// released.
 #[test]
 fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
     println!("seed 21");
@@ -428,7 +429,7 @@ fn j66_j75_a_motion_at_the_torque_limit_is_held_back_and_never_dropped() {
         for _ in 0..16 {
             let pose: [f64; 6] = core::array::from_fn(|j| POSES[0][j] + random.between(-0.5, 0.5));
             let to: [f64; 6] = core::array::from_fn(|j| pose[j] + random.between(-1.2, 1.2));
-            // As fast as 95 % of a torque limit or the velocity limit allow.
+            // The motion is as fast as 95 % of a torque limit or the velocity limit allow.
             let peak = |seconds: f64| {
                 (0..200)
                     .map(|i| {

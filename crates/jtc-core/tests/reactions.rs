@@ -1,12 +1,12 @@
-//! Reaction to each error (J-21, J-66, J-68, J-69): the arm yields or stops if the controller can still act, otherwise
-//! its torque goes. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
+//! Reaction to each error (J-21, J-66, J-68, J-69). The arm yields or stops if the controller can still act; otherwise its torque is taken
+//! away. The table in docs/safety.md shows the results of these runs; `UPDATE_DOCS=1` updates it.
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, TrajectoryState, error, joint_error};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint, StopKind};
 use rig::{Rig, floats, point, rad};
 
-/// Joint 5 leads from 0 to 0.4 rad and back, at rest at both ends.
+/// Joint 5 moves from 0 to 0.4 rad and back, at rest at both ends.
 fn path() -> Vec<RawPoint> {
     let n = 401;
     (0..n)
@@ -19,7 +19,7 @@ fn path() -> Vec<RawPoint> {
         .collect()
 }
 
-/// Returns a rig that is held, or moves along the path; the torque limit of joint 4 has margin for a position error.
+/// Returns a rig that is held, or moves along the path. The torque limit of joint 4 leaves a margin for a position error.
 fn bench(moving: bool) -> Rig {
     bench_with(Config::avena(), moving)
 }
@@ -35,7 +35,7 @@ fn bench_with(mut config: Config, moving: bool) -> Rig {
     rig
 }
 
-/// Pushes joint 4 until its position error is over the limit, not faster than is plausible (J-35).
+/// Pushes joint 4 until its position error exceeds the limit, but not faster than is plausible (J-35).
 fn push(rig: &mut Rig, to: f64) {
     const TICKS: u32 = 50;
     rig.apart[3] = true;
@@ -77,7 +77,7 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::NotAllowed);
     assert_eq!(rig.ask(FrameType::Jog, &floats([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])), DataStatus::NotAllowed);
     settle(&mut rig);
-    // Off the paused point the path does not continue; back at the point it does, and the arm approaches the path.
+    // Away from the paused point the path does not continue. Back at the point it continues, after an approach.
     assert_eq!(rig.exec(ExecCommand::Execute), DataStatus::StartPositionMismatch);
     push(&mut rig, 0.012);
     settle(&mut rig);
@@ -94,7 +94,8 @@ fn j66_j69_a_position_error_is_a_held_stop_and_the_path_can_go_on() {
     assert_eq!(rig.controller.telemetry().joints[4].set_position, rad(path()[400].position[4]));
 }
 
-/// The torque falls within 10 ms to that of a weak spring, never rises by a step on the way, and follows the joint wherever it is led.
+/// The torque falls within 10 ms to the torque of a weak spring. It never rises by a step on the way, and follows the joint wherever it is
+/// led.
 #[test]
 fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
     let mut rig = bench(false);
@@ -108,18 +109,18 @@ fn j68_a_joint_that_yields_adds_only_a_share_to_the_model() {
         rig.nodes[3].report.velocity = 0.2;
         rig.tick();
         let t = rig.controller.telemetry().joints[3];
-        // And the load that the integral had found.
+        // The load that the integral had found is carried as well.
         assert!((t.torque - t.torque_model - t.torque_i).abs() <= most + 1.0, "{k}: {t:?}");
         assert!((t.torque - last).abs() < 0.1 * most, "{k}: from {last} to {}", t.torque);
         last = t.torque;
         assert_eq!(rig.state(), ControllerState::HoldPos);
     }
-    // As stiff as is stable with what the joint moves.
+    // The spring is as stiff as is stable with the inertia of the joint.
     assert!(last < -10.0, "it still holds against the push: {last} N·m");
 }
 
-/// A joint that is calm again after a push is held at its present position, without a step of its torque; after the
-/// third time it yields until the host clears the stop.
+/// A joint that is calm again after a push is held at its present position, without a step of its torque. After the third push it yields
+/// until the host clears the stop.
 #[test]
 fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides() {
     let mut rig = bench(false);
@@ -134,7 +135,7 @@ fn j68_a_joint_is_held_again_when_it_is_calm_and_the_third_time_the_host_decides
             assert!((torque - last).abs() < 250.0, "a step from {last} to {torque}");
             last = torque;
         }
-        // A held joint pulls towards its hold position; while it yields, the spring pulls back.
+        // A held joint pulls towards its hold position; the spring of a yielding joint pulls back.
         let yields = rig.controller.telemetry().joints[3].torque < -10.0;
         assert_eq!(yields, time == 3, "time {time}: {} N·m", rig.controller.telemetry().joints[3].torque);
     }
@@ -182,7 +183,7 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let cause = pulled.controller.reactions().stop.expect("a held stop").0;
     assert_eq!((cause.kind, cause.joint), (StopKind::PositionError, 4));
     assert_eq!(cause.limit, config.joints[3].position_error_max as f32);
-    // The joint was 2 mrad further in each millisecond.
+    // The joint moved 2 mrad further in each millisecond.
     assert!((cause.limit..cause.limit + 0.01).contains(&-cause.value), "{cause:?}");
 
     let mut pushed = bench(false);
@@ -190,11 +191,11 @@ fn j69_a_cause_has_the_value_that_was_found_and_its_limit() {
     let cause = pushed.controller.reactions().stop.expect("a held stop").0;
     assert_eq!((cause.kind, cause.joint), (StopKind::Push, 6));
     assert_eq!(cause.limit, (config.yield_torque_share * config.joints[5].torque_max) as f32);
-    // The feedback torque against the push, before it is limited.
+    // The value is the feedback torque against the push, before it is limited.
     assert!((cause.limit..10.0 * cause.limit).contains(&-cause.value), "{cause:?}");
 }
 
-/// The client that acknowledges a held stop does not know that a jog key of another client is still pressed.
+/// A client acknowledges a held stop, but does not know that a jog key of another client is still pressed.
 #[test]
 fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_cleared() {
     let mut rig = bench(false);
@@ -209,18 +210,17 @@ fn j58_j69_a_key_that_is_held_down_through_a_held_stop_moves_nothing_when_it_is_
     held(&mut rig, 800);
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     held(&mut rig, 1_000);
-    // Let go, and pressed again.
+    // The key is released and pressed again.
     rig.run(210);
     assert_eq!(rig.ask(FrameType::Jog, &jog), DataStatus::NoError);
 }
 
-/// Braking excuses an arm that cannot follow its path, but not an arm that is pushed away from the present point of the
-/// path.
+/// While the arm brakes, it need not follow its path exactly. But a push away from the present point of the path is still detected.
 #[test]
 fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_brakes() {
     let mut rig = bench(true);
     assert_eq!(rig.exec(ExecCommand::Pause), DataStatus::NoError);
-    // The joint moves all the time, so braking continues.
+    // The joint moves all the time, so the braking continues.
     rig.nodes[3].report.velocity = 0.5;
     rig.until(500, |r| r.trajectory() == TrajectoryState::Pause);
     push(&mut rig, 0.097);
@@ -231,8 +231,8 @@ fn j33_j66_an_arm_that_is_pushed_where_its_path_stands_yields_while_it_still_bra
     assert_eq!(rig.status().joints[3].internal_occurred, joint_error::POSITION_ERROR);
 }
 
-/// A joint that is stuck did not follow its command. If the arm is held because of it, and the next answers are
-/// missing, the prediction must not move the joint back.
+/// A joint that is stuck has not followed its command. If the arm is held as a result, and the next answers are missing, the prediction
+/// must not move the joint back.
 #[test]
 fn j63_j66_a_stuck_joint_is_not_predicted_to_move_when_it_is_held() {
     let mut config = Config::avena();

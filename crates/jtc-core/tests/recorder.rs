@@ -1,5 +1,4 @@
-//! The flight recorder on the bench: its contents, its stop conditions, and memory that stays readable after any reset
-//! (J-56).
+//! The flight recorder in the rig: its contents, its stop conditions, and memory that is readable after any reset (J-56).
 use crate::rig;
 
 use std::collections::BTreeSet;
@@ -17,7 +16,7 @@ use rig::Rig;
 const BLOCKS: usize = 96;
 
 fn memory() -> [Vec<Block>; 2] {
-    // Pieces of different size with old contents: memory after power-up holds random data.
+    // Pieces of different sizes with old contents, because memory contains random data at power-up.
     [vec![[0x4A46_0001; BLOCK_WORDS]; BLOCKS - 5], vec![[0xA5A5_5A5A; BLOCK_WORDS]; 5]]
 }
 
@@ -92,7 +91,7 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     assert_eq!(ticks.last(), Some(&(error + u64::from(AFTER_ERROR_MS))));
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "every tick once");
 
-    // The end of the error, another error, or the passing of time does not change the log.
+    // Neither the end of the error, another error, nor the passing of time changes the log.
     let before = blocks(&rig);
     rig.clear(true, 0x7F);
     rig.run(600);
@@ -108,12 +107,12 @@ fn j56_the_log_stops_300_ms_after_the_first_error_and_is_kept_until_it_is_cleare
     rig.send(FrameType::ClearLog, &[]);
     rig.run(5);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
-    // The error that is still latched is not the first one of the new log.
+    // The error that is still latched is not the first error of the new log.
     rig.run(1_000);
     assert_eq!(recorder(&rig).state(), LogState::Recording);
 }
 
-/// An emergency stop that is pressed while the device starts is an error; it must not cost the log of a later error.
+/// An emergency stop that is pressed while the device starts is an error. The log of a later error must not be lost because of it.
 #[test]
 fn j56_a_log_without_torque_gives_way_when_torque_comes_on() {
     let mut rig = recorded();
@@ -150,12 +149,12 @@ fn j56_a_reset_keeps_the_log_of_a_device_that_failed_and_begins_anew_otherwise()
     }
 }
 
-/// Blocks in memory, as a recorder finds them after a reset.
+/// Returns the blocks in memory as a recorder finds them after a reset.
 fn found(memory: &[Vec<Block>; 2]) -> Vec<Block> {
     Recorder::new(memory.clone(), true).blocks().copied().collect()
 }
 
-/// The data of a tick count when their last word is written, and not before.
+/// The data of a tick are valid when their last word is written, and not before.
 #[test]
 fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before() {
     const MAGIC: usize = 0;
@@ -176,7 +175,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
             .collect();
         assert!(changed.iter().any(|&(_, _, word)| word == COMMIT));
         let (ticks, snapshots) = contents(&found(&before));
-        // A tick that begins a block is long: some of its words are tested, not all.
+        // A tick that begins a block is long. Not all of its words are tested, only some.
         for leave_out in (0..changed.len()).step_by(1 + changed.len() / 8) {
             let mut cut = before.clone();
             for (n, &(piece, block, word)) in changed.iter().enumerate() {
@@ -184,7 +183,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
                     cut[piece][block][word] = after[piece][block][word];
                 }
             }
-            // A block that was being overwritten is given up before anything else.
+            // Before a block is overwritten, it is first marked as invalid.
             for &(piece, block, _) in changed.iter().filter(|(_, _, word)| *word == MAGIC) {
                 cut[piece][block][MAGIC] = 0;
             }
@@ -198,7 +197,7 @@ fn j56_a_log_that_is_cut_in_the_middle_of_a_tick_is_whole_up_to_the_tick_before(
     assert!(cuts > 200, "{cuts}");
 }
 
-/// For any change of the memory, all data that are read were written, and all complete data are read.
+/// Whatever changes in the memory, only data that were written are read, and all complete data are read.
 #[test]
 fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     let mut rig = holding();
@@ -214,13 +213,13 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
         damaged[block][word] ^= 1 << bit;
         let (left, _) = contents(&damaged);
         assert!(left.iter().all(|tick| known.contains(tick)), "block {block}, word {word}, bit {bit}");
-        // A snapshot after the damage, and everything after it, are still there.
+        // A snapshot after the damage, and everything after it, can still be read.
         let behind = whole[block + 1..].iter().position(|block| block[3] as u16 != 0xFFFF);
         if let Some(first) = behind.map(|first| block + 1 + first) {
             assert!(left.ends_with(&contents(&whole[first..]).0));
         }
     }
-    // Blocks that are missing at an end, and words that are not a log.
+    // Blocks that are missing at either end, and words that are not a log.
     for cut in 0..whole.len() {
         assert!(ticks.ends_with(&contents(&whole[cut..]).0));
         assert!(ticks.starts_with(&contents(&whole[..cut]).0));
@@ -233,7 +232,7 @@ fn j56_damaged_memory_costs_the_blocks_that_are_damaged_and_no_others() {
     for n in 0..50 {
         let mut noise = whole.clone();
         for block in &mut noise {
-            // Every other time the heads of the blocks stay unchanged.
+            // In every second case the heads of the blocks stay unchanged.
             block[if n % 2 == 0 { 5 } else { 0 }..].fill_with(&mut next);
         }
         contents(&noise);
@@ -357,8 +356,8 @@ fn j56_two_seconds_are_kept_and_snapshots_come_in_time_whatever_hosts_send() {
     assert!(since.windows(2).all(|pair| pair[1] - pair[0] <= 2 * u64::from(SNAPSHOT_MS)), "{snapshots:?}");
 }
 
-/// A payload that is being blended into the model when a snapshot is taken continues to blend in the replay (J-60):
-/// from the next snapshot on each tick is the same to the bit.
+/// A payload is being blended into the model when a snapshot is taken. The replay continues the blend (J-60): from the next snapshot on
+/// each tick is equal bit for bit.
 #[test]
 fn j56_a_payload_on_its_way_is_replayed() {
     let mut rig = holding();
@@ -372,7 +371,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
     let blocks = blocks(&rig);
     let first = contents(&blocks).1.into_iter().find(|tick| *tick > given).expect("a snapshot");
     assert!(first < given + 300, "it comes while the payload is on its way: {given} {first}");
-    // By a controller without a payload.
+    // The replay uses a controller without a payload.
     let mut other = Rig::new(Config::avena());
     other.defaults();
     let replay = Replay::new(Log::new(&blocks), other.controller, None);
@@ -381,8 +380,7 @@ fn j56_a_payload_on_its_way_is_replayed() {
     assert_eq!(replayed(&rig).last(), Some(&rig.controller.telemetry().tick));
 }
 
-/// An emergency stop at power-up that is cleared at once does not stop the log of the time in which the arm then gets
-/// its torque.
+/// An emergency stop at power-up that is cleared at once does not stop the log. The log continues when the arm then gets its torque.
 #[test]
 fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     let mut rig = Rig::new(Config::avena());
@@ -403,8 +401,7 @@ fn j56_an_error_before_there_is_torque_does_not_stop_the_log() {
     assert!(replayed(&rig).contains(&error));
 }
 
-/// Read requests take their turns also in a replay when a tick has further requests: a controller without a recorder
-/// does the same.
+/// In a replay, read requests also take their turns when a tick has further requests, although its controller has no recorder.
 #[test]
 fn j56_requests_beside_others_are_replayed_in_their_turns() {
     let get_log: Vec<u8> = [&LOG_NO_BLOCK.to_be_bytes()[..], &[0; 2]].concat();
@@ -435,14 +432,13 @@ fn j56_requests_beside_others_are_replayed_in_their_turns() {
     }
 }
 
-/// Returns a rig, disabled or held, that has got a StoreArm after `wait` ticks, and has run half a second longer or
-/// more.
+/// Returns a rig, disabled or held, that has received a StoreArm after `wait` ticks, and has run for at least half a second since.
 fn storing(state: ControllerState, wait: usize) -> Rig {
     let mut rig = recorded();
     rig.controller.set_store_state(StoreState::Empty, 0);
     rig.defaults();
     rig.until(2_000, |rig| rig.state() == ControllerState::HoldPos);
-    // The log from before the torque is not kept.
+    // The log from before the torque is discarded.
     rig.run(600);
     let stored = state == ControllerState::Init;
     if stored {
@@ -456,8 +452,8 @@ fn storing(state: ControllerState, wait: usize) -> Rig {
     rig
 }
 
-/// A replay has no memory to store an arm in and refuses the store at once. This is not reported as a difference of the
-/// controller, also with a snapshot in between. After the next snapshot everything is equal.
+/// A replay has no memory to store an arm, so it refuses the request at once. This is not reported as a difference of the controller, even
+/// with a snapshot in between. After the next snapshot everything is equal.
 #[test]
 fn j56_j54_a_store_of_the_arm_is_not_a_difference() {
     for state in [ControllerState::Init, ControllerState::HoldPos] {

@@ -8,7 +8,7 @@ use rig::{Rig, rest, segment_body};
 
 const NOISE: Response = Response::bad(0, FrameStatus::IncorrectHeader, 0);
 
-/// Returns a rig on a path, with statuses that leave every 15 ms as at 115 200 Bd.
+/// Returns a rig on a path whose statuses leave every 15 ms, as at 115 200 Bd.
 fn moving() -> Rig {
     let mut rig = Rig::holding();
     let points: Vec<RawPoint> = (0..400).map(|_| rest(0)).collect();
@@ -17,7 +17,7 @@ fn moving() -> Rig {
     rig
 }
 
-/// Runs ticks with a line that is free for a status every 15 ms.
+/// Runs ticks in which the line takes a status every 15 ms.
 fn run_slowly(rig: &mut Rig, ticks: usize) {
     for n in 0..ticks {
         rig.status_free = n % 15 == 0;
@@ -26,7 +26,7 @@ fn run_slowly(rig: &mut Rig, ticks: usize) {
     rig.status_free = true;
 }
 
-/// The time scale falls: TES leaves Execute within this time.
+/// Runs until TES leaves Execute, at most this number of ticks, because path time slows down.
 fn stopped_within(rig: &mut Rig, ticks: usize) -> TrajectoryState {
     rig.until(ticks, |r| r.trajectory() != TrajectoryState::Execute);
     rig.trajectory()
@@ -42,7 +42,7 @@ fn j04_stop_and_pause_wait_for_no_record() {
         [(UrgentCommand::Stop, TrajectoryState::Stop), (UrgentCommand::Pause, TrajectoryState::Pause)]
     {
         let mut rig = moving();
-        // The line takes no status: every record waits.
+        // The line takes no status, so every record waits.
         rig.status_free = false;
         for _ in 0..400 {
             rig.send(FrameType::ClearOccurredErrors, &[]);
@@ -66,7 +66,7 @@ fn j04_a_stop_acts_while_a_long_frame_is_executed() {
     let mut rig = moving();
     rig.exec(ExecCommand::Pause);
     rig.until(400, |r| r.trajectory() == TrajectoryState::Pause);
-    // A segment of many slices, during which the path is given up.
+    // A segment with many slices. During these the path is discarded.
     let points: Vec<RawPoint> = (0..1500).map(|_| rest(0)).collect();
     rig.statuses.clear();
     rig.send(FrameType::FrictionTableUseDefault, &[]);
@@ -95,9 +95,9 @@ fn j04_a_stop_cancels_the_execute_before_it_and_not_the_one_after() {
         rig.run(20);
         assert_eq!((rig.state(), rig.trajectory()), (ControllerState::HoldPos, TrajectoryState::Stop));
         let refused = exec_record(DataStatus::NotAllowed);
-        // The arm stands at the start, in the state after a Stop, not after a Pause.
+        // The arm is at rest at the start. The state is the one after a Stop, not after a Pause.
         assert_eq!(rig.records(), [refused, refused, exec_record(data)]);
-        // A later command is obeyed.
+        // A later command is executed.
         rig.statuses.clear();
         rig.urgent(0, command);
         rig.send(FrameType::TrajSetExecStatus, &[3]);
@@ -145,7 +145,7 @@ fn j04_a_command_that_is_not_short_waits_for_its_own_tick() {
         assert!((1..=2).contains(&done), "at least one, and one of them costly: {done}");
         waiting = rig.waiting();
     }
-    // A frame that changes the state must have changed it before the next frame is checked.
+    // If a frame changes the state, the next frame must be checked in the new state.
     rig.statuses.clear();
     rig.send(FrameType::TeachingModeEnable, &[]);
     rig.send(FrameType::TeachingModeDisable, &[]);
@@ -154,7 +154,7 @@ fn j04_a_command_that_is_not_short_waits_for_its_own_tick() {
     rig.send(FrameType::Trajectory, &segment_body(1, 0, 1, 10, &[rest(0); 3]));
     rig.run(10);
     assert!(rig.records().iter().all(Response::accepted), "{:?}", rig.records());
-    // Short frames are handled together.
+    // Several short frames are executed in one tick.
     (0..160).for_each(|_| rig.send(FrameType::ClearOccurredErrors, &[]));
     rig.run(10);
     assert_eq!(rig.waiting(), 0);
@@ -198,7 +198,7 @@ fn j04_a_line_that_floods_loses_no_record_of_the_other() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 40, failure_persistence: None, ..Default::default() })]
 
-    /// For any frames in any order: each frame gets exactly one record while at most 64 wait, in order on each line.
+    /// Whatever frames are sent, each frame gets exactly one record while at most 64 wait. The records of each line are in order.
     #[test]
     fn j04_exactly_one_record_a_frame(sent in prop::collection::vec((0usize..2, 0u8..8), 1..60)) {
         let mut rig = Rig::holding();
@@ -233,7 +233,7 @@ proptest! {
                 found[line].push(rig.statuses.last().unwrap().response.frame_type);
             }
         }
-        // Those that were sent slowly have come already.
+        // The records of slowly sent frames have already come.
         let early = rig.records().len() - found[0].len() - found[1].len();
         prop_assert_eq!(early + found[0].len() + found[1].len(), expected[0].len() + expected[1].len());
         for line in 0..2 {

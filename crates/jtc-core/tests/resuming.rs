@@ -1,5 +1,5 @@
-//! Conditions and starting point of an Execute after a Pause (J-16, J-33, J-34), and the wait of Teaching, which a long
-//! hold does not use up (J-25).
+//! Conditions and starting point of an Execute after a Pause (J-16, J-33, J-34), and the time limit of a teach request, which does not
+//! depend on how long the arm was held (J-25).
 use crate::rig;
 
 use jtc_bus::NodeState;
@@ -31,7 +31,7 @@ fn j16_an_execute_after_a_pause_waits_for_drives_as_well() {
     assert_eq!(rig.errors(), 0);
 }
 
-/// The joint stands slightly off its commanded position, as friction leaves an arm.
+/// The joint is at rest slightly off its commanded position, because of friction.
 #[test]
 fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     let mut rig = Rig::holding();
@@ -52,7 +52,7 @@ fn j33_a_path_goes_on_at_once_and_from_where_it_was_commanded() {
     assert!(rig.controller.telemetry().point > paused.point + 2, "{} after {}", last, paused.point);
 }
 
-/// The waiting time of Teaching counts from the command, not from the moment at which the arm was first held.
+/// The time limit of a teach request runs from the command, not from the moment at which the arm was first held.
 #[test]
 fn j25_teaching_may_wait_however_long_the_arm_was_held() {
     let mut rig = Rig::holding_with(Config { enable_timeout_ms: 600, ..Config::avena() });

@@ -1,4 +1,4 @@
-//! The safety input with a ramp (J-22): all motion stops first, and then the torque goes.
+//! The safety input with a ramp (J-22): all motion stops first, and then the torque is taken away.
 use jtc_core::{Config, ControllerState, Parameters, TrajectoryState, settings};
 use jtc_wire::{DataStatus, ExecCommand, FrameType, SettingValue};
 
@@ -16,7 +16,7 @@ fn speeds(bench: &Bench) -> (f64, f64) {
     (most(bench.arm.v), most(bench.rig.controller.telemetry().joints.map(|joint| joint.set_velocity)))
 }
 
-/// Returns the ticks until the torque is gone.
+/// Returns the number of ticks until the torque is taken away.
 fn released(bench: &mut Bench) -> usize {
     for k in 1..2_000 {
         bench.arm.tick(&mut bench.rig);
@@ -29,8 +29,8 @@ fn released(bench: &mut Bench) -> usize {
     panic!("the torque stays");
 }
 
-/// A pulse of 1 ms is enough. Commanded motion has come to rest when the torque goes; a joint that yields or is led has
-/// until the end of the ramp.
+/// A pulse of 1 ms is sufficient. Commanded motion is at rest when the torque is taken away. A joint that yields or is led may move until
+/// the end of the ramp.
 #[test]
 fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     for (doing, begin) in UNDER_WAY {
@@ -45,7 +45,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
         println!("{doing}: from {before:.2} rad/s, {ms} ms, then {speed:.3} rad/s");
         assert!(ms <= 500, "{doing}: {ms} ms");
         match doing {
-            // No commanded motion: a stop would only keep the torque on.
+            // Without a commanded motion, a stop would only keep the torque on for longer.
             _ if before == 0.0 && !operates && doing != "teaches" && doing != "slows down after a Stop" => {
                 assert_eq!(ms, 0, "{doing}")
             }
@@ -60,7 +60,7 @@ fn j22_with_a_ramp_what_moves_stops_before_the_torque_goes() {
     }
 }
 
-/// On the path with a ramp.
+/// A controller on the path, with a ramp.
 fn moving(ramp_ms: u16) -> Bench {
     let mut bench = Bench::holding(config(ramp_ms), 1.0, 0.0);
     bench.execute(1.0, 4.0);
@@ -71,13 +71,13 @@ fn moving(ramp_ms: u16) -> Bench {
     bench
 }
 
-/// The ramp is the longest time; without one the torque goes in the tick that reads 0.
+/// The ramp is the longest time. Without a ramp the torque is taken away in the tick that reads 0.
 #[test]
 fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     for ramp_ms in [0, 1, 20, 100] {
         assert_eq!(released(&mut moving(ramp_ms)), 1 + usize::from(ramp_ms));
     }
-    // A release for a fault of a drive or another error does not wait.
+    // A fault of a drive or another error takes the torque away without waiting.
     let mut bench = moving(500);
     bench.run(50);
     bench.rig.nodes[3].fault();
@@ -85,7 +85,7 @@ fn j22_the_torque_goes_when_the_ramp_is_over_whatever_still_moves() {
     assert!(ticks < 20, "{ticks} ms");
 }
 
-/// Another cause that takes the torque away meanwhile does not hide that the safety input has been 0.
+/// If another cause takes the torque away meanwhile, the safety input is reported as well.
 #[test]
 fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     for reset in [false, true] {
@@ -94,7 +94,7 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
         bench.rig.safety_input = true;
         bench.run(50);
         if reset {
-            // The drive restarts, without an error of its own.
+            // The drive restarts without reporting an error.
             bench.rig.nodes[3].report.state = jtc_bus::NodeState::START;
         } else {
             bench.rig.nodes[3].fault();
@@ -104,7 +104,7 @@ fn j22_j21_the_safety_input_is_an_error_however_the_ramp_ends() {
     }
 }
 
-/// While drives are being enabled there is nothing to stop.
+/// While drives are being enabled, there is no motion to stop.
 #[test]
 fn j22_a_ramp_enables_no_drive() {
     let mut arm = Plant::new(&Parameters::avena().model, LuGre::of_avena_times(1.0), POSES[0]);
@@ -128,7 +128,7 @@ fn j22_nothing_begins_during_the_ramp() {
     bench.run(1);
     bench.rig.safety_input = true;
     bench.until("a path that stands", |rig| rig.trajectory() == TrajectoryState::Stop);
-    // The hand that pushes the arm keeps it from standing.
+    // The hand that pushes the arm keeps it in motion.
     bench.rig.follow = false;
     let rig = &mut bench.rig;
     rig.nodes[1].report.velocity = 0.1;
@@ -139,7 +139,7 @@ fn j22_nothing_begins_during_the_ramp() {
     rig.until(500, |rig| rig.state() == ControllerState::Error);
 }
 
-/// The setting belongs to the arm: it can be changed only without torque.
+/// The setting is part of the arm, so it can be changed only without torque.
 #[test]
 fn j22_j53_the_ramp_is_a_setting_that_changes_without_torque_only() {
     let row = settings::setting(80).expect("the setting");

@@ -1,18 +1,18 @@
-//! J-54: the two slots on a model of the flash whose power can fail at any word and in the middle of it.
+//! J-54: the two slots on a model of the flash, whose power can fail at and within any word.
 use jtc_core::slots::{Action, Header, IMAGE_MAX, SLOTS, Slots, Storing, WORD, Word, newer};
 use proptest::prelude::*;
 
 const WORDS: usize = 1 + IMAGE_MAX / WORD;
 const ERASED: Word = [0xFF; WORD];
 
-/// State of a word.
+/// State of a flash word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Cell {
-    /// As after an erasure: the word can be programmed.
+    /// The word is erased and can be programmed.
     Erased,
-    /// Programmed, completely or partly.
+    /// The word was programmed, completely or partly.
     Holds(Word),
-    /// More bits are wrong than the flash can correct: reading it is an error.
+    /// The word has more wrong bits than the flash can correct, so that reading it is an error.
     Unreadable,
 }
 
@@ -66,7 +66,7 @@ impl Flash {
     /// Simulates a loss of power in the middle of an action.
     fn torn(&mut self, action: &Action, rng: &mut Chance) {
         match *action {
-            // Some words are erased, some not, some only partly.
+            // Some words are erased, some are not, and some are erased partly.
             Action::Erase { slot } => {
                 for cell in &mut self.0[slot] {
                     let before = match cell {
@@ -107,7 +107,7 @@ impl Flash {
     }
 }
 
-/// Small seeded numbers (xorshift).
+/// Generator of small pseudo-random numbers from a seed (xorshift).
 struct Chance(u64);
 
 impl Chance {
@@ -128,7 +128,7 @@ fn image(n: usize, seed: u64) -> Vec<u8> {
     (0..n).map(|_| rng.byte()).collect()
 }
 
-/// The last image wins, each of many times, and the one before stays in the other slot.
+/// Many images are stored. The last one is found each time, and the one before stays in the other slot.
 #[test]
 fn j54_the_newest_image_is_found() {
     let mut flash = Flash::new();
@@ -152,7 +152,7 @@ fn an_image_that_is_too_long_changes_nothing() {
     assert_eq!(slots, Slots::new([Some(3), Some(2)]));
 }
 
-/// J-54: every bit of a slot matters: with one wrong the slot is not whole, and the other one is used.
+/// J-54: every bit of a slot matters. If one bit is wrong, the slot is not complete, and the other slot is used.
 #[test]
 fn j54_no_wrong_bit_is_accepted() {
     for length in [0, 1, 40, 300] {
@@ -173,8 +173,8 @@ fn j54_no_wrong_bit_is_accepted() {
     }
 }
 
-/// J-54: the power fails before, during and after every action on the flash, at the first stores and at later ones. The
-/// old image or the new one is there, complete; and the next store works normally.
+/// J-54: the power fails before, during and after every action on the flash, for the first stores and later ones. The old or the new image
+/// is complete afterwards, and the next store works normally.
 #[test]
 fn j54_a_power_cut_leaves_one_whole_image() {
     for (stores, length) in [(0, 200), (1, 200), (2, 200), (3, 333), (4, 0), (5, 2000), (1, IMAGE_MAX)] {
@@ -228,7 +228,7 @@ fn j54_two_damaged_slots_are_no_image() {
     assert_eq!(flash.slots().current(), Some((0, 1)));
 }
 
-/// The CRC alone would detect an incomplete slot; without a header it need not be computed.
+/// The CRC alone would detect an incomplete slot. Without a header it need not be computed.
 #[test]
 fn the_header_is_programmed_last() {
     let image = image(100, 1);
@@ -281,7 +281,7 @@ proptest! {
             *cell = Cell::Holds(*word);
         }
         prop_assert_eq!(flash.current(), None);
-        // With a header that is valid except for its CRC.
+        // The header is valid except for its CRC.
         let mut header = Header::new(&[], 5).expect("short").emit();
         header[8..12].copy_from_slice(&length.to_le_bytes());
         header[28..].copy_from_slice(&words[0][..4]);
@@ -289,7 +289,7 @@ proptest! {
         prop_assert_eq!(flash.current(), None);
     }
 
-    /// The newest of any two that are not 2³¹ apart is the one that was stored later.
+    /// If two sequence numbers are not 2³¹ apart, the newest is that of the image that was stored later.
     #[test]
     fn the_next_sequence_number_is_the_newest(found in any::<[Option<u32>; SLOTS]>()) {
         let mut slots = Slots::new(found);

@@ -1,4 +1,4 @@
-//! Errors and the way back (sections 3 and 4).
+//! Errors and the return from them (sections 3 and 4).
 use crate::rig;
 
 use jtc_bus::{Frame, NodeState, Request, Target, warning};
@@ -38,7 +38,7 @@ fn j21_errors_latch_until_the_cause_is_gone_and_the_host_clears() {
     rig.clear(true, 0);
     rig.run(100);
     assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
-    // Occurred errors stay until 0x02.
+    // Occurred errors stay until ClearOccurredErrors (0x02).
     assert_eq!(rig.status().occurred, error::EMERGENCY_INPUT | error::EXTERNAL);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.status().occurred, 0);
@@ -68,7 +68,7 @@ fn j21_clearing_a_node_holds_the_command_until_it_follows() {
     assert_eq!(rig.nodes[1].report.errors, 0);
 }
 
-/// A clear that arrives in the very tick in which a fault shows does not hide it.
+/// A clear that arrives in the tick in which a fault appears does not hide the fault.
 #[test]
 fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     type Fault = fn(&mut Rig);
@@ -87,7 +87,7 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
                 }
                 rig.tick();
                 fault(&mut rig);
-                // The answer to the Move of this tick shows it in the next one, which serves the clear.
+                // The answer to the Move of this tick shows the fault in the next tick, which also executes the clear.
                 rig.tick();
                 if occurred {
                     rig.send(FrameType::ClearOccurredErrors, &[]);
@@ -116,8 +116,7 @@ fn j21_a_clear_in_the_tick_of_a_fault_does_not_hide_it() {
     );
 }
 
-/// Existing hosts show the answer: a clear that cleared nothing is refused, and is not carried out later without a new
-/// request.
+/// Existing hosts show the answer. A clear without an effect is refused, and is not executed later without a new request.
 #[test]
 fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     type Fault = fn(&mut Rig);
@@ -139,12 +138,12 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!(rig.state(), ControllerState::Error, "{name}");
             rig.plain = plain;
             let refused = if plain { DataStatus::IncorrectValue } else { DataStatus::NotAllowed };
-            // The controller's errors alone; together with a joint that has nothing to clear; and the occurred errors, which are all
-            // current.
+            // Three cases: the controller's errors alone; the same with a joint that has no error to clear; and the occurred errors, which
+            // are all current.
             assert_eq!(rig.clear(true, 0), refused, "{name}");
             assert_eq!(rig.clear(true, 0x01), refused, "{name}");
             assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), refused, "{name}");
-            // Clears of nodes do not concern the controller.
+            // Clears for nodes have no effect on the controller's errors.
             assert_eq!(rig.clear(false, 0x01), DataStatus::NoError, "{name}");
             rig.nodes[4].report.state = NodeState::FAULT;
             assert_eq!(rig.clear(false, 0x10), DataStatus::NoError, "{name}");
@@ -160,7 +159,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
             assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0), "{name}");
         }
     }
-    // A clear together with the joint, or while the joint is being cleared, is accepted.
+    // A clear is accepted together with the joint, or while the joint is being cleared.
     for joint_first in [false, true] {
         let mut rig = Rig::holding();
         rig.nodes[4].report.state = NodeState::FAULT;
@@ -174,7 +173,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
         rig.run(300);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // A clear that clears another error is accepted, and the fault stays.
+    // A clear that clears another error is accepted, but the fault stays.
     let mut rig = Rig::holding();
     rig.press_stop(1);
     rig.nodes[4].report.state = NodeState::FAULT;
@@ -182,7 +181,7 @@ fn j21_a_clear_that_cannot_clear_anything_yet_is_refused_and_not_remembered() {
     assert_eq!(rig.clear(true, 0), DataStatus::NoError);
     assert_eq!(rig.errors(), error::EXTERNAL | error::EXTERNAL_JOINTS);
     assert_eq!(rig.clear(true, 0), DataStatus::NotAllowed);
-    // The occurred errors, too: the first clear empties their word, the second has nothing to clear.
+    // The same for the occurred errors: the first clear empties their word, the second one has no effect.
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NoError);
     assert_eq!(rig.ask(FrameType::ClearOccurredErrors, &[]), DataStatus::NotAllowed);
     // A controller without errors refuses no clear.
@@ -232,11 +231,11 @@ fn j23_a_reset_touches_only_the_nodes_in_its_mask() {
     let resets: Vec<_> = rig.nodes.iter().map(|n| n.resets).collect();
     assert_eq!(resets, [1, 2, 1, 1, 1, 2, 1]);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // An empty mask does nothing at all.
+    // An empty mask has no effect.
     rig.ask(FrameType::ResetCanDevices, &[0, 0, 0, 0]);
     rig.run(50);
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // Bits without a meaning are ignored: hosts send 0xFF for all.
+    // Bits without a meaning are ignored, because hosts send 0xFF for all nodes.
     rig.ask(FrameType::ResetCanDevices, &[0xFF, 0, 0, 0]);
     rig.run(600);
     assert_eq!(rig.state(), ControllerState::HoldPos);
@@ -288,7 +287,7 @@ fn j12_one_broadcast_a_tick_and_other_frames_in_one_tick_of_four() {
 #[test]
 fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
     const OWN: u16 = error::EMERGENCY_OUTPUT | error::INTERNAL;
-    // Every second tick left out: in each state with torque.
+    // Every second tick is missed, in each state with torque.
     for teaching in [false, true] {
         let mut rig = Rig::holding();
         if teaching {
@@ -309,7 +308,7 @@ fn j12_ten_late_ticks_within_a_second_are_an_internal_error() {
         rig.run(600);
         assert_eq!((rig.state(), rig.errors()), (ControllerState::HoldPos, 0));
     }
-    // A few late ticks are tolerated for any time.
+    // A few late ticks are tolerated for any length of time.
     let mut rig = Rig::holding();
     for _ in 0..100 {
         rig.missed_ticks = 5;
@@ -360,7 +359,7 @@ fn j16_the_safety_line_counts_once_a_joint_is_configured() {
         assert_eq!(rig.errors(), 0);
     }
     assert_eq!(rig.state(), ControllerState::HoldPos);
-    // In Init too, it is an error of a joint that is configured.
+    // In Init, it is also an error of a configured joint.
     let mut rig = Rig::new(Config::avena());
     rig.run(300);
     assert_eq!((rig.state(), rig.nodes[2].configured), (ControllerState::Init, true));
@@ -388,7 +387,7 @@ fn j04_each_record_is_carried_once_and_in_order() {
     assert_eq!(records[0].frame_type, 0x08);
     assert_eq!(records[1], bad);
     assert!(records[2..].iter().all(|r| (r.frame_type, r.data, r.length) == (0x0F, DataStatus::NoError, 6)));
-    // Without records: one status every 40 ms, carrying zeros.
+    // If there are no records, one status is sent every 40 ms, with an empty record.
     rig.run(40);
     rig.statuses.clear();
     rig.run(400);
@@ -423,7 +422,7 @@ fn j12_j21_j24_after_a_failure_of_the_device_itself_the_host_must_clear_first() 
     assert!(!rig.last.safety_output);
     assert!(is_move(&rig.sent[0]) && torque_of(&rig.sent[0]) == [0.0; 6]);
     rig.run(1000);
-    // The error latches; its bit is that of an internal error that is caused neither by a joint nor by the bus.
+    // The error latches. Its bit is that of an internal error that comes neither from a joint nor from the bus.
     let status = rig.status();
     assert_eq!((status.state, status.errors, status.occurred), (ControllerState::Error.into(), OWN, OWN));
     assert_eq!(status.can_occurred, 0);

@@ -1,4 +1,4 @@
-//! Holding joints with stiction, because an integral can cause endless hunting in such joints (J-41).
+//! Holding joints with stiction, in which an integral can cause endless hunting (J-41).
 use crate::{plant, rig};
 
 use jtc_core::{Config, Parameters, TrajectoryState};
@@ -46,8 +46,8 @@ fn sticky(ratio: f64, stribeck: f64, stiffness: f64, damping: f64) -> [LuGre; 6]
     core::array::from_fn(|j| LuGre { stribeck, stiffness, damping, ..LuGre::avena(j, ratio) })
 }
 
-/// Checks that every joint is quiet: at most a toggle of the encoder's last bit, which is 3.8 N·m of P and D on the
-/// large joints, and the joint stands at the position at which the integral settles.
+/// Checks that every joint is quiet: at most the encoder's last bit toggles, which is 3.8 N·m of P and D on the large joints, and the joint
+/// is at the position at which the integral settles.
 fn assert_quiet(arm: &mut Plant, rig: &mut Rig, what: &str) {
     for (j, (torque, position)) in watch(arm, rig, 6000).iter().enumerate() {
         let joint = j + 1;
@@ -78,8 +78,8 @@ fn j41_no_joint_hunts_or_buzzes_in_stiction() {
     }
 }
 
-/// An integral that is never frozen turns an error below the resolution of the encoder into a limit cycle: the plant of
-/// these tests shows it.
+/// If the integral never stops changing, an error below the resolution of the encoder leads to a limit cycle. The simulation in these tests
+/// shows it.
 #[test]
 fn j41_an_integral_that_is_never_held_hunts() {
     let mut arm =
@@ -100,7 +100,7 @@ fn j41_a_motion_ends_without_hunting() {
         let mut arm = Plant::new(&heavier(Parameters::avena().model, 1.1), friction, POSE);
         let mut rig = arm.holding(Config::avena());
         arm.run(&mut rig, 3000);
-        // 0.3 rad in 2 s, there and back.
+        // A motion of 0.3 rad in 2 s and back.
         let points: Vec<_> = (0..=400).map(|i| point(&rig, f64::from(i) / 200.0)).collect();
         rig.send(FrameType::Trajectory, &segment_body(7, 0, 1, 10, &points));
         rig.send(FrameType::TrajSetExecStatus, &[3]);

@@ -1,4 +1,4 @@
-//! Teaching an arm that carries more, or less, than its model does (J-25, J-44).
+//! Teaching an arm that carries more or less than its model (J-25, J-44).
 use crate::{plant, rig};
 
 use jtc_core::{Config, ControllerState, Parameters};
@@ -7,7 +7,7 @@ use jtc_wire::FrameType;
 use plant::{LuGre, POSES, Plant, heavier, loaded};
 use rig::Rig;
 
-/// Returns how far a hand leads each joint from a pose, rad. No joint reaches a soft end.
+/// Returns the distance by which a hand leads each joint from a pose, rad. No joint reaches a soft end.
 fn led(pose: &[f64; 6]) -> [f64; 6] {
     let second = if pose[1] > 1.0 { -0.3 } else { 0.3 };
     [0.1, second, -0.3, 0.2, 0.3, 0.3]
@@ -17,7 +17,7 @@ fn model() -> ArmModel {
     Parameters::avena().model
 }
 
-/// Holds the arm for 4 s, then teaches it; checks that the torque makes no steps.
+/// Holds the arm for 4 s, then teaches it. Checks that the torque makes no steps.
 fn taught(arm: &mut Plant, config: Config) -> Rig {
     let mut rig = arm.holding(config);
     arm.run(&mut rig, 4000);
@@ -35,7 +35,7 @@ fn without_steps(arm: &mut Plant, rig: &mut Rig, ticks: usize) {
         arm.tick(rig);
         let now = torque(rig);
         for j in 0..6 {
-            // A toggle of the encoder's last bit is 2.3 N·m of P and D; and the arm moves.
+            // A toggle of the encoder's last bit is 2.3 N·m of P and D. The motion of the arm adds to that.
             assert!((now[j] - last[j]).abs() < 4.0, "joint {}: {} to {} N·m", j + 1, last[j], now[j]);
         }
         last = now;
@@ -72,7 +72,7 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
             let mut arm = Plant::new(&loaded(model(), 2.0), LuGre::of_avena_times(factor), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
-            // With a third of its friction an arm creeps, because of the load that the integral had not found.
+            // With a third of its friction the arm creeps, because of the load that the integral had not found.
             assert!(still < if factor == 1.0 { 0.002 } else { 0.1 * 3.0 }, "{still} rad at {pose:?}");
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
@@ -82,7 +82,7 @@ fn j25_an_unknown_payload_floats_where_it_is_and_where_it_is_led() {
     }
 }
 
-/// A mass at the flange does not explain masses that are wrong everywhere; friction holds the difference.
+/// A mass at the flange does not explain masses that are wrong in every link. Friction holds the difference.
 #[test]
 fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
     for mass in [0.9, 1.1] {
@@ -93,7 +93,7 @@ fn j25_masses_that_are_wrong_by_a_tenth_do_not_make_the_arm_drift() {
             lead(&mut arm, &mut rig, led(&pose));
             let led = drift(&mut arm, &mut rig, 3000);
             assert!(still < 0.002 && led < 0.005, "masses times {mass}: {still}, {led} rad from {pose:?}");
-            // A third of that friction still holds it at its first position; elsewhere it may creep.
+            // A third of that friction still holds the arm at its first position. At other positions it may creep.
             let mut arm = Plant::new(&heavier(model(), mass), LuGre::of_avena_times(0.3), pose);
             let mut rig = taught(&mut arm, Config::avena());
             let still = drift(&mut arm, &mut rig, 3000);
@@ -125,7 +125,7 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
 /// at the flange, or a push against the first joint. Returns `None` if Teaching waits until the contact has ended.
 fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> {
     let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
-    // A contact that lasts this long counts as a load, and not as a push.
+    // A contact that lasts this long is learned as a load, and not detected as a push.
     let mut rig = arm.holding(Config { yield_torque_share: 0.8, ..Config::avena() });
     let unit = Dynamics::new(&model(), Config::avena().gravity).flange_torque(&pose);
     let push = if mass == 0.0 { [30.0, 0.0, 0.0, 5.0, 0.0, 0.0] } else { unit.map(|u| mass * u) };
@@ -148,8 +148,8 @@ fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> 
     Some(fastest)
 }
 
-/// A person leaned on the arm, or it lay on an object, when Teaching began: the learned load drives the arm when the
-/// contact ends, but slowly.
+/// When Teaching began, a person leaned on the arm, or the arm lay on an object. When the contact ends, the learned load drives the arm,
+/// but slowly.
 #[test]
 fn j25_a_contact_that_goes_does_not_make_the_arm_jump() {
     let (mut taught, mut reached) = (0, 0.0_f64);

@@ -1,4 +1,4 @@
-//! The damping of Teaching, in light joints, too (J-25).
+//! The damping of Teaching, including light joints (J-25).
 use crate::{plant, rig};
 
 use jtc_bus::NodeState;
@@ -10,7 +10,7 @@ use rig::{Rig, floats, model_body};
 
 const POSE: [f64; 6] = [0.1, 0.5, -0.9, 0.4, 0.7, 0.2];
 
-/// The default arm with its masses and lengths times these.
+/// Returns the default arm with its masses and lengths times these factors.
 fn scaled(mass: f64, length: f64) -> ArmModel {
     let mut model = Parameters::avena().model;
     for joint in &mut model.joints {
@@ -24,12 +24,12 @@ fn scaled(mass: f64, length: f64) -> ArmModel {
     model
 }
 
-/// Effect of the brake in the last 0.4 s of a push: a hand turns `joint` with `push` N·m for 0.6 s, against grease
-/// only, and holds the others back.
+/// Effect of the brake in the last 0.4 s of a push. A hand turns `joint` with `push` N·m for 0.6 s, against viscous friction only, and
+/// holds the other joints.
 struct Braked {
     /// Highest speed, rad/s.
     fastest: f64,
-    /// Number of changes of the brake between growing and shrinking, by more than 0.2 N·m in a tick.
+    /// Number of times that the brake changes between growing and shrinking, by more than 0.2 N·m in a tick.
     turns: u32,
 }
 
@@ -37,8 +37,7 @@ fn braked(model: &ArmModel, rotor: f64, joint: usize, push: f64) -> Braked {
     braked_with(model, rotor, rotor, None, joint, push)
 }
 
-/// Like `braked`, but the controller is `given` another rotor inertia than the true one (kg·m²), and another damping
-/// (N·m·s/rad).
+/// Like `braked`, but the controller gets another rotor inertia than the true one (kg·m²), and another damping (N·m·s/rad).
 fn braked_with(
     model: &ArmModel,
     given: f64,
@@ -98,11 +97,10 @@ fn j25_damping_does_not_drive_light_joints_to_and_fro() {
     for joint in 3..6 {
         for (push, damping) in [-1.5, 1.5].into_iter().flat_map(|p| [(p, None), (p, Some(1000.0))]) {
             let it = braked_with(&light, 0.05, 0.05, damping, joint, push);
-            // With the largest damping that it bears, a pushed joint swings until it has reached its speed, and no
-            // longer.
+            // With the largest damping that it tolerates, a pushed joint swings only until it has reached its speed.
             let most = if damping.is_some() { 6 } else { 0 };
             assert!(it.turns <= most, "joint {} at {push} N·m, {damping:?}: {}", joint + 1, it.turns);
-            // 90 1/s times a fifth of 0.05 kg·m² at least, and the brake.
+            // The damping is at least 90 1/s times a fifth of 0.05 kg·m², plus the brake.
             assert!(it.fastest < 1.5, "joint {}: {} rad/s", joint + 1, it.fastest);
         }
     }
@@ -114,7 +112,7 @@ fn j25_the_wrists_of_the_default_arm_are_damped() {
         let push = 0.3 * Config::avena().joints[joint].torque_max;
         let it = braked(&Parameters::avena().model, 0.7, joint, push);
         assert_eq!(it.turns, 0, "joint {}", joint + 1);
-        // A fifth of the rotors does not bear more against three tenths of the torque limit.
+        // A fifth of the rotor inertia does not allow more damping against three tenths of the torque limit.
         assert!((0.4..1.2).contains(&it.fastest), "joint {}: {} rad/s", joint + 1, it.fastest);
     }
 }

@@ -1,4 +1,4 @@
-//! An arm in a pose in which its torque limits do not hold it (J-06, J-20, J-43).
+//! An arm in a pose in which its torque limits cannot hold it (J-06, J-20, J-43).
 use crate::rig;
 
 use jtc_core::{Config, ControllerState, Parameters, joint_error};
@@ -8,7 +8,7 @@ use rig::Rig;
 
 const POSE: [f64; 6] = [0.0, 0.6, 0.0, 0.0, 0.0, 0.0];
 
-/// Joint 2 can hold the arm upright, but only four fifths of its load in `POSE`.
+/// The torque limit of joint 2 suffices to hold the arm upright, but only for four fifths of its load in `POSE`.
 fn weak() -> Config {
     let mut config = Config::avena();
     let gravity = Dynamics::new(&Parameters::avena().model, config.gravity).gravity_torque(&POSE);
@@ -16,8 +16,8 @@ fn weak() -> Config {
     config
 }
 
-/// In Teaching the torque of the joint is at its limit there. Teaching continues, or the arm is released if the setting
-/// demands it.
+/// In Teaching, the torque of the joint is at its limit in this pose. Teaching continues, or the arm is released if the setting requires
+/// that.
 #[test]
 fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() {
     for (torque_release, end) in [(false, ControllerState::Teaching), (true, ControllerState::Error)] {
@@ -43,7 +43,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
             continue;
         }
         assert_eq!(rig.status().joints[1].internal, joint_error::TORQUE);
-        // Its torque is off now: its model is required again, and stays required while the error is latched.
+        // The torque is off now. The model is required again, and stays required while the error is latched.
         assert_eq!(rig.status().jtc_init, 0b100);
         rig.clear(true, 0x7F);
         rig.run(50);
@@ -51,7 +51,7 @@ fn j43_j66_an_arm_that_is_led_to_where_it_cannot_be_held_goes_on_being_taught() 
     }
 }
 
-/// The check that an arm can be held is made when it must be held, not while it is moved by hand before.
+/// Whether an arm can be held is checked when it must be held, not while a hand moves it before.
 #[test]
 fn j06_the_model_is_judged_where_init_ends() {
     let mut rig = Rig::new(weak());

@@ -72,7 +72,7 @@ fn j30_counts_and_the_old_trajectory_survives_a_refused_segment_0() {
     assert_eq!(traj(&mut rig, 1, 0, 1, 10, &vec![rest(0); 1501]), TooManyPoints);
     assert_eq!(traj(&mut rig, 1, 0, 1, 0, &p), IncorrectStepTime);
     assert_eq!(rig.trajectory(), TrajectoryState::Stop);
-    // Fills the store to its last point. A further point is refused, and segment 0 of another trajectory counts only its own points.
+    // The store is filled to its last point. A further point is refused, but segment 0 of another trajectory replaces all of them.
     for s in 0..8 {
         assert_eq!(traj(&mut rig, 9, s, 9, 1, &vec![rest(0); 1500]), NoError);
     }
@@ -159,13 +159,13 @@ fn j31_point_0_is_commanded() {
     assert!(seen);
 }
 
-/// Every commanded position of a paused run lies on the path, and nothing is skipped.
+/// Every commanded position of a paused run is on the path, and no part of the path is skipped.
 #[test]
 fn j33_pause_and_resume_follow_the_path() {
     let mut rig = Rig::holding();
     let points = motion(301, 10);
     rig.upload(&points, 10);
-    // Undisturbed run: position of joint 5 as a function of that of joint 2.
+    // The undisturbed run gives the position of joint 5 as a function of the position of joint 2.
     rig.exec(ExecCommand::Execute);
     let mut path = Vec::new();
     while rig.trajectory() != TrajectoryState::Finish {
@@ -187,7 +187,7 @@ fn j33_pause_and_resume_follow_the_path() {
         let near = |p: &(f64, f64)| (p.0 - x).hypot(p.1 - y) < 5e-4;
         assert!(near(&path[i]) || near(&path[i - 1]), "({x}, {y}) is off the path");
         assert!(t.point >= last.point && t.point <= last.point + 1, "the index is monotone");
-        // No step of velocity: at most what 12.6 rad/s² do in a tick, and the int16 grid.
+        // The velocity does not step: it changes by at most the effect of 12.6 rad/s² in a tick, plus a step of the int16 grid.
         let dv = (t.joints[2].set_velocity - last.joints[2].set_velocity).abs();
         assert!(dv < 0.0126 + 0.0004, "step of {dv} rad/s");
     };
@@ -214,7 +214,7 @@ fn j33_pause_and_resume_follow_the_path() {
     assert_eq!(last.joints[2].set_position, rad(points[300].position[2]));
 }
 
-/// Pauses and stops in the last milliseconds, too, when the ramp would reach beyond the last point.
+/// Pauses and stops are accepted even in the last milliseconds, when the ramp would reach beyond the last point.
 #[test]
 fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
     let points = motion(101, 10);
@@ -245,7 +245,7 @@ fn j33_an_accepted_pause_or_stop_ends_in_pause_or_stop() {
 
 #[test]
 fn j33_a_pause_at_speed_takes_longer_rather_than_break_a_limit() {
-    // 1 rad/s on every joint, from rest and to rest: 200 ms would need 7.5 rad/s², which this configuration does not allow.
+    // Every joint moves at 1 rad/s, from rest to rest. A ramp of 200 ms would need 7.5 rad/s², which this configuration does not allow.
     let n = 151;
     let speed = |i: i32| (0.04 * f64::from(i.min(n - 1 - i))).min(1.0);
     let mut way = 0.0;
@@ -290,7 +290,7 @@ fn j34_commands_follow_the_table() {
             rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
         }
         if trajectory == TrajectoryState::Finish {
-            // A second run would need a closed path: the joints are put back to the start instead.
+            // A second run would need a closed path, so the joints are put back to the start.
             rig.until(3000, |r| r.trajectory() == TrajectoryState::Finish);
         }
         rig
@@ -358,7 +358,7 @@ fn j34_execute_from_pause_needs_the_arm_at_the_paused_point() {
     rig.move_along(&motion(100, 10), 301);
     rig.exec(ExecCommand::Pause);
     rig.until(1000, |r| r.trajectory() == TrajectoryState::Pause);
-    // A person leans on the arm: a little, then too much.
+    // A person leans on the arm, first a little and then too much.
     rig.follow = false;
     for (push, answer) in [(0.022, DataStatus::StartPositionMismatch), (-0.004, DataStatus::NoError)] {
         for _ in 0..20 {

@@ -1,4 +1,4 @@
-//! Arms for the plant: the default arm, and others as `jtc arm import` creates them from their descriptions.
+//! Arms for the simulation: the default arm, and arms that `jtc arm import` has created from their descriptions.
 use jtc_core::{Config, Friction, Parameters, PidGains};
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 use jtc_wire::{DataStatus, FrameType};
@@ -17,9 +17,9 @@ pub struct ArmFile {
     pub polynomial: [[f64; 6]; 6],
 }
 
-/// Universal Robots' UR5, as example-robot-data carries its description (BSD-3-Clause).
+/// Universal Robots' UR5, from its description in example-robot-data (BSD-3-Clause).
 const UR5: &str = include_str!("ur5.toml");
-/// Unitree's Z1, from the same place (BSD-3-Clause).
+/// Unitree's Z1, also from example-robot-data (BSD-3-Clause).
 const Z1: &str = include_str!("z1.toml");
 
 impl ArmFile {
@@ -47,7 +47,7 @@ impl ArmFile {
         }
     }
 
-    /// Returns the arm without friction, both in reality and in its file.
+    /// Returns the arm without friction, both in the simulation and in its file.
     pub fn slick(self) -> Self {
         Self { polynomial: [[0.0; 6]; 6], ..self }
     }
@@ -57,8 +57,8 @@ impl ArmFile {
         shares_of(torque, &self.config)
     }
 
-    /// Returns a pose inside the ranges, rad, in which the torque to stand with a payload at the flange (kg) is less
-    /// than `most` of each limit, and that torque.
+    /// Returns a pose inside the ranges, rad, and the torque that holds it. With a payload at the flange (kg), this torque is less than
+    /// `most` of each limit.
     pub fn pose(&self, random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
         let dynamics = Dynamics::new(&loaded(self.model, mass), self.config.gravity);
         loop {
@@ -73,8 +73,7 @@ impl ArmFile {
         }
     }
 
-    /// Returns the friction of its joints at the temperature of the rig, times `factor`; stiction is a fifth more than
-    /// Coulomb friction.
+    /// Returns the friction of its joints at the temperature of the rig, times `factor`. Stiction is 20 % higher than Coulomb friction.
     pub fn friction(&self, factor: f64) -> [LuGre; 6] {
         self.polynomial.map(|c| {
             if c[0] == 0.0 && c[1] == 0.0 {

@@ -1,5 +1,5 @@
-//! A simulated physical arm connected to the [`Rig`]: rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
-//! drives with a coarse encoder and a late speed.
+//! A simulated physical arm that is connected to the [`Rig`]. It has rigid bodies, rotors, rigid or elastic gears, LuGre friction, and
+//! drives with a coarse encoder and a delayed speed.
 
 use jtc_core::{Config, Parameters};
 use jtc_dynamics::{ArmModel, Dynamics};
@@ -10,32 +10,32 @@ pub mod arms;
 
 pub use arms::ArmFile;
 
-/// rad of one step of the drives' 16-bit encoder.
+/// Step of the drives' 16-bit encoder, rad.
 pub const ENCODER_STEP: f64 = core::f64::consts::TAU / 65_536.0;
-/// rad of one step of the motor's encoder, at the output side of the gear. The drives take the speed from this encoder.
+/// Step of the motor's encoder at the output side of the gear, rad. The drives measure the speed with this encoder.
 const MOTOR_STEP: f64 = core::f64::consts::TAU / 1_210_000.0;
-/// Integration steps in a millisecond: the bristles are stiff.
+/// Integration steps per millisecond. The bristles are stiff, so there are many.
 const SUBSTEPS: usize = 20;
 const DT: f64 = 1e-3 / SUBSTEPS as f64;
-/// kg·m² of the output side of an elastic gear, which turns with the link.
+/// Inertia of the output side of an elastic gear, kg·m². It turns with the link.
 const GEAR_OUTPUT: f64 = 0.01;
-/// s: damping of an elastic gear, N·m·s/rad, for each N·m/rad of its stiffness.
+/// Damping of an elastic gear per stiffness, s: N·m·s/rad for each N·m/rad.
 const GEAR_DAMPING: f64 = 5e-4;
 
 /// LuGre friction of a joint (Canudas de Wit et al. 1995): bristles that stick, then slip along Stribeck's curve.
 #[derive(Clone, Copy, Debug)]
 pub struct LuGre {
-    /// N·m while sliding slowly.
+    /// Friction torque while sliding slowly, N·m.
     pub coulomb: f64,
-    /// N·m at which it breaks away.
+    /// Torque at which the joint breaks away, N·m.
     pub stiction: f64,
-    /// rad/s above which stiction has mostly disappeared.
+    /// Speed above which stiction has mostly disappeared, rad/s.
     pub stribeck: f64,
-    /// N·m/rad of the bristles.
+    /// Stiffness of the bristles, N·m/rad.
     pub stiffness: f64,
-    /// N·m·s/rad of the bristles.
+    /// Damping of the bristles, N·m·s/rad.
     pub damping: f64,
-    /// N·m·s/rad of the grease.
+    /// Viscous friction of the grease, N·m·s/rad.
     pub viscous: f64,
 }
 
@@ -43,7 +43,7 @@ impl LuGre {
     pub const NONE: Self =
         Self { coulomb: 0.0, stiction: 0.0, stribeck: 1.0, stiffness: 0.0, damping: 0.0, viscous: 0.0 };
 
-    /// The default arm's joints at the temperature of the rig, with this ratio of stiction to Coulomb friction.
+    /// Returns the friction of the default arm's joint at the temperature of the rig, with this ratio of stiction to Coulomb friction.
     pub fn avena(j: usize, stiction: f64) -> Self {
         let jtc_core::Friction::Polynomial(polynomial) = Parameters::avena().friction else { panic!() };
         let c = polynomial[j];
@@ -59,7 +59,7 @@ impl LuGre {
         }
     }
 
-    /// The default arm's friction times `factor`; its stiction is a fifth more than its Coulomb friction.
+    /// Returns the default arm's friction times `factor`. Stiction is 20 % higher than Coulomb friction.
     pub fn of_avena_times(factor: f64) -> [Self; 6] {
         core::array::from_fn(|j| {
             let f = Self::avena(j, 1.2);
@@ -68,7 +68,7 @@ impl LuGre {
         })
     }
 
-    /// Torque against the motion at speed `v`; moves the bristles `z` on by `dt`.
+    /// Returns the torque against the motion at speed `v`, and moves the bristles `z` by `dt`.
     fn step(&self, z: &mut f64, v: f64, dt: f64) -> f64 {
         if self.stiffness == 0.0 {
             return self.viscous * v;
@@ -76,7 +76,7 @@ impl LuGre {
         let x = v / self.stribeck;
         let level = self.coulomb + (self.stiction - self.coulomb) * (-x * x).exp();
         let rate = self.stiffness * v.abs() / level;
-        // Implicit in z, which is stiff at high speed.
+        // The step is implicit in z, which is stiff at high speed.
         let next = (*z + v * dt) / (1.0 + rate * dt);
         let slope = (next - *z) / dt;
         *z = next;
@@ -84,9 +84,10 @@ impl LuGre {
     }
 }
 
-/// Elastic gears: each is a spring and a damper between its motor and its link. The motors' angles and speeds are those of the output side.
+/// Elastic gears. Each is a spring and a damper between its motor and its link. The motors' angles and speeds are converted to the output
+/// side.
 struct Gears {
-    /// N·m/rad.
+    /// Stiffness, N·m/rad.
     stiffness: f64,
     /// Angles of the motors, rad.
     q: [f64; 6],
@@ -95,7 +96,7 @@ struct Gears {
 }
 
 impl Gears {
-    /// Torque of gear `j` on its link, N·m.
+    /// Returns the torque of gear `j` on its link, N·m.
     fn torque(&self, j: usize, q: f64, v: f64) -> f64 {
         self.stiffness * (self.q[j] - q + GEAR_DAMPING * (self.v[j] - v))
     }
@@ -125,7 +126,7 @@ pub const POSES: [[f64; 6]; 4] = [
     [1.0, 0.3, 1.6, 0.2, -0.8, 0.0],
 ];
 
-/// The share of its torque limit, of the default arm.
+/// Returns the shares of the torque limits of the default arm.
 pub fn shares(torque: &[f64; 6]) -> [f64; 6] {
     shares_of(torque, &Config::avena())
 }
@@ -135,22 +136,22 @@ pub fn shares_of(torque: &[f64; 6], config: &Config) -> [f64; 6] {
     core::array::from_fn(|j| torque[j].abs() / config.joints[j].torque_max)
 }
 
-/// The highest of all joints.
+/// Returns the highest share of all joints.
 pub fn highest(shares: &[f64; 6]) -> f64 {
     shares.iter().fold(0.0, |most, share| share.max(most))
 }
 
-/// [`ArmFile::pose`] of the default arm.
+/// Like [`ArmFile::pose`], for the default arm.
 pub fn pose(random: &mut Random, mass: f64, most: f64) -> ([f64; 6], [f64; 6]) {
     ArmFile::avena().pose(random, mass, most)
 }
 
-/// Torque that `model` needs to hold `q`, N·m.
+/// Returns the torque that `model` needs to hold `q`, N·m.
 pub fn standing(model: &ArmModel, q: &[f64; 6]) -> [f64; 6] {
     Dynamics::new(model, Config::avena().gravity).gravity_torque(q)
 }
 
-/// The true arm.
+/// The simulated arm.
 pub struct Plant {
     dynamics: Dynamics,
     pub rotor: [f64; 6],
@@ -160,13 +161,13 @@ pub struct Plant {
     gears: Option<Gears>,
     pub q: [f64; 6],
     pub v: [f64; 6],
-    /// Torque of a hand or a collision, N·m.
+    /// External torque, of a hand or a collision, N·m.
     pub push: [f64; 6],
-    /// Speeds of the motors in the last ten milliseconds, rad/s.
+    /// Speeds of the motors in the last 10 ms, rad/s.
     pub speeds: [[f64; 10]; 6],
     /// Joints that a brake holds while their drive is not enabled.
     pub brakes: bool,
-    /// Factor between the true speed and the speed that the drives report.
+    /// Factor between the true speed and the reported speed.
     pub speed_scale: f64,
     ticks: usize,
 }
@@ -221,7 +222,7 @@ impl Plant {
     }
 
     /// Returns this arm with elastic gears of `stiffness` N·m/rad, twisted by its load. The drives measure the position of the link and the
-    /// speed of the motor; rotors and friction are on the motors' side.
+    /// speed of the motor. Rotors and friction are on the motor side.
     pub fn elastic(mut self, stiffness: f64) -> Self {
         let load = self.dynamics.gravity_torque(&self.q);
         let q = core::array::from_fn(|j| self.q[j] + load[j] / stiffness);
@@ -240,15 +241,15 @@ impl Plant {
         rig
     }
 
-    /// Advances both by one millisecond. The controller measures the state of the tick before, which does not depend on
-    /// that tick's torque.
+    /// Advances arm and rig by one millisecond. The controller measures the state of the previous tick, which does not depend on the torque
+    /// of this tick.
     pub fn tick(&mut self, rig: &mut Rig) {
         rig.tick();
         self.step(rig);
         self.report(rig);
     }
 
-    /// Like [`Self::tick`], but the drives of the rig answer that they are at `seen` (rad).
+    /// Like [`Self::tick`], but the drives of the rig report the positions `seen` (rad).
     pub fn tick_seen_at(&mut self, rig: &mut Rig, seen: &[f64; 6]) {
         self.report(rig);
         for (node, q) in rig.nodes.iter_mut().zip(seen) {
@@ -310,8 +311,8 @@ impl Plant {
         self.ticks += 1;
     }
 
-    /// Returns the torque of joint `j` on its link, N·m, if its drive gives `drive`: the drive torque minus friction,
-    /// or the torque of an elastic gear. With an elastic gear, also advances its motor by a step.
+    /// Returns the torque of joint `j` on its link, N·m, if its drive gives `drive`: the drive torque minus friction, or the torque of an
+    /// elastic gear. Also advances the motor of an elastic gear by one step.
     fn joint_torque(&mut self, j: usize, drive: f64, braked: bool) -> f64 {
         let speed = *self.motor_speed(j);
         let friction = self.friction[j].step(&mut self.bristles[j], speed, DT);
@@ -349,7 +350,7 @@ fn read(q: f64) -> f64 {
     (q / ENCODER_STEP).floor() * ENCODER_STEP
 }
 
-/// Inverse of a symmetric positive definite matrix, by Gauss and Jordan.
+/// Returns the inverse of a symmetric positive definite matrix (Gauss-Jordan).
 fn inverted(mut a: [[f64; 6]; 6]) -> [[f64; 6]; 6] {
     let mut b = [[0.0; 6]; 6];
     for (k, row) in b.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! A bench without physics: nodes that answer at once, and joints at the positions that the test sets.
+//! A rig without physics: the nodes answer at once, and the joints are at the positions that the test sets.
 
 use jtc_bus::{Answer, Frame, GripperReport, JointReport, NodeState, Request, Scale, Target};
 use jtc_core::recorder::{Block, Recorder};
@@ -27,19 +27,19 @@ pub struct Rig {
     pub pump: bool,
     pub torque: [f64; 6],
     pub safety_input: bool,
-    /// Ticks that are missing before the next one.
+    /// Number of missed ticks before the next one.
     pub missed_ticks: u16,
     pub acknowledged: bool,
     pub bus_off: bool,
-    /// Positions follow the commanded ones.
+    /// The joints follow the commanded positions.
     pub follow: bool,
     /// Joints that do not follow the commanded positions.
     pub apart: [bool; 6],
-    /// Frames sent by the controller, by tick.
+    /// Frames that the controller has sent, one per tick.
     pub sent: Vec<Request>,
     pub statuses: Vec<Status>,
     pub last: Outputs,
-    /// Frames that reach the controller instead of those of the nodes, in the next tick.
+    /// Frames that the controller receives in the next tick instead of the frames of the nodes.
     pub inject: Vec<Frame>,
     answers: Vec<Frame>,
     /// The serial line can take a status.
@@ -47,13 +47,13 @@ pub struct Rig {
     /// Stop and Pause that arrive before the next tick.
     urgent: [UrgentCommands; HOST_LINES],
     host: std::collections::VecDeque<Sent>,
-    /// The flight recorder, in sessions that have one.
+    /// The flight recorder, if the test has one.
     pub recorder: Option<Recorder<Vec<Block>, 2>>,
-    /// `true` if the next frames of hosts come on plain lines (J-51).
+    /// The next frames of hosts come on plain lines (J-51).
     pub plain: bool,
 }
 
-/// Frame that a host has sent and that is not done yet.
+/// Frame that a host has sent and that the controller has not finished yet.
 struct Sent {
     line: usize,
     overtaken: bool,
@@ -79,13 +79,12 @@ impl Sent {
 }
 
 impl Rig {
-    /// Creates a bench whose joints have no speed unless a test sets one: speeds are not compared with positions
-    /// (J-35).
+    /// Creates a rig whose joints have no speed unless a test sets one. Speeds are not compared with positions (J-35).
     pub fn new(config: Config) -> Self {
         Self::with_speeds(Config { drive_speed_window_ms: 0, ..config })
     }
 
-    /// Creates a bench for joints whose speeds fit their positions.
+    /// Creates a rig for joints whose speeds agree with their positions.
     pub fn with_speeds(config: Config) -> Self {
         let last = Outputs {
             bus: None,
@@ -145,7 +144,7 @@ impl Rig {
         rig
     }
 
-    /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive takes long.
+    /// Returns a rig in HoldPos whose joint 3 is not enabled yet, because its drive takes long to enable.
     pub fn with_a_slow_drive(config: Config) -> Self {
         let mut rig = Self::new(config);
         rig.nodes[2].slow_enable = true;
@@ -173,7 +172,7 @@ impl Rig {
         self.controller.telemetry().errors
     }
 
-    /// Returns the current status as the host would see it.
+    /// Returns the current status as a host would receive it.
     pub fn status(&mut self) -> Status {
         let before = self.statuses.len();
         while self.statuses.len() == before {
@@ -205,7 +204,7 @@ impl Rig {
         });
     }
 
-    /// Adds a Stop or Pause that arrives on a line: it acts in the next tick, and its frame waits after the others.
+    /// Adds a Stop or Pause that arrives on a line. It takes effect in the next tick, and its frame waits after the others.
     pub fn urgent(&mut self, line: usize, command: UrgentCommand) {
         self.urgent[line].push(command);
         self.send_on(line, FrameType::TrajSetExecStatus, &[ExecCommand::from(command) as u8]);
@@ -287,7 +286,7 @@ impl Rig {
         }
     }
 
-    /// Runs until `done`, at most `ticks`; returns the ticks it took.
+    /// Runs until `done`, at most `ticks`. Returns the number of ticks.
     pub fn until(&mut self, ticks: usize, mut done: impl FnMut(&Self) -> bool) -> usize {
         for t in 0..ticks {
             if done(self) {
@@ -298,7 +297,7 @@ impl Rig {
         panic!("not within {ticks} ticks: {:?}", self.controller.telemetry());
     }
 
-    /// Drops answers of a node that the controller has not seen yet.
+    /// Drops the answers of a node that the controller has not received yet.
     pub fn drop_answers(&mut self, node: usize) {
         self.answers.retain(|frame| usize::from(frame.id & 0x0F) != node);
     }

@@ -1,25 +1,25 @@
 //! A node without physics.
 use jtc_bus::{JointReport, NodeState};
 
-/// A node with its state machine, as seen on the bus.
+/// A node with its state machine, as it behaves on the bus.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     pub report: JointReport,
-    /// Does not answer.
+    /// The node does not answer.
     pub silent: bool,
-    /// Added to the position that it reports, rad.
+    /// Error of the reported position, rad.
     pub glitch: f64,
-    /// Takes its configuration in Init only.
+    /// The node accepts its configuration only in Init.
     pub refuses_when_ready: bool,
-    /// Does not leave ReadyToOperate.
+    /// The node does not leave ReadyToOperate.
     pub stays_ready: bool,
-    /// Does not leave OperationEnable.
+    /// The node does not leave OperationEnable.
     pub stays_enabled: bool,
-    /// Refuses to be enabled: stays in the transition.
+    /// The node does not become enabled: it stays in the transition.
     pub slow_enable: bool,
     pub configured: bool,
     pub resets: u32,
-    /// Ticks until it answers again after a reset.
+    /// Ticks until the node answers again after a reset.
     pub booting: u32,
 }
 

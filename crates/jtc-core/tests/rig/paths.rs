@@ -1,10 +1,10 @@
-//! Trajectories, and moves to a point on them.
+//! Trajectories, and motions to a point on them.
 use jtc_core::TrajectoryState;
 use jtc_wire::{DataStatus, ExecCommand, FrameType, RawPoint};
 
 use super::{Rig, segment_body};
 
-/// A motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
+/// Returns a motion of a joint (0..5) in pieces of constant acceleration (rad/s², number of points 10 ms apart).
 pub fn pieces(joint: usize, list: &[(f64, u32)]) -> Vec<RawPoint> {
     let (mut p, mut v) = (0.0f64, 0.0f64);
     let mut points = vec![RawPoint::default()];
@@ -33,7 +33,7 @@ pub fn put(point: &mut RawPoint, joint: usize, q: f64, v: f64, a: f64) {
     point.acceleration[joint] = raw(a, 12.566370);
 }
 
-/// Returns the integer of a value; `scale` is the value of the largest integer.
+/// Returns a value as an integer of the wire format. `scale` is the value of the largest integer.
 pub fn raw(value: f64, scale: f64) -> i16 {
     (value / scale * 32767.0).round() as i16
 }
@@ -65,7 +65,7 @@ impl Rig {
         assert_eq!(self.exec(ExecCommand::Execute), DataStatus::NoError);
     }
 
-    /// Uploads points 10 ms apart, executes them, and runs until `point` ms of the path are done.
+    /// Uploads points 10 ms apart, executes them, and runs until path time is at `point` ms.
     pub fn move_along(&mut self, points: &[RawPoint], point: u32) {
         self.execute(points);
         self.until(4_000, |rig| rig.controller.telemetry().point >= point);

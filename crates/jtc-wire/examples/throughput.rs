@@ -1,4 +1,5 @@
-//! Throughput of the CRC and of the stream parser, one JSON object: `cargo run --profile dist -p jtc-wire --example throughput`.
+//! Prints the throughput of the CRC and of the stream parser as one JSON object: `cargo run --profile dist -p jtc-wire --example
+//! throughput`.
 use std::hint::black_box;
 
 use crc::{CRC_16_XMODEM, Crc, Table};
@@ -8,8 +9,8 @@ use test_kit::clock::CpuTime;
 static ONE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_XMODEM);
 static SIXTEEN: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_XMODEM);
 
-/// GB/s in the fastest of many short rounds of `bytes` bytes each: other programs can only slow one down. All contenders
-/// take turns, so that a slow moment hits each.
+/// Returns GB/s in the fastest of many short rounds of `bytes` bytes each, because other programs can only slow a round down. All
+/// contenders take turns, so that a slow moment affects each of them.
 fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
     const ROUNDS: usize = 301;
     let mut best = vec![f64::INFINITY; contenders.len()];
@@ -24,7 +25,7 @@ fn measure(bytes: usize, contenders: &mut [&mut dyn FnMut()]) -> Vec<f64> {
 }
 
 fn main() {
-    // Short enough to fit between two of the scheduler's decisions.
+    // A round is short enough to fit between two decisions of the scheduler.
     const REPEATS: usize = 10;
     let mut frame = vec![0; FRAME_MAX];
     let point = |i: usize| RawPoint { position: [i as i16; 6], velocity: [-1; 6], acceleration: [77; 6] };

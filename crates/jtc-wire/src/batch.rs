@@ -1,5 +1,5 @@
-//! Events that the parsers of all lines have found, copied in order for the controller. The parsers can take more bytes while the
-//! controller works.
+//! Events that the parsers of all lines have found, copied in order for the controller. While the controller works, the parsers can take
+//! more bytes.
 use crate::frame::{FRAME_MAX, FrameRef, FrameType};
 use crate::response::{DataStatus, FrameStatus, Response};
 use crate::stream::LinkEvent;
@@ -7,14 +7,14 @@ use crate::stream::LinkEvent;
 /// Maximum number of events in a batch, and of events that a controller executes in one tick.
 pub const EVENTS_MAX: usize = 16;
 
-/// An event with its line and its position.
+/// An event with its line and its position in the stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReceivedEvent<'a> {
     /// Number of its line.
     pub line: usize,
-    /// Position in the stream of that line at which it began.
+    /// Position of the first byte of the event in the stream of that line.
     pub position: u64,
-    /// Set if a frame came on a plain line, which had no extension request in the 2 s before the frame's first byte (J-51).
+    /// Set if a frame came on a plain line: there was no extension request in the 2 s before the first byte of the frame (J-51).
     pub plain: bool,
     /// The received event.
     pub event: LinkEvent<'a>,
@@ -22,10 +22,10 @@ pub struct ReceivedEvent<'a> {
 
 /// Events in the order of execution. All fields are integers, so that all zeros are an empty batch.
 pub struct EventBatch {
-    /// Number of events stored, and number of those that are done.
+    /// Number of stored events, and number of those that are done.
     len: u16,
     done: u16,
-    /// Bytes used.
+    /// Number of used bytes.
     used: u16,
     entries: [Entry; EVENTS_MAX],
     bytes: [u8; FRAME_MAX],
@@ -34,7 +34,7 @@ pub struct EventBatch {
 #[derive(Clone, Copy)]
 struct Entry {
     position: u64,
-    /// Bytes of a frame.
+    /// Position of the bytes of a frame.
     start: u16,
     length: u16,
     line: u8,
@@ -64,7 +64,7 @@ impl EventBatch {
             LinkEvent::Frame(frame) => {
                 let Some(place) = self.bytes.get_mut(start..start + frame.bytes.len()) else { return false };
                 place.copy_from_slice(frame.bytes);
-                // At most FRAME_MAX.
+                // A frame has at most FRAME_MAX bytes, so this fits.
                 self.used += frame.bytes.len() as u16;
                 (FRAME, frame.frame_type as u8, FrameStatus::NoError, frame.bytes.len() as u16)
             }
@@ -85,7 +85,7 @@ impl EventBatch {
         true
     }
 
-    /// Returns the `n`-th of the events that are not done.
+    /// Returns the event with index `n` among those that are not done.
     pub fn get(&self, n: usize) -> Option<ReceivedEvent<'_>> {
         let n = usize::from(self.done).checked_add(n)?;
         let entry = self.entries.get(..usize::from(self.len))?.get(n)?;

@@ -1,4 +1,4 @@
-//! Bits of the controller's words in JtcStatus: each word is one table of bit, name, text and meaning.
+//! Bits of the controller's words in JtcStatus. Each word is a table with bit, name, text and meaning.
 use jtc_bus::bit_words;
 
 bit_words! {

@@ -1,9 +1,9 @@
-//! Bytes that stand for one of a closed list: states, kinds.
+//! Bytes that are codes from a fixed list, such as states and kinds.
 use core::fmt;
 use core::marker::PhantomData;
 
-/// Declares a closed list of codes: an enum, the list of its variants, the conversion from a byte, and the names. A variant without a text
-/// is named by its identifier.
+/// Declares a list of codes: an enum, the list of its variants, the conversion from a byte, and the names. A variant without a text has its
+/// identifier as name.
 macro_rules! codes {
     (@text $name:ident $text:literal) => { $text };
     (@text $name:ident) => { stringify!($name) };
@@ -16,10 +16,10 @@ macro_rules! codes {
         }
 
         impl $list {
-            /// Every one, in the order of the numbers.
+            /// All codes, in the order of their numbers.
             pub const ALL: [Self; [$($code),+].len()] = [$(Self::$name),+];
 
-            /// The one of number `byte`.
+            /// Returns the code of number `byte`.
             pub const fn from_byte(byte: u8) -> Option<Self> {
                 match byte {
                     $($code => Some(Self::$name),)+
@@ -27,7 +27,7 @@ macro_rules! codes {
                 }
             }
 
-            /// In words.
+            /// Returns the name of the code.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => $crate::code::codes!(@text $name $($text)?),)+
@@ -44,23 +44,23 @@ macro_rules! codes {
 }
 pub(crate) use codes;
 
-/// A closed list of codes with their names.
+/// A fixed list of codes with their names.
 pub trait Known: Copy + Eq + fmt::Debug + 'static {
     /// All codes of the list, in the order of their numbers.
     const ALL: &'static [Self];
     /// Name of a code that is not in the list.
     const UNKNOWN: &'static str;
 
-    /// The byte on the wire.
+    /// Returns the byte in the wire format.
     fn code(self) -> u8;
 
-    /// Name, as every program prints it.
+    /// Returns the name, which is the same in every program.
     fn name(self) -> &'static str;
 }
 
-/// A received code: one of `T`, or one that this version does not know.
+/// A received code: a variant of `T`, or a code that this version does not know.
 ///
-/// A code is compared with variants of `T`, never with a number.
+/// Compare a code with variants of `T`, never with a number.
 ///
 /// ```
 /// use jtc_wire::{Code, ControllerState};
@@ -77,12 +77,12 @@ pub struct Code<T> {
 }
 
 impl<T: Known> Code<T> {
-    /// The code of a received byte.
+    /// Creates the code of a received byte.
     pub const fn new(byte: u8) -> Self {
         Self { byte, list: PhantomData }
     }
 
-    /// The byte on the wire.
+    /// Returns the byte in the wire format.
     pub const fn byte(self) -> u8 {
         self.byte
     }
@@ -97,7 +97,7 @@ impl<T: Known> Code<T> {
         wanted.iter().any(|&wanted| self == wanted)
     }
 
-    /// Name, as every program prints it.
+    /// Returns the name, which is the same in every program.
     pub fn name(self) -> &'static str {
         self.known().map_or(T::UNKNOWN, T::name)
     }

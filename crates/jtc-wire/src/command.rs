@@ -1,4 +1,4 @@
-//! The commands of the host: the meaning of each frame type.
+//! The commands of the host: the meaning of the frame of each type.
 use crate::code::codes;
 use crate::extension::{Name, Values};
 use crate::frame::{FrameRef, FrameType};
@@ -24,7 +24,7 @@ impl<'a> Floats<'a> {
     pub fn new(bytes: &'a [u8]) -> Self {
         Self(&bytes[..bytes.len() & !3])
     }
-    /// Returns all floats in order.
+    /// Returns all floats, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
         self.0.as_chunks::<4>().0.iter().map(|bytes| f32::from_be_bytes(*bytes))
     }
@@ -52,10 +52,10 @@ impl Floats<'_> {
 /// Bits of the nodes 0..6.
 pub const ALL_NODES: u8 = 0x7F;
 
-/// A command's meaning, borrowed from the frame. Lengths are right; numbers in `Floats` are not yet checked.
+/// Meaning of a command, borrowed from the frame. The lengths are valid; the numbers in `Floats` are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
-    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old 6-byte form clears everything.
+    /// Bit 0 of `jtc`; `nodes`: bits 0..6. The old frame of 6 bytes clears all errors.
     ClearCurrentErrors {
         /// Clear the controller's own errors.
         jtc: bool,
@@ -78,24 +78,24 @@ pub enum Command<'a> {
     ArmModel(Floats<'a>),
     /// Use the default model.
     ArmModelUseDefault,
-    /// Trajectory execution.
+    /// Command for the execution of the trajectory.
     TrajSetExecStatus(ExecCommand),
-    /// Teaching on.
+    /// Switch teaching on.
     TeachingModeEnable,
-    /// Teaching off.
+    /// Switch teaching off.
     TeachingModeDisable,
     /// 6 × 4 or 6 × 6 coefficients, highest index first.
     FrictionPolynomial(Floats<'a>),
     /// Use the default polynomial (also type 0x0E with 6 bytes).
     FrictionPolynomialUseDefault,
-    /// Mask of nodes.
+    /// Reset nodes.
     ResetCanDevices {
-        /// Bits 0..6.
+        /// Mask of the nodes, bits 0..6.
         nodes: u8,
     },
-    /// Pump.
+    /// Switch the pump.
     GripperControl {
-        /// On.
+        /// `true`: on.
         pump: bool,
     },
     /// Request for the identity of the device and of its firmware (J-52).
@@ -114,11 +114,11 @@ pub enum Command<'a> {
         /// First requested byte of the image.
         offset: u16,
     },
-    /// Store the arm in use, so that it survives a loss of power (J-54).
+    /// Store the arm in use, so that it is kept without power (J-54).
     StoreArm,
-    /// Torque off, back to Init (J-53).
+    /// Switch the torque off and return to Init (J-53).
     Disable,
-    /// Joint velocities, rad/s (J-58).
+    /// Jog with these joint velocities, rad/s (J-58).
     Jog(Floats<'a>),
     /// A page of the flight recorder's log (J-56).
     GetLog {
@@ -155,9 +155,9 @@ pub mod field {
 }
 
 impl<'a> Command<'a> {
-    /// Parses a frame on the device. Returns `IncorrectValue` for a command or pump byte that is not listed, and `NotAllowed` for a frame
-    /// that only a device sends, such as JtcStatus. A body that is too short for its type is `IncorrectValue`; [`crate::Receiver`] never
-    /// returns such a frame.
+    /// Parses a frame on the device. Returns `IncorrectValue` for an unknown command, for an invalid pump byte, and for a body that is too
+    /// short for its type; [`crate::Receiver`] never returns such a body. Returns `NotAllowed` for a frame that only a device sends, such
+    /// as JtcStatus.
     pub fn parse(frame: FrameRef<'a>) -> Result<Self, DataStatus> {
         let body = frame.body();
         let byte = |i: usize| body.get(i).copied().ok_or(DataStatus::IncorrectValue);
@@ -221,13 +221,13 @@ impl<'a> Command<'a> {
             }
             FrameType::ClearLog => Self::ClearLog,
             FrameType::GetPoints => Self::GetPoints { first: from()? },
-            // Frames that a device sends: JtcStatus and the answers. Without this arm, the numbers between the types, which no type has,
-            // would lead into a trap.
+            // Frames that a device sends: JtcStatus and the answers. Without this arm, the compiler would insert a trap for the unused
+            // numbers between the types.
             _ => return Err(DataStatus::NotAllowed),
         })
     }
 
-    /// Returns the type of its frame.
+    /// Returns the type of the command's frame.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::ClearCurrentErrors { .. } => FrameType::ClearCurrentErrors,

@@ -1,7 +1,7 @@
-//! CRC-16/XMODEM: over whole slices, incrementally, and the arithmetic that checks a frame inside a longer stream.
+//! CRC-16/XMODEM of whole slices and of pieces, and the arithmetic that checks a frame inside a longer stream.
 use crc::{CRC_16_XMODEM, Crc, Table};
 
-// A microcontroller gets one table of 512 bytes, a PC sixteen of them: eight to ten times as fast.
+// A microcontroller uses one table of 512 bytes. A PC uses sixteen, which is eight to ten times as fast.
 #[cfg(target_pointer_width = "64")]
 type Tables = Table<16>;
 #[cfg(not(target_pointer_width = "64"))]
@@ -18,7 +18,7 @@ pub fn crc16(bytes: &[u8]) -> u16 {
     CRC.checksum(bytes)
 }
 
-/// The register after `bytes` when it was `register` before them: `crc16` in pieces.
+/// Returns the register after `bytes` if it was `register` before them. This computes `crc16` in pieces.
 ///
 /// ```
 /// use jtc_wire::{crc16, crc16_update};
@@ -33,7 +33,7 @@ pub fn crc16_update(register: u16, bytes: &[u8]) -> u16 {
 /// The polynomial without its highest term.
 const POLYNOMIAL: u16 = 0x1021;
 
-/// The register after one zero byte; also the bit-by-bit definition that constants are made with.
+/// Returns the register after one zero byte. This is also the bit-by-bit definition from which constants are computed.
 const fn zero_byte(mut register: u16) -> u16 {
     let mut bit = 0;
     while bit < 8 {
@@ -43,7 +43,7 @@ const fn zero_byte(mut register: u16) -> u16 {
     register
 }
 
-/// `crc16` for constants.
+/// Like `crc16`, for constants.
 pub(crate) const fn crc16_const(bytes: &[u8]) -> u16 {
     let mut register = 0;
     let mut i = 0;
@@ -54,7 +54,7 @@ pub(crate) const fn crc16_const(bytes: &[u8]) -> u16 {
     register
 }
 
-/// Product of two polynomials modulo the CRC's.
+/// Returns the product of two polynomials modulo the polynomial of the CRC.
 const fn multiply(a: u16, b: u16) -> u16 {
     let mut product = 0;
     let mut bit = 16;
@@ -62,7 +62,7 @@ const fn multiply(a: u16, b: u16) -> u16 {
         bit -= 1;
         let carry = product & 0x8000 != 0;
         product <<= 1;
-        // Masks instead of branches: the time does not depend on the data.
+        // Masks are used instead of branches, so that the time does not depend on the data.
         product ^= POLYNOMIAL & 0u16.wrapping_sub(carry as u16);
         product ^= a & 0u16.wrapping_sub(b >> bit & 1);
     }
@@ -89,10 +89,10 @@ const fn powers(step: usize) -> [u16; 256] {
 static LOW: [u16; 256] = powers(1);
 static HIGH: [u16; 256] = powers(256);
 
-/// The register after `count` zero bytes, in constant time. `count` below 65,536.
+/// Returns the register after `count` zero bytes, in constant time. `count` is below 65,536.
 ///
-/// The CRC is linear: with `a` and `b` the registers at two places of a stream, `count` bytes apart, the CRC of the bytes
-/// between them is `b ^ advance(a, count)`. So any frame in a stream is checked from two registers.
+/// The CRC is linear. If `a` and `b` are the registers at two positions of a stream, `count` bytes apart, the CRC of the bytes between them
+/// is `b ^ advance(a, count)`. So any frame in a stream can be checked with two registers.
 pub(crate) fn advance(register: u16, count: usize) -> u16 {
     let power = multiply(LOW[count & 0xFF], HIGH[count >> 8 & 0xFF]);
     multiply(register, power)

@@ -1,4 +1,4 @@
-//! Frames in words: a line each, like a network sniffer's; `{:#}` adds every number.
+//! Text of a frame: one line, as in a network sniffer. `{:#}` adds all numbers.
 use core::fmt::{Display, Formatter, Result};
 
 use crate::command::{Command, Floats};
@@ -9,7 +9,7 @@ use crate::segment::Segment;
 use crate::status::Status;
 use crate::words::{self, Bits};
 
-/// Any bytes in words: a frame of either direction, or the fault of the bytes.
+/// Text of any bytes: a frame of either direction, or the fault of the bytes.
 ///
 /// ```
 /// use jtc_wire::Described;
@@ -68,7 +68,7 @@ impl Display for FrameRef<'_> {
         match Command::parse(*self) {
             Ok(command) => {
                 command.fmt(f)?;
-                // Two frames have this meaning, only one of them is the right one.
+                // Two frames have this meaning, but only one of them is the correct one.
                 if self.frame_type != command.frame_type() {
                     write!(f, " (sent as an empty {})", self.frame_type)?;
                 }
@@ -202,7 +202,7 @@ impl Display for Status {
     }
 }
 
-/// Words of set bits, only of those words that have any.
+/// Names of the set bits, only for words in which any bit is set.
 struct Lists<'a, 'b> {
     f: &'a mut Formatter<'b>,
 }
@@ -245,13 +245,13 @@ impl Display for crate::GripperStatus {
 /// A part of a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece<'a> {
-    /// A good frame of either direction.
+    /// A valid frame of either direction.
     Frame(FrameRef<'a>),
-    /// Bytes between good frames: bad frames, noise, a frame that the capture cuts off.
+    /// Bytes between valid frames: damaged frames, noise, or a frame that is cut off at the end of the capture.
     Other(&'a [u8]),
 }
 
-/// Returns the frames of a whole capture and the bytes between them, in order. Gaps in time are not known, so they end no frame.
+/// Returns the frames of a whole capture and the bytes between them, in order. The times are not known, so gaps do not end a frame.
 ///
 /// ```
 /// use jtc_wire::{Piece, fixed, pieces};
@@ -287,7 +287,7 @@ impl<'a> Iterator for Pieces<'a> {
     }
 }
 
-/// The good frame at the front of `bytes`.
+/// Returns the valid frame at the front of `bytes`.
 fn frame_at(bytes: &[u8]) -> Option<FrameRef<'_>> {
     let &[_, _, high, low] = bytes.first_chunk()?;
     let n = usize::from(u16::from_be_bytes([high, low]));

@@ -1,5 +1,4 @@
-//! Encoders of the host's frames, which write every command into the caller's buffer. Numbers are checked and scaled, never wrapped or
-//! clipped.
+//! Encoders that write the host's frames into the caller's buffer. Numbers are checked and scaled; they never wrap and are never clipped.
 use core::fmt;
 
 use crate::command::{Command, Floats};
@@ -17,16 +16,16 @@ use crate::segment::{
 /// A quantity that a trajectory point has for each joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Channel {
-    /// rad.
+    /// Position, rad.
     Position,
-    /// rad/s.
+    /// Velocity, rad/s.
     Velocity,
-    /// rad/s².
+    /// Acceleration, rad/s².
     Acceleration,
 }
 
 impl Channel {
-    /// Full scale: the largest magnitude that the wire carries.
+    /// Returns the full scale: the largest magnitude that the wire format can represent.
     pub const fn scale(self) -> f64 {
         match self {
             Self::Position => POSITION_SCALE,
@@ -34,7 +33,7 @@ impl Channel {
             Self::Acceleration => ACCELERATION_SCALE,
         }
     }
-    /// In words.
+    /// Returns the name of the quantity.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Position => "position",
@@ -42,7 +41,7 @@ impl Channel {
             Self::Acceleration => "acceleration",
         }
     }
-    /// Unit of `scale`.
+    /// Returns the unit of `scale`.
     pub const fn unit(self) -> &'static str {
         match self {
             Self::Position => "rad",
@@ -59,9 +58,9 @@ pub struct OutOfScale {
     pub joint: usize,
     /// Quantity of the number.
     pub channel: Channel,
-    /// The number: too large in magnitude, infinite, or not a number.
+    /// The number: outside the scale, infinite, or NaN.
     pub value: f64,
-    /// Largest magnitude that the wire carries.
+    /// Largest magnitude that the wire format can represent.
     pub limit: f64,
 }
 
@@ -80,7 +79,8 @@ impl fmt::Display for OutOfScale {
 impl core::error::Error for OutOfScale {}
 
 impl RawPoint {
-    /// Returns the nearest point that the wire carries, from rad, rad/s and rad/s². A number outside the scale or a NaN is an error.
+    /// Returns the nearest point that the wire format can represent, from rad, rad/s and rad/s². Returns an error for a number outside the
+    /// scale or a NaN.
     pub fn from_si(
         position: &[f64; JOINTS],
         velocity: &[f64; JOINTS],
@@ -90,12 +90,12 @@ impl RawPoint {
             let limit = channel.scale();
             let mut raw = [0; JOINTS];
             for (joint, (to, &value)) in raw.iter_mut().zip(values).enumerate() {
-                // Not `value.abs() > limit`: that is false for NaN.
+                // `value.abs() > limit` would be false for NaN.
                 if !(-limit..=limit).contains(&value) {
                     return Err(OutOfScale { joint, channel, value, limit });
                 }
                 let exact = value * RAW_FULL_SCALE / limit;
-                // The cast cuts off towards zero: with the half it rounds to the nearest.
+                // The cast truncates towards zero, so adding one half rounds to the nearest integer.
                 *to = (exact + 0.5f64.copysign(exact)) as i16;
             }
             Ok(raw)
@@ -108,35 +108,35 @@ impl RawPoint {
     }
 }
 
-/// Why a frame was not written.
+/// Reason why a frame was not written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EncodeError {
     /// The buffer is too short for the frame.
     BufferTooShort {
-        /// Bytes of the frame.
+        /// Length of the frame, bytes.
         needed: usize,
-        /// Bytes of the buffer.
+        /// Length of the buffer, bytes.
         given: usize,
     },
-    /// More points than a frame can have.
+    /// There are more points than a frame can have.
     TooManyPoints {
-        /// Number of points, at least.
+        /// Number of points. There may be more.
         points: usize,
         /// Maximum number of points in a frame.
         limit: usize,
     },
-    /// Frames of this type do not have that many floats.
+    /// A frame of this type has another number of floats.
     WrongCount {
         /// Type of the frame.
         frame_type: FrameType,
-        /// Number of floats, at least.
+        /// Number of floats. There may be more.
         count: usize,
     },
-    /// A float is infinite or not a number, or too large for an f32.
+    /// A float is infinite, NaN, or too large for an f32.
     NotFinite {
         /// Type of the frame.
         frame_type: FrameType,
-        /// Index of the float from 0, in the order of the wire.
+        /// Index of the float from 0, in the order of the wire format.
         index: usize,
         /// Its value.
         value: f64,
@@ -162,13 +162,13 @@ impl fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Name of a float in a frame, from the frame's type and the float's index from 0 in the order of the wire. Displays as `PidParam joint 3
-/// Ki`, joints counted from 1.
+/// Name of a float in a frame, from the type of the frame and the index of the float, from 0 in the order of the wire format. It is
+/// displayed as `PidParam joint 3 Ki`, with joints counted from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FloatName(pub FrameType, pub usize);
 
 impl FloatName {
-    /// Names of the numbers of a link, in the order of the wire. The first six are also the names of an origin's numbers.
+    /// Names of the numbers of a link, in the order of the wire format. The first six are also the names of the numbers of an origin.
     pub const LINK: [&'static str; 13] =
         ["x", "y", "z", "roll", "pitch", "yaw", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz", "mass"];
 }
@@ -199,7 +199,7 @@ impl fmt::Display for FloatName {
     }
 }
 
-/// Writes header and length for `n` bytes, leaves the body to `body`, ends with the CRC.
+/// Writes the header and the length for `n` bytes, calls `body`, and writes the CRC.
 fn frame(
     out: &mut [u8],
     frame_type: FrameType,
@@ -217,7 +217,7 @@ fn frame(
     Ok(n)
 }
 
-/// Writes a Trajectory frame and returns its length. After an error the content of the buffer is meaningless.
+/// Writes a Trajectory frame and returns its length. After an error the content of the buffer is not valid.
 pub fn trajectory(
     out: &mut [u8],
     (number, segment, segments): (u16, u16, u16),
@@ -245,7 +245,8 @@ pub fn trajectory(
     })
 }
 
-/// Writes a frame of floats in the order of the wire (FrictionTable, PidParam, ArmModel, FrictionPolynomial or Jog) and returns its length.
+/// Writes a frame of floats in the order of the wire format (FrictionTable, PidParam, ArmModel, FrictionPolynomial or Jog) and returns its
+/// length.
 pub fn floats(
     out: &mut [u8],
     frame_type: FrameType,
@@ -272,12 +273,12 @@ fn check_count(frame_type: FrameType, count: usize) -> Result<(), EncodeError> {
     fits.then_some(()).ok_or(EncodeError::WrongCount { frame_type, count })
 }
 
-/// Writes a PidParam frame: per joint Kp, Ki, Kd, IntMin, IntMax (the last two in rad·s).
+/// Writes a PidParam frame: Kp, Ki, Kd, IntMin and IntMax of each joint (the last two in rad·s).
 pub fn pid_param(out: &mut [u8], gains: &[[f64; 5]; JOINTS]) -> Result<usize, EncodeError> {
     floats(out, FrameType::PidParam, gains.as_flattened().iter().copied())
 }
 
-/// Writes an ArmModel frame: joint origins (x, y, z in m, roll, pitch, yaw in rad), and links (origin likewise, Ixx Ixy Ixz Iyy Iyz
+/// Writes an ArmModel frame. It has the joint origins (x, y, z in m, roll, pitch, yaw in rad) and the links (an origin, Ixx Ixy Ixz Iyy Iyz
 /// Izz in kg·m², mass in kg).
 pub fn arm_model(
     out: &mut [u8],
@@ -288,8 +289,8 @@ pub fn arm_model(
     floats(out, FrameType::ArmModel, values.copied())
 }
 
-/// Writes a FrictionPolynomial frame. `coefficients` has 4 or 6 per joint in the order of their index, c0 first. The wire carries the
-/// highest first.
+/// Writes a FrictionPolynomial frame. `coefficients` has 4 or 6 coefficients per joint, c0 first. In the wire format the highest index is
+/// first.
 pub fn friction_polynomial<const N: usize>(
     out: &mut [u8],
     coefficients: &[[f64; N]; JOINTS],
@@ -302,11 +303,11 @@ pub fn friction_polynomial<const N: usize>(
 /// Friction of one joint by velocity and temperature.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionTable<'a> {
-    /// rad/s, strictly increasing.
+    /// Velocities, rad/s, strictly increasing.
     pub velocity: &'a [f32; 20],
-    /// °C, strictly increasing.
+    /// Temperatures, °C, strictly increasing.
     pub temperature: &'a [f32; 20],
-    /// N·m, a row per velocity.
+    /// Torques, N·m, one row per velocity.
     pub torque: &'a [[f32; 20]; 20],
 }
 

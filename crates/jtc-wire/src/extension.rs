@@ -20,26 +20,26 @@ pub use reactions::{Reactions, StopCause, StopKind};
 
 pub use info::{BootCause, INFO_LEN, INFO_WRITTEN, Info, Program, SIMULATOR, StoreState, capability};
 
-/// Version of the extensions that this crate speaks. Later ones only add.
+/// Version of the extensions that this crate implements. Later versions only add to it.
 pub const EXTENSION_VERSION: u8 = 1;
 /// Longest frame that answers an extension request (J-56).
 pub const ANSWER_MAX: usize = 256;
 /// Bytes of a [`SettingValue`].
 pub const VALUE_LEN: usize = 10;
-/// Most values in a SetSettings frame.
+/// Highest number of values in a SetSettings frame.
 pub const SET_VALUES_MAX: usize = 256;
-/// Bytes before the content of a Settings, Arm or Points frame: number of the first item or byte, and total number.
+/// Length of the head of a Settings, Arm or Points body: the number of the first item or byte, and the total number.
 pub const PAGE_HEAD_LEN: usize = 4;
-/// Most values in a Settings frame.
+/// Highest number of values in a Settings frame.
 pub const PAGE_VALUES: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / VALUE_LEN;
-/// Most bytes of the arm image in an Arm frame.
+/// Highest number of bytes of the arm image in an Arm frame.
 pub const PAGE_BYTES: usize = ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN;
-/// Most points in a Points frame.
+/// Highest number of points in a Points frame.
 pub const PAGE_POINTS: usize = (ANSWER_MAX - FRAME_MIN - PAGE_HEAD_LEN) / POINT_LEN;
 /// Bytes of a [`Name`].
 pub const NAME_LEN: usize = 32;
 
-/// The name of an arm: UTF-8 without control characters, filled up with zeros.
+/// Name of an arm: UTF-8 without control characters, padded with zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Name([u8; NAME_LEN]);
 
@@ -51,7 +51,7 @@ impl Name {
         (!text.chars().any(char::is_control)).then_some(Self(bytes))
     }
 
-    /// Returns as many whole characters of `text` as fit, without its control characters.
+    /// Returns as many whole characters of `text` as fit, without control characters.
     pub fn cut(text: &str) -> Self {
         let (mut bytes, mut len) = ([0; NAME_LEN], 0);
         for c in text.chars().filter(|c| !c.is_control()) {
@@ -62,7 +62,7 @@ impl Name {
         Self(bytes)
     }
 
-    /// Parses a name from the wire. Returns `None` if it is not valid text, or if a byte that is not zero follows its end.
+    /// Parses a name from the wire format. Returns `None` if it is not valid text, or if a byte after its end is not zero.
     pub fn parse(bytes: &[u8]) -> Option<Self> {
         let bytes: [u8; NAME_LEN] = bytes.try_into().ok()?;
         let end = bytes.iter().position(|byte| *byte == 0).unwrap_or(NAME_LEN);
@@ -78,7 +78,7 @@ impl Name {
         self.0.get(..end).and_then(|text| core::str::from_utf8(text).ok()).unwrap_or_default()
     }
 
-    /// Returns the bytes on the wire.
+    /// Returns the bytes in the wire format.
     pub const fn as_bytes(&self) -> &[u8; NAME_LEN] {
         &self.0
     }
@@ -102,20 +102,20 @@ pub struct SettingValue {
 }
 
 impl SettingValue {
-    /// Returns the bytes on the wire: setting, joint, value.
+    /// Returns the bytes in the wire format: setting, joint, value.
     pub fn emit(&self) -> [u8; VALUE_LEN] {
         let [a, b, c, d, e, f, g, h] = self.value.to_be_bytes();
         [self.setting, self.joint, a, b, c, d, e, f, g, h]
     }
 
-    /// Parses a value from the wire.
+    /// Parses a value from the wire format.
     pub fn parse(bytes: &[u8; VALUE_LEN]) -> Self {
         let [setting, joint, value @ ..] = *bytes;
         Self { setting, joint, value: f64::from_be_bytes(value) }
     }
 }
 
-/// A list of [`SettingValue`]s as on the wire.
+/// A list of [`SettingValue`]s in the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Values<'a>(&'a [u8]);
 
@@ -160,9 +160,9 @@ impl fmt::Display for Values<'_> {
 /// A device's answer to an extension request, in addition to the response record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer<'a> {
-    /// To GetInfo.
+    /// Answer to GetInfo.
     Info(Info),
-    /// To GetSettings.
+    /// Answer to GetSettings.
     Settings {
         /// Number of values before the first of these.
         first: u16,
@@ -171,7 +171,7 @@ pub enum Answer<'a> {
         /// The values.
         values: Values<'a>,
     },
-    /// To GetArm: bytes of the arm image.
+    /// Answer to GetArm: bytes of the arm image.
     Arm {
         /// Position of the first of these bytes in the image.
         offset: u16,
@@ -180,9 +180,9 @@ pub enum Answer<'a> {
         /// The bytes.
         bytes: &'a [u8],
     },
-    /// To GetLog: bytes of the flight recorder's log.
+    /// Answer to GetLog: bytes of the flight recorder's log.
     Log(LogPage<'a>),
-    /// To GetPoints: points of the trajectory in memory.
+    /// Answer to GetPoints: points of the trajectory in memory.
     Points {
         /// Number of points before the first of these.
         first: u16,
@@ -193,7 +193,7 @@ pub enum Answer<'a> {
     },
 }
 
-/// Points of a trajectory as on the wire.
+/// Points of a trajectory in the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Points<'a>(&'a [u8]);
 
@@ -210,7 +210,7 @@ impl<'a> Points<'a> {
 }
 
 impl<'a> Answer<'a> {
-    /// Parses an answer. Returns `None` if the frame is of another type or its body is not valid.
+    /// Parses an answer. Returns `None` if the frame has another type or its body is not valid.
     pub fn parse(frame: FrameRef<'a>) -> Option<Self> {
         let body = frame.body();
         let page = || {
@@ -236,7 +236,7 @@ impl<'a> Answer<'a> {
         }
     }
 
-    /// Returns the type of its frame.
+    /// Returns the type of the answer's frame.
     pub const fn frame_type(&self) -> FrameType {
         match self {
             Self::Info(_) => FrameType::Info,
@@ -250,7 +250,7 @@ impl<'a> Answer<'a> {
     /// Writes the frame of the answer and returns its length.
     ///
     /// # Errors
-    /// [`EncodeError::BufferTooShort`], also for more than a frame of [`ANSWER_MAX`] bytes carries.
+    /// Returns [`EncodeError::BufferTooShort`] if `out` is too short, or if the content does not fit into a frame of [`ANSWER_MAX`] bytes.
     pub fn emit(&self, out: &mut [u8]) -> Result<usize, EncodeError> {
         let page = |from: u16, total: u16| {
             let ([a, b], [c, d]) = (from.to_be_bytes(), total.to_be_bytes());
@@ -270,7 +270,8 @@ impl<'a> Answer<'a> {
     }
 }
 
-/// Writes a frame whose body has two parts and returns its length. The board runs this function, so it uses no slice that could panic.
+/// Writes a frame whose body has two parts, and returns its length. The board runs this function, so it contains no slice operation that
+/// could panic.
 fn sealed(out: &mut [u8], frame_type: FrameType, first: &[u8], second: &[u8]) -> Result<usize, EncodeError> {
     let (n, given) = (FRAME_MIN + first.len() + second.len(), out.len().min(ANSWER_MAX));
     let short = EncodeError::BufferTooShort { needed: n, given };

@@ -1,4 +1,4 @@
-//! Frames of few bytes, as constants.
+//! Short frames as constants.
 use crate::command::ExecCommand;
 use crate::crc::crc16_const;
 use crate::extension::Name;
@@ -21,53 +21,53 @@ const fn sealed<const N: usize>(frame_type: FrameType, body: &[u8]) -> [u8; N] {
     bytes
 }
 
-/// A frame without body.
+/// Returns a frame without a body.
 pub const fn empty(frame_type: FrameType) -> [u8; 6] {
     sealed(frame_type, &[])
 }
 
-/// ClearCurrentErrors: the controller's own errors, and those of the nodes in `nodes` (bits 0..6).
+/// ClearCurrentErrors: clears the controller's own errors, and those of the nodes in `nodes` (bits 0..6).
 pub const fn clear_current_errors(jtc: bool, nodes: u8) -> [u8; 10] {
     sealed(FrameType::ClearCurrentErrors, &[jtc as u8, nodes])
 }
 
-/// TrajSetExecStatus.
+/// TrajSetExecStatus with this command.
 pub const fn exec(command: ExecCommand) -> [u8; 7] {
     sealed(FrameType::TrajSetExecStatus, &[command as u8])
 }
 
-/// ResetCanDevices: the nodes in `nodes` (bits 0..6).
+/// ResetCanDevices: resets the nodes in `nodes` (bits 0..6).
 pub const fn reset_can_devices(nodes: u8) -> [u8; 10] {
     sealed(FrameType::ResetCanDevices, &[nodes])
 }
 
-/// GripperControl.
+/// GripperControl: switches the pump.
 pub const fn gripper_control(pump: bool) -> [u8; 10] {
     sealed(FrameType::GripperControl, &[pump as u8])
 }
 
-/// GetSettings: what follows the first `first` values.
+/// GetSettings: requests the values from number `first` on.
 pub const fn get_settings(first: u16) -> [u8; 8] {
     sealed(FrameType::GetSettings, &first.to_be_bytes())
 }
 
-/// SetName.
+/// SetName: sets the name of the arm.
 pub const fn set_name(name: &Name) -> [u8; 38] {
     sealed(FrameType::SetName, name.as_bytes())
 }
 
-/// GetArm: the arm image from byte `offset` on.
+/// GetArm: requests the arm image from byte `offset` on.
 pub const fn get_arm(offset: u16) -> [u8; 8] {
     sealed(FrameType::GetArm, &offset.to_be_bytes())
 }
 
-/// GetLog: block `block` of the log from byte `offset` on.
+/// GetLog: requests block `block` of the log from byte `offset` on.
 pub const fn get_log(block: u32, offset: u16) -> [u8; 12] {
     let ([a, b, c, d], [e, f]) = (block.to_be_bytes(), offset.to_be_bytes());
     sealed(FrameType::GetLog, &[a, b, c, d, e, f])
 }
 
-/// GetPoints: what follows the first `first` points.
+/// GetPoints: requests the points from number `first` on.
 pub const fn get_points(first: u16) -> [u8; 8] {
     sealed(FrameType::GetPoints, &first.to_be_bytes())
 }

@@ -1,4 +1,4 @@
-//! Structure of a frame: header, type, length, body, CRC, and the lengths that each type can have.
+//! Structure of a frame: header, type, length, body and CRC, and the lengths that each type can have.
 use core::ops::Range;
 
 use crate::code::codes;
@@ -7,9 +7,9 @@ use crate::extension::{ANSWER_MAX, INFO_LEN, LOG_HEAD_LEN, PAGE_HEAD_LEN, SET_VA
 
 /// First byte of every frame.
 pub const HEADER: u8 = 0x9B;
-/// Shortest frame: no body (J-02).
+/// Length of the shortest frame, which has no body (J-02).
 pub const FRAME_MIN: usize = 6;
-/// Longest frame (J-02).
+/// Length of the longest frame (J-02).
 pub const FRAME_MAX: usize = 60_000;
 /// Joints of the arm.
 pub const JOINTS: usize = 6;
@@ -26,9 +26,9 @@ pub mod field {
     pub const LENGTH: Range<usize> = 2..4;
     /// First byte of the body.
     pub const BODY: usize = 4;
-    /// Bytes of the CRC at the end.
+    /// Length of the CRC at the end.
     pub const CRC_LEN: usize = 2;
-    /// Body of a frame of `n` bytes.
+    /// Returns the positions of the body of a frame of `n` bytes.
     pub const fn body(n: usize) -> Range<usize> {
         BODY..n - CRC_LEN
     }
@@ -56,7 +56,7 @@ codes! {
         FrictionPolynomialUseDefault = 0x0F;
         ResetCanDevices = 0x10;
         GripperControl = 0x11;
-        // Extensions (J-50): requests from 0x40, what they return from 0x50.
+        // Extensions (J-50): requests from 0x40 on, and their answers from 0x50 on.
         GetInfo = 0x40;
         GetSettings = 0x41;
         SetSettings = 0x42;
@@ -81,11 +81,11 @@ codes! {
 pub enum Lengths {
     /// A list of lengths.
     OneOf(&'static [u16]),
-    /// `first` and every `step` bytes more, up to `last`.
+    /// Lengths from `first` to `last`, `step` bytes apart.
     Steps {
         /// Shortest length.
         first: u16,
-        /// Bytes from one length to the next.
+        /// Difference between two consecutive lengths.
         step: u16,
         /// Upper bound of the lengths.
         last: u16,
@@ -96,7 +96,7 @@ pub enum Lengths {
 pub const TRAJECTORY_OVERHEAD: usize = 14;
 /// Bytes of a point in a Trajectory frame.
 pub const POINT_LEN: usize = 36;
-/// Most points that fit into one frame (the controller takes 1,500).
+/// Highest number of points that fit into a frame. (The controller accepts 1,500.)
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
@@ -199,17 +199,17 @@ const fn steps(first: usize, step: usize, last: usize) -> Lengths {
     Lengths::Steps { first: first as u16, step: step as u16, last: last as u16 }
 }
 
-/// A complete frame whose CRC is right and whose length its type can have. Bodies are not yet checked.
+/// A complete frame with a correct CRC and a length that its type can have. The body is not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameRef<'a> {
-    /// Type.
+    /// Type of the frame.
     pub frame_type: FrameType,
-    /// All bytes, header and CRC included.
+    /// All bytes, including header and CRC.
     pub bytes: &'a [u8],
 }
 
 impl<'a> FrameRef<'a> {
-    /// Checks a whole frame: header, type, length and CRC. The length must be that of `bytes`, and one that the type can have.
+    /// Checks a whole frame: header, type, length and CRC. The length must be the length of `bytes`, and one that the type can have.
     pub fn new_checked(bytes: &'a [u8]) -> Option<Self> {
         let (head, _) = bytes.split_first_chunk::<4>()?;
         let frame_type = FrameType::from_byte(head[field::TYPE])?;
@@ -217,7 +217,7 @@ impl<'a> FrameRef<'a> {
         let good = head[field::HEADER] == HEADER
             && n == bytes.len()
             && frame_type.can_have(n)
-            // The remainder over a message and its CRC is zero.
+            // The CRC of a message that is followed by its own CRC is zero.
             && crc16(bytes) == 0;
         good.then_some(Self { frame_type, bytes })
     }

@@ -1,4 +1,4 @@
-//! Bodies of the fuzz targets: each takes any bytes and panics when a promise is broken.
+//! Functions of the fuzz targets. Each takes any bytes, and panics if a guarantee is violated.
 mod reference;
 mod script;
 mod status;
@@ -33,10 +33,11 @@ fn body_len(kind: FrameType, pick: u8) -> usize {
     }
 }
 
-/// The frame that an input of [`frame_bodies`] stands for: type, pick of a length, then the body, repeated or cut to the length.
+/// Returns the frame for an input of [`frame_bodies`]. The input consists of the type, a byte that selects a length, and the body, which is
+/// repeated or cut to that length.
 pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     let [kind, pick, rest @ ..] = data else { return None };
-    // Types up to 0x11 are selected by their number, as in earlier inputs; the others are the extensions.
+    // Types up to 0x11 are selected by their number, as in earlier inputs. The other numbers select extensions.
     let kind = match usize::from(*kind % 0x20) {
         kind @ 0..0x12 => FrameType::from_byte(kind as u8)?,
         more => *FrameType::ALL.get(more - 1)?,
@@ -45,13 +46,13 @@ pub fn body_frame(data: &[u8]) -> Option<Vec<u8>> {
     Some(sealed(kind as u8, &body))
 }
 
-/// The frame of [`body_frame`]: parse, describe, encode again, parse again.
+/// Parses, describes and encodes the frame of [`body_frame`], and parses it again.
 pub fn frame_bodies(data: &[u8]) {
     let Some(bytes) = body_frame(data) else { return };
     let frame = FrameRef::new_checked(&bytes).expect("a good frame");
     assert_eq!(frame.body(), &bytes[4..bytes.len() - 2]);
 
-    // A body that no receiver returns must not break anything either.
+    // A body that no receiver returns must not cause a panic either.
     let raw = FrameRef { frame_type: frame.frame_type, bytes: &data[2..] };
     if let Ok(command) = Command::parse(raw) {
         let mut out = vec![0; data.len() + 64];
@@ -81,7 +82,7 @@ fn scaled_and_back(point: RawPoint) {
     let lowest = [point.position, point.velocity, point.acceleration].as_flattened().contains(&i16::MIN);
     match again {
         Ok(again) => assert_eq!(again, point),
-        // The one number that lies outside the scale.
+        // The one raw number that is outside the scale.
         Err(_) => assert!(lowest),
     }
 }

@@ -38,7 +38,7 @@ pub use encode::{
     Channel, EncodeError, FloatName, FrictionTable, OutOfScale, arm_model, floats, friction_polynomial,
     friction_table, pid_param, set_settings, trajectory,
 };
-/// States of drives and gripper in a status are those of the joint bus.
+/// The states of drives and gripper in a status are those of the joint bus.
 pub use jtc_bus::{Joint, NodeState};
 
 pub use extension::{
@@ -61,7 +61,7 @@ pub use status::{
 pub use stream::{KNOWN_US, LinkEvent, Receiver};
 pub use urgent::{UrgentCommand, UrgentCommands, UrgentWatch};
 
-/// Where each part of a frame is: byte ranges, named once.
+/// Byte ranges of the parts of each frame, each defined once.
 pub mod field {
     pub use crate::command::field as command;
     pub use crate::extension::image_field as image;

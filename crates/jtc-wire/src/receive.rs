@@ -6,11 +6,11 @@ use crate::status::Status;
 /// Bytes and statuses received so far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct StatusCounters {
-    /// Good statuses.
+    /// Number of valid statuses.
     pub frames: u64,
-    /// Runs of bytes that looked like a frame of the device but had a wrong CRC or body.
+    /// Number of runs of bytes that looked like a frame of the device but had a wrong CRC or body.
     pub bad_frames: u64,
-    /// Bytes that belong to no good frame.
+    /// Number of bytes that do not belong to a valid frame.
     pub skipped_bytes: u64,
 }
 
@@ -24,8 +24,8 @@ pub enum FromDevice<'a> {
     Answer(Answer<'a>),
 }
 
-/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and for answers to extension requests. The parser
-/// resynchronises after noise and lost bytes, without losing a good frame that follows them.
+/// Stream parser of the host, for statuses of 165, 173 and 175 bytes (J-08) and for answers to extension requests. It resynchronises after
+/// noise and lost bytes, without losing a valid frame that follows them.
 ///
 /// ```
 /// use jtc_wire::{Status, StatusReceiver};
@@ -42,7 +42,7 @@ pub enum FromDevice<'a> {
 pub struct StatusReceiver {
     held: [u8; ANSWER_MAX],
     len: usize,
-    /// Bytes at the front of `held` that were returned to the caller and that the next call removes.
+    /// Number of bytes at the front of `held` that were returned to the caller. The next call removes them.
     used: usize,
     counters: StatusCounters,
 }
@@ -53,9 +53,9 @@ impl Default for StatusReceiver {
     }
 }
 
-/// The scan result at the first held byte.
+/// Result of the scan at the first held byte.
 enum ScanResult {
-    /// No frame of the device begins at the first held byte.
+    /// The first held byte does not begin a frame of the device.
     Nothing,
     /// This many bytes are needed to decide.
     Needs(usize),
@@ -72,8 +72,8 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a status is complete. Returns `None` when all are taken. Skips answers to extension
-    /// requests.
+    /// Takes bytes from the front of `bytes` until a status is complete. Returns `None` if all bytes were taken before that. Skips answers
+    /// to extension requests.
     pub fn next(&mut self, bytes: &mut &[u8]) -> Option<Status> {
         loop {
             if let FromDevice::Status(status) = self.next_frame(bytes)? {
@@ -82,7 +82,7 @@ impl StatusReceiver {
         }
     }
 
-    /// Takes bytes from the front of `bytes` until a frame is complete. Returns `None` when all are taken.
+    /// Takes bytes from the front of `bytes` until a frame is complete. Returns `None` if all bytes were taken before that.
     pub fn next_frame(&mut self, bytes: &mut &[u8]) -> Option<FromDevice<'_>> {
         self.drop_front(self.used);
         self.used = 0;
@@ -116,7 +116,7 @@ impl StatusReceiver {
         self.held.get(..self.used).unwrap_or(&[])
     }
 
-    /// Bytes and statuses received so far.
+    /// Returns the numbers of bytes and statuses received so far.
     pub fn counters(&self) -> StatusCounters {
         self.counters
     }
@@ -126,7 +126,7 @@ impl StatusReceiver {
         self.len - self.used
     }
 
-    /// Discards the held bytes: for a line that was closed and opened again.
+    /// Discards the held bytes, for a line that was closed and opened again.
     pub fn clear(&mut self) {
         self.counters.skipped_bytes += self.held() as u64;
         (self.len, self.used) = (0, 0);
@@ -165,7 +165,7 @@ fn scan(held: &[u8]) -> ScanResult {
     match held.get(field::LENGTH) {
         None => ScanResult::Needs(field::LENGTH.end),
         Some(n) => match usize::from(u16::from_be_bytes([n[0], n[1]])) {
-            // No such frame is longer than the buffer.
+            // A frame of this type is never longer than the buffer.
             n if kind.can_have(n) => ScanResult::Needs(n.min(ANSWER_MAX)),
             _ => ScanResult::Nothing,
         },
@@ -220,7 +220,7 @@ mod tests {
         use crate::response::{DataStatus, Response};
         let emitted = Status { point: 77, ..Status::default() }.emit();
         let record = Response::good(FrameType::GetInfo, DataStatus::NotAllowed, 6);
-        // Also the layouts that other builds send: without a gripper, and with a short index.
+        // The other layouts are tested as well: without a gripper, and with a short index.
         for (cut, length) in [(0..0, 175), (163..173, 165), (17..19, 173)] {
             let mut bytes: Vec<u8> =
                 emitted.iter().enumerate().filter(|(i, _)| !cut.contains(i)).map(|(_, b)| *b).collect();

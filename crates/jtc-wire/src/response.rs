@@ -40,26 +40,26 @@ codes! {
 /// A response record (J-04).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct Response {
-    /// Type byte as received, 0 if unknown.
+    /// Type byte as received; 0 if unknown.
     pub frame_type: u8,
     /// Result of receiving the frame.
     pub status: FrameStatus,
     /// Result for the data of the frame; Idle unless `status` is NoError.
     pub data: DataStatus,
-    /// Bytes received, 0 if unknown.
+    /// Number of received bytes; 0 if unknown.
     pub length: u16,
 }
 
 impl Response {
-    /// No record.
+    /// Marks that there is no record.
     pub const NONE: Self = Self::bad(0, FrameStatus::Idle, 0);
 
-    /// Creates the record of a frame with a fault.
+    /// Creates the record of a damaged frame.
     pub const fn bad(frame_type: u8, status: FrameStatus, length: u16) -> Self {
         Self { frame_type, status, data: DataStatus::Idle, length }
     }
 
-    /// Creates the record of a good frame.
+    /// Creates the record of a valid frame.
     pub const fn good(frame_type: FrameType, data: DataStatus, length: u16) -> Self {
         Self { frame_type: frame_type as u8, status: FrameStatus::NoError, data, length }
     }

@@ -1,7 +1,7 @@
-//! Trajectory bodies: four numbers and points of eighteen int16.
+//! The bodies of Trajectory frames: four numbers, followed by points of eighteen int16.
 use crate::frame::{JOINTS, POINT_LEN};
 
-/// A trajectory point as the wire carries it.
+/// A trajectory point in the wire format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(C)]
 pub struct RawPoint {
@@ -13,13 +13,13 @@ pub struct RawPoint {
     pub acceleration: [i16; JOINTS],
 }
 
-/// rad at 32767 in a trajectory point. These three are numbers of the protocol, not roundings of ours.
+/// Position at 32767 in a trajectory point, rad. These three values are defined by the protocol; they are not rounded constants.
 #[allow(clippy::approx_constant)]
 pub const POSITION_SCALE: f64 = 3.141592;
-/// rad/s at 32767 in a trajectory point.
+/// Velocity at 32767 in a trajectory point, rad/s.
 #[allow(clippy::approx_constant)]
 pub const VELOCITY_SCALE: f64 = 6.283185;
-/// rad/s² at 32767 in a trajectory point.
+/// Acceleration at 32767 in a trajectory point, rad/s².
 pub const ACCELERATION_SCALE: f64 = 12.566370;
 
 /// Raw value at full scale.
@@ -35,7 +35,7 @@ pub mod field {
     pub const SEGMENT: Range<usize> = 2..4;
     /// Number of segments, u16.
     pub const SEGMENTS: Range<usize> = 4..6;
-    /// ms between points, u16.
+    /// Time between points, ms, u16.
     pub const STEP_TIME: Range<usize> = 6..8;
     /// First point.
     pub const POINTS: usize = 8;
@@ -63,17 +63,17 @@ impl RawPoint {
         bytes
     }
 
-    /// rad; `raw * (3.141592 / 32767)`, the quotient taken first.
+    /// Returns the positions, rad: `raw * (3.141592 / 32767)`, with the quotient computed first.
     pub fn position_rad(&self) -> [f64; JOINTS] {
         self.position.map(|raw| f64::from(raw) * (POSITION_SCALE / RAW_FULL_SCALE))
     }
 
-    /// rad/s; `raw * (6.283185 / 32767)`, the quotient taken first.
+    /// Returns the velocities, rad/s: `raw * (6.283185 / 32767)`, with the quotient computed first.
     pub fn velocity_rad_s(&self) -> [f64; JOINTS] {
         self.velocity.map(|raw| f64::from(raw) * (VELOCITY_SCALE / RAW_FULL_SCALE))
     }
 
-    /// rad/s²; `raw * (12.566370 / 32767)`, the quotient taken first.
+    /// Returns the accelerations, rad/s²: `raw * (12.566370 / 32767)`, with the quotient computed first.
     pub fn acceleration_rad_s2(&self) -> [f64; JOINTS] {
         self.acceleration.map(|raw| f64::from(raw) * (ACCELERATION_SCALE / RAW_FULL_SCALE))
     }
@@ -88,7 +88,7 @@ pub struct Segment<'a> {
     pub segment: u16,
     /// Number of segments of the trajectory.
     pub segments: u16,
-    /// ms between points.
+    /// Time between points, ms.
     pub step_time: u16,
     points: &'a [u8],
 }

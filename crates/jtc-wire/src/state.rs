@@ -1,7 +1,7 @@
-//! States of the controller and of its trajectory: code, name and meaning of each, in one table.
+//! States of the controller and of its trajectory: one table with code, name and meaning of each.
 use crate::code::{Known, codes};
 
-/// Declares a list of codes that a status carries, known and unknown ones.
+/// Declares a list of codes in a status. A received code may be unknown.
 macro_rules! states {
     ($(#[$doc:meta])* $list:ident, $unknown:literal $rows:tt) => {
         codes! {

@@ -1,4 +1,4 @@
-//! JtcStatus: the controller's report to the hosts, 25 times a second.
+//! JtcStatus: the report of the controller to the hosts, 25 times per second.
 use jtc_bus::NodeState;
 
 use crate::code::Code;
@@ -16,8 +16,8 @@ pub const STATUS_LEN_NO_GRIPPER: usize = 165;
 
 /// Positions of the parts of the 175-byte frame.
 ///
-/// The 165-byte layout ends after the joints; in the 173-byte layout the point index has two bytes and all that follows
-/// it comes two bytes earlier.
+/// The 165-byte layout ends after the joints. In the 173-byte layout the point index has two bytes, and all parts after it are two bytes
+/// further forward.
 pub mod field {
     use core::ops::Range;
 
@@ -27,7 +27,7 @@ pub mod field {
     pub const RESPONSE_STATUS: usize = 5;
     /// Record: data status code.
     pub const RESPONSE_DATA: usize = 6;
-    /// Record: bytes received, u16.
+    /// Record: number of received bytes, u16.
     pub const RESPONSE_LENGTH: Range<usize> = 7..9;
     /// State of the controller.
     pub const FSM: usize = 9;
@@ -45,15 +45,15 @@ pub mod field {
     pub const POINT: Range<usize> = 17..21;
     /// Friction type.
     pub const FRICTION_TYPE: usize = 21;
-    /// CAN: 0 good, 1 error.
+    /// CAN: 0 no error, 1 error.
     pub const CAN_ERROR: usize = 22;
     /// CAN: current flags, u32.
     pub const CAN_CURRENT: Range<usize> = 23..27;
     /// CAN: occurred flags, u32.
     pub const CAN_OCCURRED: Range<usize> = 27..31;
-    /// Joint 0; each has [`JOINT_LEN`] bytes.
+    /// Joint 0. Each joint has [`JOINT_LEN`] bytes.
     pub const JOINTS: usize = 31;
-    /// Bytes of a joint.
+    /// Length of a joint.
     pub const JOINT_LEN: usize = 22;
     /// Gripper: state, pump, pressure 1, pressure 2, errors, warnings, four zeros.
     pub const GRIPPER: Range<usize> = 163..173;
@@ -78,47 +78,47 @@ pub mod field {
         pub const INTERNAL: Range<usize> = 5..7;
         /// Occurred errors found by the controller, u16.
         pub const INTERNAL_OCCURRED: Range<usize> = 7..9;
-        /// rad, f32.
+        /// Position, rad, f32.
         pub const POSITION: Range<usize> = 9..13;
-        /// rad/s, f32.
+        /// Velocity, rad/s, f32.
         pub const VELOCITY: Range<usize> = 13..17;
-        /// N·m, f32.
+        /// Torque, N·m, f32.
         pub const TORQUE: Range<usize> = 17..21;
-        /// °C.
+        /// Temperature, °C.
         pub const TEMPERATURE: usize = 21;
     }
 }
 
-/// JtcStatus (section 2), both ways: `emit` for the device, `parse` for the host (165, 173 and 175 bytes, J-08).
+/// JtcStatus (section 2). The device uses `emit`, the host uses `parse` (165, 173 and 175 bytes, J-08).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Status {
-    /// Record of a received frame, or none.
+    /// Record of a received frame, or an empty record.
     pub response: Response,
     /// State of the controller.
     pub state: Code<ControllerState>,
     /// Current errors: bits of [`crate::error`].
     pub errors: u16,
-    /// Occurred errors, same bits.
+    /// Occurred errors, with the same bits.
     pub occurred: u16,
-    /// Parameters that are missing: bits of [`crate::missing_parameter`].
+    /// Missing parameters: bits of [`crate::missing_parameter`].
     pub jtc_init: u8,
-    /// Nodes that are missing: bits of [`crate::words::NODES`].
+    /// Nodes that are not ready: bits of [`crate::words::NODES`].
     pub node_init: u8,
     /// State of the trajectory.
     pub trajectory: Code<TrajectoryState>,
     /// Index of the current 1 ms point.
     pub point: u32,
-    /// 0 polynomial, 1 table.
+    /// Kind of friction: 0 polynomial, 1 table.
     pub friction_type: u8,
-    /// 0 good, 1 error.
+    /// CAN: 0 no error, 1 error.
     pub can_error: u8,
     /// Current CAN flags: bits of [`crate::can_flag`].
     pub can_current: u32,
-    /// Occurred flags, same bits.
+    /// Occurred CAN flags, with the same bits.
     pub can_occurred: u32,
     /// Joints 0..5.
     pub joints: [JointStatus; JOINTS],
-    /// `None` in the 165-byte layout.
+    /// State of the gripper; `None` in the 165-byte layout.
     pub gripper: Option<GripperStatus>,
 }
 
@@ -139,11 +139,11 @@ pub struct JointStatus {
     pub internal: u16,
     /// Occurred errors found by the controller.
     pub internal_occurred: u16,
-    /// rad.
+    /// Position, rad.
     pub position: f32,
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: f32,
-    /// N·m.
+    /// Torque, N·m.
     pub torque: f32,
     /// Bearing temperature, °C.
     pub temperature: u8,
@@ -154,11 +154,11 @@ pub struct JointStatus {
 pub struct GripperStatus {
     /// State.
     pub state: NodeState,
-    /// Pump 0 off, 1 on.
+    /// Pump: 0 off, 1 on.
     pub pump: u8,
-    /// 1: first pressure level reached.
+    /// 1: the first pressure level is reached.
     pub pressure1: u8,
-    /// 1: second pressure level reached.
+    /// 1: the second pressure level is reached.
     pub pressure2: u8,
     /// Errors: bits of [`jtc_bus::error`].
     pub errors: u8,
@@ -166,7 +166,7 @@ pub struct GripperStatus {
     pub warnings: u8,
 }
 
-/// Returns `N` bytes of `bytes` from `at`, or zeros past the end. No caller reads past the end.
+/// Returns `N` bytes of `bytes` from `at` on, or zeros after the end. No caller reads after the end.
 fn get<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
     bytes.get(at..).and_then(|rest| rest.first_chunk::<N>()).copied().unwrap_or([0; N])
 }
@@ -206,14 +206,14 @@ impl JointStatus {
 }
 
 impl Status {
-    /// Returns the 175-byte frame with CRC. A missing gripper is emitted as zeros.
+    /// Returns the 175-byte frame with its CRC. If there is no gripper, its bytes are zero.
     pub fn emit(&self) -> [u8; STATUS_LEN] {
         let mut frame = [0; STATUS_LEN];
         self.emit_to(&mut frame);
         frame
     }
 
-    /// Like [`emit`](Self::emit), into `b`.
+    /// Like [`emit`](Self::emit), but writes to `b`.
     pub fn emit_to(&self, b: &mut [u8; STATUS_LEN]) {
         use field::*;
         b[frame_field::HEADER] = HEADER;
@@ -253,14 +253,14 @@ impl Status {
 
     /// Parses a whole frame of 165, 173 or 175 bytes. Returns `None` if type, length or CRC is wrong.
     ///
-    /// A record with a code that this version does not know reads as one of status Idle, so that it confirms nothing.
+    /// A record with a code that this version does not know becomes a record with the status Idle, so that it confirms nothing.
     pub fn parse(bytes: &[u8]) -> Option<Status> {
         let frame = crate::FrameRef::new_checked(bytes)?;
         if frame.frame_type != FrameType::JtcStatus {
             return None;
         }
         let short_index = bytes.len() == STATUS_LEN_SHORT_INDEX;
-        // Position of a byte that follows the point index.
+        // Position of a byte after the point index.
         let late = |at: usize| if short_index { at - 2 } else { at };
         let byte = |at: usize| get::<1>(bytes, at)[0];
         let response = match (
@@ -305,8 +305,8 @@ impl Status {
         })
     }
 
-    /// Replaces the response record in the bytes of a good status of any layout, for a program that passes the status on to several hosts.
-    /// Returns false and changes nothing if the bytes are not a good status.
+    /// Replaces the response record in the bytes of a valid status of any layout. A program that passes the status on to several hosts uses
+    /// this. Returns false and changes nothing if the bytes are not a valid status.
     pub fn replace_response(bytes: &mut [u8], response: &Response) -> bool {
         use field::*;
         let status = |frame: crate::FrameRef<'_>| frame.frame_type == FrameType::JtcStatus;
@@ -323,12 +323,12 @@ impl Status {
         true
     }
 
-    /// Returns true in Start and Init: the controller does not hold the arm yet.
+    /// Returns true in Start and Init, in which the controller does not hold the arm yet.
     pub fn is_coming_up(&self) -> bool {
         self.state.is_in(&[ControllerState::Start, ControllerState::Init])
     }
 
-    /// Returns true in a held stop (J-69): the arm is held under torque or comes to rest, and does not move until the host has cleared the
+    /// Returns true in a held stop (J-69). The arm is held under torque or comes to rest, and does not move until the host has cleared the
     /// cause that the joints report.
     pub fn is_held_stop(&self) -> bool {
         self.errors == crate::error::INTERNAL_JOINTS && self.state != ControllerState::Error
@@ -344,12 +344,12 @@ impl Status {
         self.trajectory == TrajectoryState::Execute
     }
 
-    /// Returns the measured positions of the joints as the frame has them, rad; 0 if a position is not known.
+    /// Returns the measured positions of the joints in the frame, rad. An unknown position is 0.
     pub fn positions(&self) -> [f64; JOINTS] {
         self.joints.map(|joint| f64::from(joint.position))
     }
 
-    /// Returns the record that the status carries, or `None` if it carries none.
+    /// Returns the record of the status, or `None` if it has none.
     pub fn response(&self) -> Option<Response> {
         (!self.response.is_idle()).then_some(self.response)
     }

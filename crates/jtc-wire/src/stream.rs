@@ -1,16 +1,16 @@
 //! The device's stream parser: finds frames in bytes that arrive in pieces of any length, and reports all other bytes (J-03, J-04).
 //!
-//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. The run
-//! ends at the next good frame or at a gap. The parser reports one event for a run, as soon as the fault at its first byte is known, and
-//! skips the remainder without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap the parser scans the
-//! bytes after its first one again, so that a false header costs none of the frames that follow it.
+//! A stream is a sequence of *good frames* and *runs* of other bytes. A run begins with a byte that does not begin a good frame. It ends at
+//! the next good frame or at a gap. The parser reports one event for a run, as soon as the fault at its first byte is known, and skips the
+//! remainder without an event. An incomplete frame ends when its last byte arrives, or at a gap. After a gap the parser scans again from
+//! the second byte of such a frame, so that a false header does not hide the frames after it.
 //!
-//! Terms: a *candidate* is a position with a header, a known type and a length that the type can have. A *gap* is a silence of
-//! the inter-byte timeout or more after received bytes.
+//! Terms: a *candidate* is a position with a header, a known type and a length that the type can have. A *gap* is a silence of at least the
+//! inter-byte timeout after received bytes.
 //!
-//! Cost: each byte is copied and enters the CRC once, when it arrives. The CRC register is kept at every 64th byte, so that
-//! a candidate of any length is checked with two registers and some arithmetic. Hostile bytes full of false
-//! headers cost a constant each, and [`Receiver::poll`] scans a bounded number of them per call.
+//! Cost: each byte is copied once and enters the CRC once, when it arrives. The CRC register is stored at every 64th byte, so that a
+//! candidate of any length can be checked with two registers and some arithmetic. In hostile input full of false headers, each header costs
+//! a constant amount of work, and [`Receiver::poll`] scans a bounded number of them per call.
 use crate::batch::ReceivedEvent;
 use crate::crc::advance;
 use crate::frame::{FRAME_MAX, FRAME_MIN, FrameRef, FrameType, HEADER, field};
@@ -25,14 +25,14 @@ use registers::Registers;
 pub enum LinkEvent<'a> {
     /// A good frame.
     Frame(FrameRef<'a>),
-    /// A bad frame, and the bytes that follow it without a gap.
+    /// A damaged frame, and the bytes that follow it without a gap.
     Bad(Response),
     /// A run of bytes whose first byte does not look like a frame.
     Noise(Response),
 }
 
 impl LinkEvent<'_> {
-    /// The frame status of its response record (J-05).
+    /// Returns the frame status of the response record (J-05).
     pub fn status(&self) -> FrameStatus {
         match self {
             Self::Frame(_) => FrameStatus::NoError,
@@ -41,18 +41,18 @@ impl LinkEvent<'_> {
     }
 }
 
-/// Time after an extension request during which the line's client counts as one that knows the extensions, µs (J-51). After this time the
-/// line is *plain*.
+/// Time after an extension request in which the client of the line is assumed to know the extensions, µs (J-51). After this time the line
+/// is *plain*.
 pub const KNOWN_US: u64 = 2_000_000;
 
-/// Most gaps among the held bytes that are stored.
+/// Highest number of stored gaps among the held bytes.
 const GAPS: usize = 64;
-/// Work of one `poll`: a skipped byte costs 1, a candidate whose CRC is checked costs `CANDIDATE`.
+/// Amount of work of one `poll`. A skipped byte costs 1; a candidate whose CRC is checked costs `CANDIDATE`.
 const BUDGET: usize = 2048;
 const CANDIDATE: usize = 128;
 
-/// Stream parser of rule J-03 over a buffer of at least [`FRAME_MAX`] bytes (with a shorter one, frames that do not fit into it
-/// are refused as such with a wrong length).
+/// Stream parser of rule J-03 with a buffer of at least [`FRAME_MAX`] bytes. With a shorter buffer, frames that do not fit are refused like
+/// frames with a wrong length.
 ///
 /// ```
 /// use jtc_wire::{LinkEvent, Receiver};
@@ -70,25 +70,25 @@ pub struct Receiver<B> {
     inter_byte_timeout_us: u64,
     /// Position in the stream of the first byte of the buffer.
     base: u64,
-    /// Held bytes are `start..end` of the buffer.
+    /// The held bytes are `start..end` of the buffer.
     start: usize,
     end: usize,
     /// Time of the last byte, µs.
     last_us: u64,
-    /// The caller holds bytes that were not taken, so that silence does not count as a gap on the line.
+    /// The caller holds bytes that the buffer had no space for. During this time, silence is not a gap on the line.
     refused: bool,
-    /// Those bytes follow a gap.
+    /// There is a gap before those bytes.
     gap_before_refused: bool,
-    /// The bytes from `start` belong to a run that has had its event.
+    /// The bytes from `start` on belong to a run whose event has already been reported.
     in_run: bool,
-    /// The last `poll` stopped early.
+    /// The last `poll` stopped because of its limited work.
     busy: bool,
     event: Option<Found>,
     gaps: Gaps,
     registers: Registers,
-    /// Position in the stream of the frame that is not complete yet, and the time at which its first byte was seen, µs.
+    /// Position in the stream of the incomplete frame, and time at which its first byte was seen, µs.
     began: (u64, u64),
-    /// Time at which the last extension request was complete, µs.
+    /// Time at which the last extension request was completed, µs.
     asked_us: Option<u64>,
     /// The frame of the event came on a plain line.
     plain: bool,
@@ -97,7 +97,7 @@ pub struct Receiver<B> {
 #[derive(Clone, Copy)]
 enum Found {
     Frame(FrameType, usize),
-    /// The fault, and its position in the stream.
+    /// The fault of a run, and its position in the stream.
     Run(Sort, Response, u64),
 }
 

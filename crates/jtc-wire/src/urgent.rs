@@ -49,15 +49,15 @@ pub struct UrgentCommands {
 }
 
 impl UrgentCommands {
-    /// No commands.
+    /// An empty list.
     pub const NONE: Self = Self { stops: 0, pauses: 0, pause_is_last: false };
 
-    /// Adds a command after the others.
+    /// Appends a command.
     pub fn push(&mut self, command: UrgentCommand) {
         self.add(command, 1);
     }
 
-    /// Adds `count` equal commands after the others.
+    /// Appends `count` equal commands.
     pub fn add(&mut self, command: UrgentCommand, count: u8) {
         if count == 0 {
             return;
@@ -72,7 +72,7 @@ impl UrgentCommands {
         self.stops == 0 && self.pauses == 0
     }
 
-    /// Returns each command that came, with its count. The command that came last is at the end.
+    /// Returns each command that came, with its count. The last command is at the end.
     pub fn iter(&self) -> impl Iterator<Item = (UrgentCommand, u8)> {
         let (stops, pauses) = ((UrgentCommand::Stop, self.stops), (UrgentCommand::Pause, self.pauses));
         let order = if self.pause_is_last { [stops, pauses] } else { [pauses, stops] };
@@ -80,9 +80,9 @@ impl UrgentCommands {
     }
 }
 
-/// Bytes of a Stop or a Pause.
+/// Length of a Stop or a Pause.
 const LENGTH: usize = 7;
-/// The last seven bytes, the oldest on top.
+/// Mask of the last seven bytes. The oldest byte is the highest.
 const WINDOW: u64 = (1 << (8 * LENGTH)) - 1;
 const STOP: u64 = window(&fixed::STOP);
 const PAUSE: u64 = window(&fixed::PAUSE);
@@ -95,9 +95,9 @@ const fn window(bytes: &[u8; LENGTH]) -> u64 {
 /// State of a line.
 #[derive(Clone, Copy, Debug)]
 struct Tail {
-    /// Its last bytes.
+    /// The last bytes of the line.
     window: u64,
-    /// Bytes received.
+    /// Number of received bytes.
     received: u64,
     /// Time of the last byte, µs.
     last_us: u64,
@@ -105,13 +105,13 @@ struct Tail {
     commands: UrgentCommands,
     /// Position in the stream at which the last of these commands ended.
     hit: u64,
-    /// Bytes received when the last urgent command of any line came. A frame that began before is older than that command.
+    /// Number of bytes received when the last urgent command of any line came. A frame that began earlier was sent before that command.
     overtaken: u64,
 }
 
 /// Watches the bytes of all lines to a controller for Stop and Pause.
 ///
-/// In each tick, [`scan`](Self::scan) the bytes that have arrived on every line, then [`take`](Self::take) the commands. An Execute at a
+/// In each tick, call [`scan`](Self::scan) with the bytes that have arrived on every line, and then [`take`](Self::take). An Execute at a
 /// position that is [`overtaken`](Self::overtaken) must not be executed.
 ///
 /// ```
@@ -131,15 +131,15 @@ pub struct UrgentWatch<const LINES: usize> {
 }
 
 impl<const LINES: usize> UrgentWatch<LINES> {
-    /// `inter_byte_timeout_us`: silence after which bytes no longer belong to one frame, µs. Times are only as fine as the calls
-    /// of `scan`: with the timeout of the receiver and a tick more, every Stop that the receiver finds is found here.
+    /// `inter_byte_timeout_us`: silence after which bytes no longer belong to the same frame, µs. Times are only as precise as the calls of
+    /// `scan`. If this timeout is one tick longer than the timeout of the receiver, every Stop that the receiver finds is also found here.
     pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };
         Self { inter_byte_timeout_us: inter_byte_timeout_us as u64, lines: [tail; LINES] }
     }
 
-    /// Scans the bytes that have arrived on a line by `now_us`: every byte once, in order. Takes a few instructions per byte.
+    /// Scans the bytes that have arrived on a line until `now_us`: every byte once, in order. This takes a few instructions per byte.
     pub fn scan(&mut self, line: usize, now_us: u64, bytes: &[u8]) {
         let Some(tail) = self.lines.get_mut(line) else { return };
         if bytes.is_empty() {
@@ -168,7 +168,7 @@ impl<const LINES: usize> UrgentWatch<LINES> {
         let lines_with = commands.iter().filter(|commands| !commands.is_empty()).count();
         for tail in &mut self.lines {
             let own = !core::mem::take(&mut tail.commands).is_empty();
-            // The order of two lines within a tick is not known, so all bytes that either has sent count as older.
+            // The order of two lines within a tick is not known. Therefore all bytes received so far on both lines are considered older.
             match lines_with {
                 0 => {}
                 1 if own => tail.overtaken = tail.hit,
@@ -227,7 +227,7 @@ mod tests {
         }
     }
 
-    /// A call without bytes does not count as a received byte: the gap is counted from the last received byte (J-03).
+    /// A call without bytes is not a received byte. The gap is measured from the last received byte (J-03).
     #[test]
     fn j05_an_empty_scan_does_not_join_across_a_gap() {
         let mut watch = UrgentWatch::<2>::new(6000);

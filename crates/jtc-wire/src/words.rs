@@ -1,4 +1,4 @@
-//! States, error bits and codes in words: the same everywhere they are printed.
+//! Texts of states, error bits and codes, which are the same in all outputs.
 pub use jtc_bus::Bits;
 
 use crate::bits::{error, joint_error, missing_parameter};
@@ -7,7 +7,7 @@ use crate::bits::{error, joint_error, missing_parameter};
 pub const JTC_ERRORS: [&str; 8] = error::NAMES;
 /// Bits of the parameters that the controller has not received.
 pub const JTC_INIT: [&str; 3] = missing_parameter::NAMES;
-/// Nodes of the joint bus: nodes count from 0 on the wire, joints from 1.
+/// Nodes of the joint bus. Nodes are counted from 0 on the wire, joints from 1.
 pub const NODES: [&str; 7] = [
     "node 0 (joint 1)",
     "node 1 (joint 2)",
@@ -44,7 +44,7 @@ pub const CAN_FLAGS: [&str; 15] = [
     "no answer from the gripper",
 ];
 
-/// Friction type.
+/// Returns the text of the friction type.
 pub fn friction_type(code: u8) -> &'static str {
     match code {
         0 => "polynomial",

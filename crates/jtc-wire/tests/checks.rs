@@ -1,4 +1,4 @@
-//! Bytes that are not a valid frame, command or status, although the remainder of them is right.
+//! Bytes that are not a valid frame, command or status because of a single fault.
 use jtc_wire::{
     ALL_NODES, Command, DataStatus, Floats, FrameRef, FrameStatus, FrameType, HEADER, LinkEvent, RawPoint,
     Response, Segment, Status, crc16, fixed,
@@ -98,7 +98,7 @@ fn j08_a_frame_of_another_type_is_no_status() {
     assert!(Status::parse(&Status::default().emit()).is_some());
 }
 
-/// A status without a record carries 0, 0, 0, 0.
+/// A status without a record contains 0, 0, 0, 0.
 #[test]
 fn j04_a_status_without_a_record_confirms_nothing() {
     let bytes = Status::default().emit();
@@ -117,7 +117,7 @@ fn a_rest_of_a_float_is_none() {
     }
 }
 
-/// An empty segment is an incorrect value (J-06), so it must be seen to be empty.
+/// An empty segment is an incorrect value (J-06), so it must be detectable.
 #[test]
 fn j06_points_of_a_segment() {
     let point = |i: i16| RawPoint { position: [i; 6], ..RawPoint::default() };

@@ -1,4 +1,4 @@
-//! Frames byte by byte, scaling, and the numbers that the protocol's pages print.
+//! Frames byte by byte, scaling, and the numbers on the protocol pages.
 use jtc_bus::NodeState;
 use jtc_wire::{
     ACCELERATION_SCALE, Channel, Command, ControllerState, DataStatus, Described, EncodeError, ExecCommand,
@@ -34,7 +34,7 @@ fn j02_printed_crcs() {
     assert_eq!(crc_of(&fixed::PUMP_OFF), 0xDF2E);
 }
 
-/// E-04: the CRC printed for this frame belongs to another one.
+/// E-04: the CRC that is printed for this frame belongs to another frame.
 #[test]
 fn e04_friction_polynomial_use_default() {
     assert_eq!(fixed::FRICTION_POLYNOMIAL_USE_DEFAULT, [0x9B, 0x0F, 0x00, 0x06, 0x94, 0x77]);
@@ -180,7 +180,7 @@ fn scale_ends() {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-    /// Nearest, or an error: never wrapped, never clipped.
+    /// A value is rounded to the nearest one or refused. It never wraps and is never clipped.
     #[test]
     fn scaling_never_wraps_or_clips(value in any::<f64>(), near in -4.0..4.0, joint in 0..6usize) {
         for value in [value, near] {
@@ -250,7 +250,7 @@ fn status() -> Status {
     }
 }
 
-/// E-01, E-02, E-05: length, four bytes of point index, joint 1 at 53.
+/// E-01, E-02, E-05: the length, the point index of four bytes, and joint 1 at byte 53.
 #[test]
 fn e01_e02_e05_status_layout() {
     let bytes = status().emit();
@@ -268,7 +268,7 @@ fn e01_e02_e05_status_layout() {
     assert_eq!(Status::parse(&bytes), Some(status()));
 }
 
-/// The other layouts of the same status.
+/// Returns the other layouts of the same status.
 fn layouts() -> [Vec<u8>; 3] {
     let full = status().emit();
     let sealed = |mut bytes: Vec<u8>| {

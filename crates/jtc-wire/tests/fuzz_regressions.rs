@@ -1,4 +1,4 @@
-//! The bodies of the fuzz targets over the inputs that are kept, and over some at random.
+//! Runs the functions of the fuzz targets on the stored inputs, and on some random ones.
 
 use jtc_wire::fuzzing::{frame_bodies, status_stream, stream_parser};
 use proptest::prelude::*;

@@ -32,7 +32,7 @@ fn j08_a_wrong_crc_is_counted_once() {
     assert_eq!(counters.skipped_bytes, 2 * STATUS_LEN as u64);
 }
 
-/// A line was closed and opened again: half of a status before does not belong to the bytes after.
+/// A line was closed and opened again. Half of a status before that does not belong to the bytes after it.
 #[test]
 fn j08_what_is_held_can_be_forgotten() {
     let mut receiver = StatusReceiver::new();

@@ -1,4 +1,4 @@
-//! Frames, states and codes in words.
+//! Texts of frames, states and codes.
 use jtc_bus::NodeState;
 use jtc_wire::words::{self, Bits};
 use jtc_wire::{
@@ -52,7 +52,7 @@ fn bits_in_words() {
     assert!(Bits(0b1010, &names).iter().eq([(1, ""), (3, "")]));
 }
 
-/// Masks and texts of a word are in one table, that of the protocol.
+/// The masks and the texts of a word come from the same table, which is the one in the protocol.
 #[test]
 fn masks_have_the_texts_of_their_bits() {
     let errors = error::EMERGENCY_INPUT | error::EXTERNAL | error::EXTERNAL_JOINTS;
@@ -169,7 +169,7 @@ fn j06_coefficients_are_called_by_their_index() {
     check::<6>();
 }
 
-/// Such a command comes from no frame, but anyone can make it.
+/// No frame contains such a command, but it can be constructed.
 #[test]
 fn j07_a_polynomial_of_too_few_numbers_can_be_said() {
     let command = Command::FrictionPolynomial(Floats::new(&[0; 20]));
@@ -228,7 +228,7 @@ fn a_node_says_all_that_is_wrong_with_it() {
     );
 }
 
-/// The pieces add up to the capture, its good frames are found, and the bytes between two of them are one piece.
+/// The pieces add up to the capture, its valid frames are found, and the bytes between two frames are one piece.
 #[test]
 fn a_capture_in_pieces() {
     let status = Status::default().emit();
@@ -259,7 +259,7 @@ fn a_capture_in_pieces() {
     assert_eq!(pieces(&[]).next(), None);
 }
 
-/// J-31: which states hold the arm, and which one moves it; the bytes are those of the manual.
+/// J-31: the states in which the arm is held, and the state in which it moves. The bytes are those of the manual.
 #[test]
 fn a_status_knows_whether_the_controller_comes_up_or_executes() {
     let of = |state: u8, trajectory: u8| Status {

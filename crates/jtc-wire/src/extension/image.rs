@@ -1,4 +1,4 @@
-//! The arm image (J-54): all parameters of an arm in one block of bytes, which is stored, read back and hashed.
+//! The arm image (J-54): all parameters of an arm in one block of bytes, for storing, reading back and hashing.
 use super::{NAME_LEN, Name, VALUE_LEN, Values};
 use crate::command::Floats;
 
@@ -10,9 +10,9 @@ pub mod field {
     pub const MAGIC: [u8; 4] = *b"JTCA";
     /// Version of the layout.
     pub const VERSION: u8 = 1;
-    /// Byte of the version.
+    /// Position of the version byte.
     pub const VERSION_AT: usize = 4;
-    /// Friction: 0 polynomial, 1 table.
+    /// Position of the byte for the kind of friction: 0 polynomial, 1 table.
     pub const FRICTION_AT: usize = 5;
     /// Number of settings, u16.
     pub const SETTINGS: Range<usize> = 6..8;
@@ -20,16 +20,16 @@ pub mod field {
     pub const PID: Range<usize> = 8..128;
     /// The body of an ArmModel frame.
     pub const MODEL: Range<usize> = 128..660;
-    /// First byte of the friction: the body of a FrictionPolynomial frame of six coefficients, or of a FrictionTable frame. The settings
-    /// follow, each as in a SetSettings frame, then the name.
+    /// Position of the friction: the body of a FrictionPolynomial frame with six coefficients per joint, or of a FrictionTable frame. It is
+    /// followed by the settings, each in the format of a SetSettings frame, and by the name.
     pub const FRICTION: usize = 660;
-    /// Bytes of the polynomials.
+    /// Length of the polynomials, bytes.
     pub const POLYNOMIAL_LEN: usize = 144;
-    /// Bytes of the tables.
+    /// Length of the tables, bytes.
     pub const TABLE_LEN: usize = 10_560;
 }
 
-/// Longest image, for which each slot of the board's flash has space.
+/// Length of the longest image. Each slot in the flash of the board has space for it.
 pub const IMAGE_MAX: usize = 12 * 1024;
 
 /// Friction in an image.
@@ -41,12 +41,12 @@ pub enum FrictionImage<'a> {
     Table(Floats<'a>),
 }
 
-/// The parts of an image. Lengths are right; numbers are not yet checked.
+/// The parts of an image. The lengths are valid; the numbers are not checked yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArmImage<'a> {
-    /// Gains, as in PidParam.
+    /// Gains, in the format of PidParam.
     pub pid: Floats<'a>,
-    /// Kinematics and masses, as in ArmModel.
+    /// Kinematics and masses, in the format of ArmModel.
     pub model: Floats<'a>,
     /// Friction.
     pub friction: FrictionImage<'a>,
@@ -87,13 +87,14 @@ impl<'a> ArmImage<'a> {
     }
 }
 
-/// Hash of an arm image without its name, and thus of all parameters that decide how the arm moves (J-52). The hash is FNV-1a with 64 bits
-/// (RFC 9923); the bytes can be fed in pieces of any length. The hash distinguishes arms that differ by accident, not by malice.
+/// Hash of an arm image without its name: of all parameters that affect the motion of the arm (J-52). The hash is FNV-1a with 64 bits (RFC
+/// 9923). The bytes may be added in pieces of any length. The hash distinguishes arms that differ by accident; it does not protect against
+/// forgery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Hash(u64);
 
 impl Hash {
-    /// Returns the hash of no bytes.
+    /// Returns the hash of an empty image.
     pub const fn new() -> Self {
         Self(0xCBF2_9CE4_8422_2325)
     }

@@ -8,13 +8,13 @@ use crate::code::codes;
 use crate::frame::FRAME_MIN;
 use crate::words::{self, Bits};
 
-/// Minimum length of an [`Info`]; later versions are longer.
+/// Minimum length of an [`Info`]. Later versions are longer.
 pub const INFO_LEN: usize = 136;
-/// Bytes of an [`Info`] as this version writes it.
+/// Length of an [`Info`] that this version writes.
 pub const INFO_WRITTEN: usize = 168;
-/// Board of a simulator: a device whose drives are simulated (J-52).
+/// Name of the board of a simulator, whose drives are simulated (J-52).
 pub const SIMULATOR: &str = "simulator";
-/// Bytes of the firmware's version, and of its revision.
+/// Length of the text for the firmware's version, and of the text for its revision.
 const SHORT_TEXT: usize = 16;
 
 /// Positions of the parts, counted from the first byte of the body.
@@ -39,10 +39,10 @@ mod field {
     pub const FIRMWARE: Range<usize> = 72..88;
     pub const REVISION: Range<usize> = 88..104;
     pub const BOARD: Range<usize> = 104..136;
-    // Added since (J-67).
+    // Added later (J-67).
     pub const PROGRAM_BYTES: Range<usize> = 136..140;
     pub const PROGRAM_CRC: Range<usize> = 140..144;
-    // Added since (J-69).
+    // Added later (J-69).
     pub const REACTIONS: Range<usize> = 144..168;
 }
 
@@ -94,12 +94,12 @@ codes! {
     }
 }
 
-/// Program in the flash that the device runs from, as the device read it at its start (J-67).
+/// Program in flash that the device runs, as the device read it at its start (J-67).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Program {
-    /// Bytes of the program from the first byte of the flash on.
+    /// Length of the program, from the first byte of the flash on.
     pub bytes: u32,
-    /// Their CRC-32 (ISO-HDLC, as zlib and Ethernet have it).
+    /// CRC-32 of these bytes (ISO-HDLC, as in zlib and Ethernet).
     pub crc32: u32,
 }
 
@@ -114,19 +114,19 @@ impl fmt::Display for Program {
 pub struct Info {
     /// Version of the extensions.
     pub version: u8,
-    /// Parameters missing: bits of [`crate::missing_parameter`].
+    /// Missing parameters: bits of [`crate::missing_parameter`].
     pub missing: u8,
     /// Nodes that are not ready: bits of [`crate::words::NODES`].
     pub nodes_missing: u8,
     /// Cause of the last start.
     pub boot_cause: BootCause,
-    /// Number of starts, as far as the device knows.
+    /// Number of starts, if the device counts them.
     pub boots: u32,
     /// Time since the last start, ms.
     pub uptime_ms: u64,
-    /// Response records lost because too many waited (J-04).
+    /// Number of response records that were lost because too many were waiting (J-04).
     pub lost_records: u32,
-    /// Hash of all parameters that decide how the arm moves ([`super::Hash`]).
+    /// Hash of all parameters that affect the motion of the arm ([`super::Hash`]).
     pub hash: u64,
     /// Bits of [`capability`].
     pub capabilities: u32,
@@ -134,9 +134,9 @@ pub struct Info {
     pub defaults_stored: bool,
     /// State of the memory for the stored arm.
     pub store: StoreState,
-    /// Number of the stored arm; each store increments it.
+    /// Number of the stored arm. Each store increments it.
     pub sequence: u32,
-    /// The flight recorder.
+    /// State of the flight recorder.
     pub log: LogState,
     /// Name of the arm in use.
     pub arm: Name,
@@ -144,7 +144,7 @@ pub struct Info {
     pub firmware: [u8; SHORT_TEXT],
     /// Git revision of the firmware.
     pub revision: [u8; SHORT_TEXT],
-    /// The board.
+    /// Name of the board.
     pub board: Name,
     /// Program in flash; `None` if the device does not report it.
     pub program: Option<Program>,
@@ -178,7 +178,7 @@ impl Default for Info {
     }
 }
 
-/// Returns as much of a text as fits, filled up with zeros.
+/// Returns as much of a text as fits, padded with zeros.
 pub(crate) fn short_text(text: &str) -> [u8; SHORT_TEXT] {
     let mut bytes = [0; SHORT_TEXT];
     for (to, from) in bytes.iter_mut().zip(text.bytes()) {
@@ -194,23 +194,23 @@ fn text(bytes: &[u8; SHORT_TEXT]) -> &str {
 }
 
 impl Info {
-    /// Sets the version of the firmware and its git revision, cut to what fits.
+    /// Sets the version of the firmware and its git revision, cut off to the available length.
     pub fn with_firmware(mut self, version: &str, revision: &str) -> Self {
         (self.firmware, self.revision) = (short_text(version), short_text(revision));
         self
     }
 
-    /// Version of the firmware.
+    /// Returns the version of the firmware.
     pub fn firmware(&self) -> &str {
         text(&self.firmware)
     }
 
-    /// Git revision of the firmware.
+    /// Returns the git revision of the firmware.
     pub fn revision(&self) -> &str {
         text(&self.revision)
     }
 
-    /// Returns the version of the firmware, followed by its Git revision in brackets if it has one. Every program shows it like this.
+    /// Returns the version of the firmware, followed by its git revision in brackets if it has one. Every program uses this format.
     pub fn firmware_and_revision(&self) -> impl fmt::Display + '_ {
         FirmwareAndRevision(self)
     }
@@ -244,12 +244,12 @@ impl Info {
         b
     }
 
-    /// Parses the body of an Info frame. Bytes that a later version adds are ignored. A cause or a state that this version does not know
-    /// reads as the default of its type. Returns `None` if the body is too short or a name is not valid.
+    /// Parses the body of an Info frame. Bytes that a later version adds are ignored. A cause or state that this version does not know
+    /// becomes the default of its type. Returns `None` if the body is too short or a name is not valid.
     pub fn parse(body: &[u8]) -> Option<Self> {
         use field::*;
         let (b, _) = body.split_first_chunk::<INFO_LEN>()?;
-        // Zero if the body is of an earlier version and ends before this word (J-67).
+        // The word is zero if the body comes from an earlier version and ends before it (J-67).
         let word = |at: core::ops::Range<usize>| {
             body.get(at).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u32::from_be_bytes(*bytes))
         };

@@ -5,11 +5,11 @@ use super::ANSWER_MAX;
 use crate::code::codes;
 use crate::frame::FRAME_MIN;
 
-/// Bytes in the body before those of the log.
+/// Length of the body before the bytes of the log.
 pub(crate) const LOG_HEAD_LEN: usize = 17;
-/// Most bytes of the log in a Log frame: whole words.
+/// Highest number of bytes of the log in a Log frame, in whole words.
 pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
-/// Block number that no log has: a GetLog with it returns the extent of the log, but none of its bytes.
+/// Block number that no log contains. A GetLog with this number returns the extent of the log, without bytes.
 pub const LOG_NO_BLOCK: u32 = u32::MAX;
 
 codes! {
@@ -34,13 +34,13 @@ pub struct LogPage<'a> {
     pub block: u32,
     /// Position of these bytes in the block.
     pub offset: u16,
-    /// Number after that of the newest block.
+    /// Number after the number of the newest block.
     pub end: u32,
-    /// Points of the trajectory in the memory of the device.
+    /// Number of points of the trajectory in the memory of the device.
     pub points: u16,
     /// Hash of those points.
     pub points_hash: u32,
-    /// The bytes; none past the end of the log.
+    /// The bytes; empty after the end of the log.
     pub bytes: &'a [u8],
 }
 

@@ -1,4 +1,4 @@
-//! Why the arm came to a held stop, and what the controller does about it now (J-69).
+//! The cause of a held stop, and the reactions of the controller that are in progress (J-69).
 use core::fmt;
 
 use crate::bits::joint_error;
@@ -38,12 +38,12 @@ codes! {
     }
 }
 
-/// Why the arm came to a held stop.
+/// Cause of a held stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StopCause {
     /// Kind of the cause.
     pub kind: StopKind,
-    /// First joint for which the cause was found, from 1; 0 if the cause belongs to no particular joint.
+    /// First joint for which the cause was found, from 1; 0 if the cause does not belong to a joint.
     pub joint: u8,
     /// Value that was found, in the unit of its kind: N·m, rad, rad/s or rad/s². For [`StopKind::SpeedScale`] it is a factor.
     pub value: f32,
@@ -63,8 +63,7 @@ impl StopKind {
         }
     }
 
-    /// Returns the kind for the first joint error that stands for a limit of the path. Position errors and torques are distinguished
-    /// elsewhere.
+    /// Returns the kind for the first joint error that is a limit of the path. Position errors and torques are distinguished elsewhere.
     pub const fn of_limit(joint_error: u16) -> Self {
         if joint_error & joint_error::POSITION != 0 {
             Self::Position
@@ -125,27 +124,27 @@ impl fmt::Display for StopCause {
     }
 }
 
-/// Reactions of the controller to what it has found, and the cause of its last held stop (J-69).
+/// Reactions of the controller that are in progress, and the cause of its last held stop (J-69).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reactions {
     /// Cause of the last held stop, and the time since that stop began, ms. `None` if no held stop has occurred since the start or the last
     /// ClearOccurredErrors.
     pub stop: Option<(StopCause, u32)>,
-    /// Joints that yield or lower their loads: a bit for each.
+    /// Joints that yield or lower their loads, a bit each.
     pub yields: u8,
-    /// Joints whose encoder has jumped since their drives were configured: a bit for each (J-35).
+    /// Joints whose encoder has jumped since their drives were configured, a bit each (J-35).
     pub jumped: u8,
-    /// Rate of path time, path seconds per second.
+    /// Rate of path time, in seconds of path time per second.
     pub rate: f32,
-    /// Time for which this run has been held back (J-75), ms.
+    /// Time for which the path has been held back in this run, ms (J-75).
     pub held_back_ms: u32,
 }
 
-/// Bytes of [`Reactions`].
+/// Length of [`Reactions`].
 pub(super) const REACTIONS_LEN: usize = 24;
 
 impl Reactions {
-    /// Returns the bytes on the wire.
+    /// Returns the bytes in the wire format.
     pub(super) fn emit(&self) -> [u8; REACTIONS_LEN] {
         let (cause, ms) = self.stop.unwrap_or_default();
         let kind = if self.stop.is_some() { cause.kind as u8 } else { 0 };
@@ -159,7 +158,7 @@ impl Reactions {
         b
     }
 
-    /// Parses the reactions from the wire. If this version does not know the kind, `stop` is `None`.
+    /// Parses the reactions from the wire format. If this version does not know the kind, `stop` is `None`.
     pub(super) fn parse(b: &[u8; REACTIONS_LEN]) -> Self {
         let word = |at: usize| {
             let bytes = b.get(at..).and_then(|bytes| bytes.first_chunk());

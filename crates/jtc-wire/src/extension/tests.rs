@@ -47,7 +47,7 @@ fn j67_an_info_of_before_has_no_program() {
     assert_eq!(Info::parse(&body), Some(info));
     let before = Info { program: None, ..info };
     assert_eq!(Info::parse(&before.emit()), Some(before));
-    // An older device sends 136 bytes. A body that ends within the new bytes also has no program.
+    // An older device sends 136 bytes. A body that ends within the new bytes does not contain a program either.
     for end in INFO_LEN..144 {
         assert_eq!(Info::parse(&body[..end]), Some(before), "{end}");
     }
@@ -71,7 +71,7 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
         shown.contains("last held stop 1.2 s ago: joint 2 was pushed: the controller held 61.5 N·m"),
         "{shown}"
     );
-    // A device that does not report it, and one that stopped for a cause that is not known here.
+    // One device does not report the reactions. Another one stopped for a cause that this version does not know.
     for end in INFO_LEN..INFO_WRITTEN {
         assert_eq!(Info::parse(&body[..end]).unwrap().reactions, None, "{end}");
     }
@@ -81,7 +81,7 @@ fn j69_an_info_has_the_cause_of_a_held_stop_where_the_device_reports_it() {
     assert_eq!(Info::parse(&later).unwrap().reactions, Some(Reactions { stop: None, ..reactions }));
 }
 
-/// Every cause says its joint or what happened, with value and limit in their unit.
+/// The text of every cause contains the joint or the event, and value and limit with their unit.
 #[test]
 fn j69_every_cause_has_its_words() {
     for kind in StopKind::ALL {
@@ -136,7 +136,7 @@ fn j53_values_travel_whole() {
     assert_eq!(short, Err(EncodeError::BufferTooShort { needed: 16, given: 15 }));
 }
 
-/// Worked bytes of the page on the protocol.
+/// The bytes are those of the examples on the protocol page.
 #[test]
 fn j50_requests_are_these_bytes() {
     assert_eq!(fixed::GET_INFO[..4], [0x9B, 0x40, 0, 6]);
@@ -151,7 +151,7 @@ fn j50_requests_are_these_bytes() {
     assert_eq!(value.emit(), [3, 6, 0xBF, 0xF8, 0, 0, 0, 0, 0, 0]);
 }
 
-/// Worked bytes of the page on the protocol.
+/// The bytes are those of the examples on the protocol page.
 #[test]
 fn j56_a_page_of_the_log_is_these_bytes() {
     let page = LogPage {
@@ -171,7 +171,7 @@ fn j56_a_page_of_the_log_is_these_bytes() {
     ];
     assert_eq!(out[..n - 2], bytes);
     assert_eq!(Answer::parse(FrameRef::new_checked(&out[..n]).unwrap()), Some(Answer::Log(page)));
-    // The longest page is within what J-56 allows.
+    // J-56 limits the length of a page.
     let full = LogPage { bytes: &[7; LOG_PAGE], ..page };
     assert!(Answer::Log(full).emit(&mut out).unwrap() <= 256);
 }
@@ -208,7 +208,7 @@ fn j54_an_image_is_read_whole_or_not_at_all() {
         assert_eq!(read.settings.len(), usize::from(settings));
         assert!(bytes.len() <= IMAGE_MAX);
         assert_eq!(ArmImage::parse(&bytes[..bytes.len() - 1]), None);
-        // The name decides nothing.
+        // The name does not change the hash.
         let hash = Hash::of_image(&bytes);
         let at = bytes.len() - 32;
         bytes[at] = b'x';
@@ -232,7 +232,8 @@ proptest! {
         if let Some(frame) = FrameRef::new_checked(&bytes) {
             if let Some(answer) = Answer::parse(frame) {
                 let mut out = [0; ANSWER_MAX];
-                // What it reads it writes again, but for what a later version may have added to an Info.
+                // An answer that can be parsed is encoded to the same bytes again, except for bytes that a later version may have added to
+                // an Info.
                 if let Ok(n) = answer.emit(&mut out) && !matches!(answer, Answer::Info(_)) {
                     prop_assert_eq!(&out[..n], &bytes[..]);
                 }

@@ -1,4 +1,4 @@
-//! A second stream parser, slow and with the whole stream at hand, so that a reader can see that it is right.
+//! A second stream parser. It is slow and sees the whole stream at once, so that its correctness is easy to verify.
 use std::vec::Vec;
 
 use crate::{FrameRef, FrameStatus, Response};
@@ -6,18 +6,19 @@ use crate::{FrameRef, FrameStatus, Response};
 /// An event of the stream.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// Bytes of a good frame.
+    /// Bytes of a valid frame.
     Frame(Vec<u8>),
     /// A run of other bytes.
     Bad(Response),
 }
 
-/// Returns the events of a stream; `regions` are its parts between gaps, `capacity` the longest frame that can be held.
+/// Returns the events of a stream. `regions`: the parts of the stream between gaps; `capacity`: length of the longest frame that fits into
+/// the buffer.
 pub fn events(regions: &[Vec<u8>], capacity: usize) -> Vec<Event> {
     placed_events(regions, capacity).into_iter().map(|(_, event)| event).collect()
 }
 
-/// Like `events`, with the position in the stream of the first byte of each event.
+/// Like `events`, with the position of the first byte of each event in the stream.
 pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, Event)> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -28,7 +29,7 @@ pub(super) fn placed_events(regions: &[Vec<u8>], capacity: usize) -> Vec<(u64, E
     all
 }
 
-/// Returns the positions in the stream at which a Stop or a Pause ends, also inside other frames.
+/// Returns the positions in the stream at which a Stop or a Pause ends, including those inside other frames.
 pub(super) fn urgent_ends(regions: &[Vec<u8>]) -> Vec<u64> {
     let mut all = Vec::new();
     let mut begin = 0;
@@ -61,7 +62,7 @@ fn of_region(region: &[u8], capacity: usize) -> Vec<(usize, Event)> {
     found
 }
 
-/// Returns the length of the good frame at the front.
+/// Returns the length of the valid frame at the front.
 fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     let n = usize::from(u16::from_be_bytes([*bytes.get(2)?, *bytes.get(3)?]));
     let frame = FrameRef::new_checked(bytes.get(..n)?)?;
@@ -69,7 +70,7 @@ fn good_frame(bytes: &[u8], capacity: usize) -> Option<usize> {
     (!of_device && n <= capacity).then_some(n)
 }
 
-/// Returns the record of bytes that do not begin with a good frame and end at a gap.
+/// Returns the record of bytes that do not begin with a valid frame and end at a gap.
 fn judge(bytes: &[u8], capacity: usize) -> Response {
     let record = |kind, status, length: usize| Response::bad(kind, status, length as u16);
     if bytes[0] != 0x9B {

@@ -1,11 +1,11 @@
-//! Streams of statuses of all layouts, broken ones and noise.
+//! Streams of statuses of all layouts, damaged statuses and noise.
 use std::format;
 use std::vec::Vec;
 
 use super::sealed;
 use crate::{Answer, FrameRef, FrameType, Status, StatusReceiver};
 
-/// Returns the statuses of a whole stream, each at the first position at which one begins, and the number of bytes between them.
+/// Returns the statuses of a whole stream, each at the first position at which a status begins, and the number of bytes between them.
 fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     let (mut found, mut skipped, mut at) = (Vec::new(), 0, 0);
     while at < stream.len() {
@@ -32,7 +32,8 @@ fn reference(stream: &[u8]) -> (Vec<Status>, u64) {
     (found, skipped)
 }
 
-/// Runs a script: the first byte is the length of the pieces, then steps follow: statuses made of some bytes, broken statuses, noise.
+/// Runs a script. The first byte is the length of the pieces; the steps follow: statuses generated from some bytes, damaged statuses, and
+/// noise.
 pub fn status_stream(data: &[u8]) {
     let Some((piece, mut rest)) = data.split_first() else { return };
     let mut stream = Vec::new();
@@ -58,7 +59,7 @@ pub fn status_stream(data: &[u8]) {
             _ => stream.extend(bytes),
         }
     }
-    // These bytes let the receiver decide a candidate at the end.
+    // With these bytes the receiver can decide about a candidate at the end.
     stream.extend([0; 256]);
 
     let mut receiver = StatusReceiver::new();

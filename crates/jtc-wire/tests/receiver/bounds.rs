@@ -1,9 +1,9 @@
-//! The device's parser at its bounds: nothing pushed, a full buffer, the work of a call.
+//! The device's parser at its limits: no bytes, a full buffer, and the work of a call.
 use jtc_wire::{FRAME_MAX, FrameStatus, HEADER, LinkEvent, Receiver, fixed};
 
 use super::{INTER_BYTE_TIMEOUT_US, ON, receiver};
 
-/// Time passes by itself: a call without bytes does not keep half a frame alive.
+/// A call without bytes does not extend the life of half a frame: its time runs on.
 #[test]
 fn j03_no_bytes_end_no_silence() {
     let mut receiver = Receiver::new([0; 64], INTER_BYTE_TIMEOUT_US);

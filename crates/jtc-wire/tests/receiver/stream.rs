@@ -1,4 +1,4 @@
-//! The stream parser of the device, story by story.
+//! Tests of the device's stream parser, each of which is a sequence of bytes, silences and events.
 use jtc_wire::{
     Command, DataStatus, FRAME_MAX, FrameRef, FrameStatus, FrameType, HEADER, KNOWN_US, LinkEvent, Receiver,
     crc16, fixed,
@@ -6,7 +6,7 @@ use jtc_wire::{
 
 use super::{ON, receiver, segment};
 
-/// An event, short enough to write down.
+/// An event in a short form.
 #[derive(Debug, PartialEq)]
 enum Received {
     Good(FrameType, usize),
@@ -119,7 +119,7 @@ fn j05_frame_type() {
     }
 }
 
-/// Also D16 of the old device: a length that the type cannot have is never executed, even if the CRC is right.
+/// The same as D16 of the old device: a frame whose length its type cannot have is never executed, even if the CRC is right.
 #[test]
 fn j05_length_of_another_type() {
     let mut line = Line::new();
@@ -157,7 +157,7 @@ fn j05_gap() {
     assert_eq!(line.silence(4999), []);
     assert_eq!(line.silence(1), [Bad(4, DiscontinuousFrame, 20)]);
     assert_eq!(line.send(&ON), [GOOD_ON]);
-    // Counted from the last byte, not from the first or from the last frame.
+    // The silence is measured from the last byte, not from the first byte or the last frame.
     for piece in frame.chunks(100) {
         line.silence(4800);
         line.send(piece);
@@ -168,7 +168,7 @@ fn j05_gap() {
     assert_eq!(line.silence(5000), [Noise(DiscontinuousFrame, 1)]);
 }
 
-/// The bytes after a gap may come before the next call of `poll`.
+/// The bytes after a gap may arrive before the next call of `poll`.
 #[test]
 fn j05_gap_seen_with_the_next_bytes() {
     for (us, expected) in
@@ -194,7 +194,7 @@ fn j07_glitches() {
 #[test]
 fn j03_a_false_header_costs_no_frame() {
     let mut line = Line::new();
-    // The header announces 59,990 bytes and takes the bytes that follow, until a gap.
+    // The header announces 59,990 bytes. The bytes that follow are taken as its body, until a gap.
     assert_eq!(line.send(&[HEADER, 0x04, 0xEA, 0x56]), []);
     assert_eq!(line.send(&ON), []);
     assert_eq!(line.send(&fixed::STOP), []);
@@ -212,7 +212,7 @@ fn j03_a_false_header_that_fills_up_costs_no_frame() {
     assert!(received[1..].iter().all(|h| *h == GOOD_ON));
 }
 
-/// A frame with a lost byte, followed by the whole frame without a gap.
+/// A frame with a lost byte is followed by the complete frame without a gap.
 #[test]
 fn j03_a_lost_byte_costs_only_its_frame() {
     let frame = segment(10);
@@ -250,7 +250,7 @@ fn j06_oddities_of_existing_hosts() {
     assert_eq!(command, Ok(Command::FrictionPolynomialUseDefault));
 }
 
-/// A line is plain 2 s after an extension request, counted to the first byte of a frame of any length.
+/// A line becomes plain 2 s after an extension request. The time of a frame is that of its first byte, whatever its length is.
 #[test]
 fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame() {
     // Returns for each complete frame whether the line was plain.
@@ -276,7 +276,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         assert_eq!(plain(&mut line, &fixed::STOP), [is_plain], "{after_us} \u{b5}s");
-        // The first byte decides: a frame of 4.7 s at 115 200 Bd ends far later.
+        // The first byte decides. A frame of 4.7 s at 115 200 Bd ends much later.
         assert_eq!(plain(&mut line, &fixed::GET_INFO), [false]);
         line.now += after_us;
         let long = segment(1_500);
@@ -289,7 +289,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
             .collect();
         assert_eq!(all, [after_us + 4_000 > KNOWN_US]);
     }
-    // Requests that are damaged, cut or only look like one show nothing; others do.
+    // Requests that are damaged, cut off or only look like one have no effect; valid requests do.
     for (bytes, shows) in [
         (&fixed::GET_INFO[..], true),
         (&fixed::DISABLE, true),
@@ -305,7 +305,7 @@ fn j51_a_line_is_plain_where_no_extension_request_came_in_the_2_s_before_a_frame
         line.now += 10_000;
         assert_eq!(plain(&mut line, &fixed::STOP), [!shows], "{bytes:x?}");
     }
-    // After noise, and after other frames in the same piece.
+    // The same after noise, and after other frames in the same piece.
     let mut line = Line::new();
     let bytes =
         [&[7, 7, 0x9B][..], &fixed::STOP, &fixed::GET_INFO, &fixed::STOP, &segment(500), &ON].concat();

@@ -1,4 +1,4 @@
-//! Frames that nodes send: [`Answer`].
+//! Frames that nodes send: see [`Answer`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE, from_i16, from_i32, to_i16, to_i32};
@@ -6,11 +6,11 @@ use crate::{GRIPPER, NODES, NodeState, id};
 
 /// Positions in the payloads of answers to Move.
 mod field {
-    /// i32.
+    /// Position, i32.
     pub const POSITION: usize = 0;
-    /// i16.
+    /// Velocity, i16.
     pub const VELOCITY: usize = 4;
-    /// i16.
+    /// Torque, i16.
     pub const TORQUE: usize = 6;
     pub const BEARING_TEMPERATURE: usize = 8;
     pub const FSM: usize = 9;
@@ -18,7 +18,7 @@ mod field {
     pub const MC_OCCURRED: usize = 11;
     pub const ERRORS: usize = 12;
     pub const WARNINGS: usize = 13;
-    /// Only with 20 bytes.
+    /// Present only in payloads of 20 bytes.
     pub const MOTOR_TEMPERATURE: usize = 16;
     pub const PUMP: usize = 0;
     pub const PRESSURE1: usize = 1;
@@ -27,41 +27,41 @@ mod field {
     pub const LONG_LEN: usize = 20;
 }
 
-/// A joint's answer to Move (0x200+n): 16 bytes, new drives 20.
+/// A joint's answer to Move (0x200+n): 16 bytes, or 20 bytes from new drives.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct JointReport {
-    /// rad.
+    /// Position, rad.
     pub position: f64,
-    /// rad/s.
+    /// Velocity, rad/s.
     pub velocity: f64,
-    /// N·m; its sign is that of the command (J-16).
+    /// Torque, N·m, with the same sign as the command (J-16).
     pub torque: f64,
     /// Bearing temperature, °C.
     pub temperature: u8,
-    /// Node FSM byte as sent.
+    /// State byte of the node as sent.
     pub state: NodeState,
-    /// Motor-control faults now.
+    /// Present motor-control faults.
     pub mc_current: u8,
-    /// Motor-control faults since acknowledged.
+    /// Motor-control faults that have occurred since the last acknowledgement.
     pub mc_occurred: u8,
     /// Error bits.
     pub errors: u8,
     /// Warning bits.
     pub warnings: u8,
-    /// Motor temperature, °C, when the answer has 20 bytes.
+    /// Motor temperature, °C, if the answer has 20 bytes.
     pub motor_temperature: Option<u8>,
 }
 
 /// The gripper's answer to Move (0x206).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct GripperReport {
-    /// Pump is running (measured).
+    /// The pump is running (measured).
     pub pump: bool,
-    /// First vacuum level reached.
+    /// The first vacuum level is reached.
     pub pressure1: bool,
-    /// Second vacuum level reached.
+    /// The second vacuum level is reached.
     pub pressure2: bool,
-    /// Node FSM byte as sent.
+    /// State byte of the node as sent.
     pub state: NodeState,
     /// Error bits.
     pub errors: u8,
@@ -72,25 +72,25 @@ pub struct GripperReport {
 /// Answer of a node. The controller uses `parse`, nodes use `emit`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
-    /// 0x200+n.
+    /// Answer of a joint to Move, 0x200+n.
     Joint {
-        /// 0..5.
+        /// Node number, 0..5.
         node: u8,
         /// Decoded report.
         report: JointReport,
     },
-    /// 0x206.
+    /// Answer of the gripper to Move, 0x206.
     Gripper(GripperReport),
-    /// 0x210+n.
+    /// Answer to ChangeFsm, 0x210+n.
     State {
-        /// 0..6.
+        /// Node number, 0..6.
         node: u8,
-        /// FSM byte at reception of the request.
+        /// State byte at the time when the request was received.
         state: NodeState,
     },
-    /// 0x2F0+n.
+    /// Answer to ChangeMode, 0x2F0+n.
     Mode {
-        /// 0..6.
+        /// Node number, 0..6.
         node: u8,
         /// The configuration was accepted.
         accepted: bool,
@@ -98,7 +98,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// Returns the node that answered, 0..6.
+    /// Returns the number of the node that answered, 0..6.
     pub const fn node(&self) -> u8 {
         match self {
             Self::Joint { node, .. } | Self::State { node, .. } | Self::Mode { node, .. } => *node,
@@ -106,7 +106,7 @@ impl Answer {
         }
     }
 
-    /// Parses an answer, on the controller. Inlined, so that a report is not stored by bytes and copied by words, which stalls a PC.
+    /// Parses an answer on the controller. Inlined, because a report that is stored by bytes and copied by words would stall a PC.
     #[inline]
     pub fn parse(frame: &Frame, scale: Scale) -> Result<Answer, FrameError> {
         let node = id::node(frame.id);
@@ -133,9 +133,9 @@ impl Answer {
         }
     }
 
-    /// Returns the frame of the answer, on a node. Joint reports have 20 bytes if they have a motor temperature, else 16. Values saturate.
+    /// Returns the frame of the answer on a node. A joint report has 20 bytes if it has a motor temperature, otherwise 16. Values saturate.
     ///
-    /// A node number that does not exist is sent as 15, which the controller ignores.
+    /// A node number that does not exist is sent as 15, and the controller ignores it.
     pub fn emit(&self, scale: Scale) -> Frame {
         match self {
             Self::Joint { node, report } => emit_joint(*node, report, scale),
@@ -172,7 +172,7 @@ fn joint(frame: &Frame, scale: Scale) -> JointReport {
 }
 
 fn emit_joint(node: u8, report: &JointReport, scale: Scale) -> Frame {
-    // Number 6 is the gripper: a joint that claims this number must not be taken for the gripper.
+    // Number 6 is the gripper. A joint with this number must not be taken for the gripper.
     let node = if usize::from(node) == GRIPPER { u8::MAX } else { node };
     let id = id::answer(id::MOVE, node);
     let mut frame = match report.motor_temperature {

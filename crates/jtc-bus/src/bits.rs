@@ -1,8 +1,8 @@
-//! Bits of words: each word is one table of bit, name, text and meaning.
+//! Bits of words. Each word is a table with bit, name, text and meaning.
 
-/// Declares words of bits. A row of a word is the meaning (documentation), the name of the mask, the bit and its text.
+/// Declares words of bits. A row of a word has the meaning (as documentation), the name of the mask, the bit and its text.
 ///
-/// Each word is a module with a mask for each bit and the texts in `NAMES`.
+/// Each word becomes a module with a mask for each bit, and with the texts in `NAMES`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! bit_words {

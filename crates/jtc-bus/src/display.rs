@@ -1,11 +1,11 @@
-//! Frames in words.
+//! Text of frames.
 
 use core::fmt::{Display, Formatter, Result};
 
 use crate::{Answer, Bits, Frame, GRIPPER, GripperReport, Joint, JointReport, Request, Scale, Target};
 use crate::{config, error, id, motor_control, warning};
 
-/// A decoded frame of the bus. A frame that is not understood is shown with the reason and its bytes.
+/// A decoded frame of the bus as text. A frame that cannot be decoded is shown with the reason and its bytes.
 ///
 /// ```
 /// use jtc_bus::{Decoded, Request, Scale};
@@ -16,7 +16,7 @@ use crate::{config, error, id, motor_control, warning};
 pub struct Decoded<'a> {
     /// The frame.
     pub frame: &'a Frame,
-    /// Scale of its velocities.
+    /// Scale of the velocities in the frame.
     pub scale: Scale,
 }
 

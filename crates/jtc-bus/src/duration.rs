@@ -6,39 +6,39 @@ use crate::timing::{DATA_BIT_RATE, NOMINAL_BIT_RATE};
 const NOMINAL_NS: u32 = 1_000_000_000 / NOMINAL_BIT_RATE;
 const DATA_NS: u32 = 1_000_000_000 / DATA_BIT_RATE;
 
-/// Acknowledge, its delimiter, end of frame and intermission: nominal bits after the data phase.
+/// Nominal bits after the data phase: acknowledgement, its delimiter, end of frame and intermission.
 const TAIL_BITS: u32 = 1 + 1 + 7 + 3;
 /// Bits of the stuff count with its parity, sent before the checksum.
 const STUFF_COUNT_BITS: u32 = 4;
-/// The delimiter after the checksum. The bit rate changes within this bit, and within the bit at which the rate rises. Both change at the
-/// same share of the bit, so one of them counts as a nominal bit and the other as a data bit.
+/// The delimiter after the checksum. The bit rate changes within this bit, and also within the bit at which the rate rises. Both changes
+/// are at the same share of the bit, so one of the two bits is counted as a nominal bit and the other as a data bit.
 const CRC_DELIMITER_BITS: u32 = 1;
 
-/// Returns the nanoseconds from the start of the frame until the next may start (intermission included), with the rates of
-/// [`timing`](crate::timing).
+/// Returns the time from the start of the frame until the next frame may start, in ns, at the rates in [`timing`](crate::timing). It
+/// includes the intermission.
 ///
-/// The result is exact: it has the stuff bits of this payload. Repetitions and error frames are not included.
+/// The result is exact: it includes the stuff bits of this payload. It does not include repetitions and error frames.
 pub fn duration_ns(frame: &Frame) -> u32 {
     let mut stuffer = Stuffer::default();
-    // Start, identifier, RRS, IDE, FDF, reserved, BRS.
+    // Bits before the data phase: start, identifier, RRS, IDE, FDF, reserved, BRS.
     stuffer.push(0, 1);
     stuffer.push(u32::from(frame.id), 11);
     stuffer.push(0b00101, 5);
     let nominal = stuffer.bits + TAIL_BITS;
     let before = stuffer.bits;
-    // ESI and length code.
+    // Data phase: ESI and length code.
     stuffer.push(u32::from(frame.dlc()), 5);
     for byte in frame.data() {
         stuffer.push(u32::from(*byte), 8);
     }
     let crc_bits = STUFF_COUNT_BITS + if frame.data().len() <= 16 { 17 } else { 21 };
-    // A fixed stuff bit is sent before the stuff count and after every four bits that follow.
+    // A fixed stuff bit is sent before the stuff count and after every four of the bits that follow.
     let fixed_stuff_bits = 1 + crc_bits / 4;
     let data = stuffer.bits - before + crc_bits + fixed_stuff_bits + CRC_DELIMITER_BITS;
     nominal * NOMINAL_NS + data * DATA_NS
 }
 
-/// Counts bits as sent: five equal bits are followed by a bit of the other kind.
+/// Counts bits as they are sent: after five equal bits, a bit of the other value is sent.
 #[derive(Default)]
 struct Stuffer {
     bits: u32,
@@ -49,7 +49,7 @@ struct Stuffer {
 impl Stuffer {
     fn push(&mut self, value: u32, width: u32) {
         for at in (0..width).rev() {
-            // The stuff bit is due before the next bit. After the last bit of the payload the fixed stuff bit takes its place.
+            // The stuff bit is sent before the next bit. After the last bit of the payload it is replaced by the fixed stuff bit.
             if self.run == 5 {
                 self.bits += 1;
                 self.last = self.last.map(|bit| !bit);
@@ -72,7 +72,7 @@ mod tests {
         // 17 + 12 nominal bits; ESI, length, 8 bytes, 4 + 17 checksum bits, 6 fixed stuff bits, delimiter.
         let frame = Frame::new(0x555, &[0x55; 8]).unwrap();
         assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 64 + 21 + 6 + 1) * 200);
-        // 20 bytes have the longer checksum: 4 + 21 bits, 7 fixed stuff bits.
+        // A frame of 20 bytes has the longer checksum: 4 + 21 bits, 7 fixed stuff bits.
         let frame = Frame::new(0x555, &[0x55; 20]).unwrap();
         assert_eq!(duration_ns(&frame), 29_000 + (1 + 4 + 160 + 25 + 7 + 1) * 200);
     }

@@ -1,4 +1,4 @@
-//! A frame of the bus, and the reasons why a frame is not understood.
+//! A frame of the bus, and the reasons why a frame cannot be decoded.
 
 use crate::id;
 
@@ -9,7 +9,7 @@ pub const MAX_LEN: usize = 24;
 ///
 /// The payload has a length that CAN FD can send: 0..8, 12, 16, 20 or 24 bytes.
 ///
-/// Aligned, so that it is copied by words.
+/// The frame is aligned, so that it is copied by words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(align(4))]
 pub struct Frame {
@@ -22,11 +22,11 @@ pub struct Frame {
 /// The format of a received frame, for drivers that receive every frame of a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Format {
-    /// 29-bit identifier.
+    /// `true` for a 29-bit identifier.
     pub extended: bool,
-    /// Remote frame.
+    /// `true` for a remote frame.
     pub remote: bool,
-    /// CAN FD, else classic.
+    /// `true` for CAN FD, `false` for classic CAN.
     pub fd: bool,
 }
 
@@ -36,7 +36,8 @@ impl Format {
 }
 
 impl Frame {
-    /// Creates a frame. Returns `None` if `data` does not have a length of this bus (0..8, 12, 16, 20, 24) or `id` has more than 11 bits.
+    /// Creates a frame. Returns `None` if the length of `data` is not valid on this bus (0..8, 12, 16, 20, 24), or if `id` has more than 11
+    /// bits.
     pub const fn new(id: u16, data: &[u8]) -> Option<Self> {
         if id > 0x7FF || dlc_of(data.len()).is_none() {
             return None;
@@ -50,11 +51,11 @@ impl Frame {
         Some(frame)
     }
 
-    /// Creates a frame from one that was received on a bus which other protocols may share.
+    /// Creates a frame from a received one. Other protocols may use the same bus.
     ///
     /// # Errors
     ///
-    /// [`FrameError::WrongFormat`] for a frame of another format than this bus's, to be counted (J-15).
+    /// Returns [`FrameError::WrongFormat`] for a frame with another format than the frames of this bus. Count such frames (J-15).
     pub fn received(id: u32, format: Format, data: &[u8]) -> Result<Self, FrameError> {
         let wrong = FrameError::WrongFormat { id, len: data.len().min(255) as u8 };
         if format != Format::BUS {
@@ -64,7 +65,7 @@ impl Frame {
         Self::new(short, data).ok_or(wrong)
     }
 
-    /// Creates a frame of zeros, for the encoders of this crate. `LEN` must be a length of CAN FD.
+    /// Creates a frame of zeros, for the encoders of this crate. `LEN` must be a valid length in CAN FD.
     pub(crate) fn zeroed<const LEN: usize>(id: u16) -> Self {
         const { assert!(LEN <= MAX_LEN && dlc_of(LEN).is_some()) }
         Self { id: id & 0x7FF, len: LEN as u8, data: [0; MAX_LEN] }
@@ -77,7 +78,7 @@ impl Frame {
         }
     }
 
-    /// Returns the bytes at a position; beyond the payload they are 0, as in a node's receive buffer.
+    /// Returns the bytes at a position. Bytes after the payload are 0, as in the receive buffer of a node.
     #[inline]
     pub(crate) fn get<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
@@ -115,7 +116,7 @@ impl Frame {
         self.len
     }
 
-    /// Returns the length code of the frame, 0..12.
+    /// Returns the length code (DLC) of the frame, 0..12.
     pub fn dlc(&self) -> u8 {
         dlc_of(usize::from(self.len)).unwrap_or(0)
     }
@@ -125,8 +126,8 @@ impl Frame {
         id::node(self.id)
     }
 
-    /// Creates a frame from a length code as a CAN controller reports it. Returns `None` if the code stands for more than 24 bytes, or for
-    /// more than `data` has.
+    /// Creates a frame from a length code as a CAN controller reports it. Returns `None` if the code means more than 24 bytes, or more
+    /// bytes than `data` has.
     pub fn from_dlc(id: u16, dlc: u8, data: &[u8]) -> Option<Self> {
         Self::new(id, data.get(..len_of(dlc)?)?)
     }
@@ -140,7 +141,7 @@ impl Frame {
     }
 }
 
-/// Returns the length code of a payload, or `None` for a length that this bus does not have.
+/// Returns the length code of a payload, or `None` if the length is not valid on this bus.
 const fn dlc_of(len: usize) -> Option<u8> {
     match len {
         0..=8 => Some(len as u8),
@@ -152,7 +153,7 @@ const fn dlc_of(len: usize) -> Option<u8> {
     }
 }
 
-/// Returns the payload length of a length code, or `None` above 24 bytes.
+/// Returns the payload length for a length code, or `None` if it is above 24 bytes.
 const fn len_of(dlc: u8) -> Option<usize> {
     match dlc {
         0..=8 => Some(dlc as usize),
@@ -164,12 +165,12 @@ const fn len_of(dlc: u8) -> Option<usize> {
     }
 }
 
-/// Reason why a frame was not understood. Such a frame is counted and ignored (J-15).
+/// Reason why a frame cannot be decoded. Such a frame is counted and ignored (J-15).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// No frame of this protocol has this id.
+    /// This protocol does not use the identifier.
     UnknownId(u16),
-    /// Fewer bytes than the frame needs.
+    /// The frame is too short for its identifier.
     TooShort {
         /// Identifier.
         id: u16,
@@ -178,7 +179,7 @@ pub enum FrameError {
         /// Bytes needed.
         need: u8,
     },
-    /// A byte has a value that its frame cannot have.
+    /// A byte has a value that is not valid in its frame.
     BadValue {
         /// Identifier.
         id: u16,
@@ -187,7 +188,7 @@ pub enum FrameError {
         /// Its value.
         value: u8,
     },
-    /// Not a CAN FD data frame with an 11-bit id and at most 24 bytes.
+    /// The frame is not a CAN FD data frame with an 11-bit identifier and at most 24 bytes.
     WrongFormat {
         /// Identifier as received, up to 29 bits.
         id: u32,

@@ -1,8 +1,8 @@
-//! Body of the fuzz target of bus frames.
+//! Function of the fuzz target for bus frames.
 
 use crate::{Answer, Decoded, Frame, POSITION_FULL_SCALE, Request, Scale, duration_ns};
 
-/// Two bytes of identifier, then the payload: parse both ways, send again, compare.
+/// Takes two bytes as the identifier and the rest as the payload. Parses the frame in both directions, encodes the result and compares.
 pub fn bus_frame(data: &[u8]) {
     let Some((id, payload)) = data.split_first_chunk::<2>() else { return };
     let id = u16::from_be_bytes(*id);

@@ -1,10 +1,10 @@
-//! Numbers of the joints: people count from 1, the bus from 0.
+//! Numbers of the joints: counted from 1 for people, from 0 on the bus.
 use core::fmt;
 
 use crate::JOINTS;
 
-/// A joint of the arm. Texts, JSON values and files count joints from 1, starting at the base. On the bus and in arrays the number is lower
-/// by one: joint 1 is node 0 and index 0. A joint prints as `joint 3`.
+/// A joint of the arm. Texts, JSON values and files count joints from 1, starting at the base. On the bus and in arrays the number is one
+/// lower: joint 1 is node 0 and index 0. A joint is printed as `joint 3`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Joint(u8);
 

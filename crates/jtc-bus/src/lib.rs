@@ -27,9 +27,9 @@ pub use request::{Request, Target};
 pub use scale::{POSITION_FULL_SCALE, Scale, TORQUE_FULL_SCALE};
 pub use state::NodeState;
 
-/// Joints on the bus, nodes 0..5.
+/// Number of joints on the bus (nodes 0..5).
 pub const JOINTS: usize = 6;
 /// Node number of the gripper.
 pub const GRIPPER: usize = 6;
-/// Joints and gripper.
+/// Number of joints plus the gripper.
 pub const NODES: usize = 7;

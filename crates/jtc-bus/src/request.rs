@@ -1,4 +1,4 @@
-//! Frames that the controller sends: [`Request`].
+//! Frames that the controller sends: see [`Request`].
 
 use crate::frame::{Frame, FrameError};
 use crate::scale::{TORQUE_FULL_SCALE, to_i16};
@@ -19,27 +19,27 @@ mod field {
     pub const MODE_LEN: usize = 16;
 }
 
-/// A state that the controller can request from a node. The controller sends no other bytes (J-16), because some drives take any other
-/// byte, such as an echo of their own state, as a command to move.
+/// A state that the controller can request from a node. The controller sends no other values (J-16), because some drives take any other
+/// value, such as their own state, as a command to move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 #[repr(u8)]
 pub enum Target {
     /// Keep the present state.
     #[default]
     NoChange = 0,
-    /// Init; from Fault this acknowledges the faults.
+    /// Init. In Fault this also acknowledges the faults.
     Init = NodeState::INIT.code(),
-    /// Ready to operate, motor off.
+    /// Ready to operate, with the motor off.
     Ready = NodeState::READY.code(),
     /// Operation enabled.
     Enable = NodeState::ENABLED.code(),
 }
 
 impl Target {
-    /// Returns the target of a byte on the wire.
+    /// Returns the target for a byte in the wire format.
     pub const fn from_byte(byte: u8) -> Option<Self> {
         match NodeState::new(byte) {
-            // Start cannot be requested: its byte requests no change.
+            // Start cannot be requested. Its byte means that no change is requested.
             NodeState::START => Some(Self::NoChange),
             NodeState::INIT => Some(Self::Init),
             NodeState::READY => Some(Self::Ready),
@@ -52,40 +52,40 @@ impl Target {
 /// Request of the controller. The controller uses `emit`, nodes use `parse`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// 0x000: torque per joint (N·m, saturated when encoded, J-13; NaN is encoded as 0) and the pump.
+    /// 0x000: torque of each joint and the pump. A torque saturates when it is encoded (J-13); NaN is encoded as 0.
     Move {
-        /// N·m at the joint.
+        /// Torque at the joint, N·m.
         torque: [f64; JOINTS],
-        /// Vacuum pump on.
+        /// `true`: vacuum pump on.
         pump: bool,
     },
-    /// 0x010: target per node (J-16).
+    /// 0x010: requested state of each node (J-16).
     ChangeFsm {
         /// Requested state of each node.
         target: [Target; NODES],
     },
-    /// 0x0F0: mode (1 torque) and configuration bits per joint, configuration bits of the gripper.
+    /// 0x0F0: mode (1: torque) and configuration bits of each joint, configuration bits of the gripper.
     ChangeMode {
-        /// 0 none, 1 torque, 2 speed.
+        /// Mode: 0 none, 1 torque, 2 speed.
         mode: [u8; JOINTS],
-        /// Configuration bits per joint, see [`config`](crate::config).
+        /// Configuration bits of each joint, see [`config`](crate::config).
         config: [u8; JOINTS],
         /// Configuration bits of the gripper.
         gripper: u8,
     },
-    /// 0x0A0.
+    /// 0x0A0: reset of every node.
     ResetAll,
-    /// 0x1A0 + node, 0..6. A node that does not exist is sent as 15, which no node has.
+    /// 0x1A0 + node, 0..6: reset of one node. A node that does not exist is sent as 15, which is not used by any node.
     Reset(u8),
 }
 
 impl Request {
-    /// Returns a Move with zero torques and the given state of the pump: the first frame after an error (J-12).
+    /// Returns a Move with zero torques and this state of the pump, which is the first frame after an error (J-12).
     pub const fn zero_torque(pump: bool) -> Self {
         Self::Move { torque: [0.0; JOINTS], pump }
     }
 
-    /// Returns the frame on the bus.
+    /// Returns the frame of the request.
     pub fn emit(&self) -> Frame {
         match self {
             Self::Move { torque, pump } => {
@@ -114,13 +114,13 @@ impl Request {
         }
     }
 
-    /// Parses a request, on a node or in a bus monitor.
+    /// Parses a request on a node or in a bus monitor.
     pub fn parse(frame: &Frame) -> Result<Request, FrameError> {
         match frame.id {
             id::MOVE => {
                 frame.need(field::MOVE_LEN as u8)?;
                 let torque = core::array::from_fn(|joint| {
-                    // Computed in the same order as in the drives. The tick of the controller does not parse requests.
+                    // The order of the operations is the same as in the drives. The tick of the controller does not parse requests.
                     let raw = i16::from_be_bytes(frame.get(field::TORQUE + 2 * joint));
                     f64::from(raw) * TORQUE_FULL_SCALE / f64::from(i16::MAX)
                 });

@@ -1,22 +1,22 @@
-//! Scaling between physical values and the drives' integers; every encoder saturates (J-13).
+//! Scaling between physical values and the integers of the drives. Every encoder saturates (J-13).
 
-/// rad at the largest 32-bit position.
+/// Position at the largest 32-bit value, rad.
 #[expect(clippy::approx_constant, reason = "the drives' number, which is not π")]
 pub const POSITION_FULL_SCALE: f64 = 3.141592;
-/// N·m at the largest 16-bit torque.
+/// Torque at the largest 16-bit value, N·m.
 pub const TORQUE_FULL_SCALE: f64 = 360.0;
 
-/// Full scales of the drives' numbers (J-11). Position (3.141592) and torque (360) are protocol constants.
+/// Full scales of the values of the drives (J-11). The scales of position (3.141592) and torque (360) are constants of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
-    /// rad/s at 32767: 2.0, on older drives 6.283185.
+    /// Velocity at 32767, rad/s: 2.0, or 6.283185 on older drives.
     pub velocity: f64,
 }
 
 impl Scale {
-    /// Current drives.
+    /// Scale of current drives.
     pub const CURRENT: Self = Self { velocity: 2.0 };
-    /// Older drives.
+    /// Scale of older drives.
     #[expect(clippy::approx_constant, reason = "the drives' number, which is not 2π")]
     pub const OLDER: Self = Self { velocity: 6.283185 };
 }
@@ -38,8 +38,8 @@ pub(crate) fn to_i32(value: f64, full_scale: f64) -> [u8; 4] {
     (nearest(value, full_scale, f64::from(i32::MAX)) as i32).to_be_bytes()
 }
 
-/// The quotient is computed first, because it is the same for every answer of a tick. On the board a division takes as long as seven
-/// multiplications.
+/// Returns the value of a 16-bit number. The quotient is computed first, because it is the same for every answer of a tick. On the board a
+/// division takes as long as seven multiplications.
 #[inline]
 pub(crate) fn from_i16(bytes: [u8; 2], full_scale: f64) -> f64 {
     f64::from(i16::from_be_bytes(bytes)) * (full_scale / f64::from(i16::MAX))
@@ -50,8 +50,8 @@ pub(crate) fn from_i32(bytes: [u8; 4], full_scale: f64) -> f64 {
     f64::from(i32::from_be_bytes(bytes)) * (full_scale / f64::from(i32::MAX))
 }
 
-/// Returns `value` in units of the last bit, moved by half a unit so that the cast (which truncates and makes NaN 0) rounds. An invalid
-/// full scale (0, NaN) gives a saturated value or 0, never a value of the other sign.
+/// Returns `value` in units of the last bit, moved by half a unit away from zero. So the cast rounds, although it truncates; it turns NaN
+/// into 0. An invalid full scale (0, NaN) gives a saturated value or 0, never a value with the opposite sign.
 fn nearest(value: f64, full_scale: f64, max: f64) -> f64 {
     let raw = value * (max / full_scale.abs());
     (raw + 0.5_f64.copysign(raw)).clamp(-max, max)
@@ -88,7 +88,7 @@ mod tests {
             assert_eq!((raw, long), (0, 0));
             return;
         }
-        // Never another sign; a value below half a unit may be 0.
+        // The sign never changes, but a value below half a unit may become 0.
         assert!(f64::from(raw) * value >= 0.0, "{value} became {raw}");
         assert!(f64::from(long) * value >= 0.0, "{value} became {long}");
         if value.abs() >= TORQUE_FULL_SCALE {

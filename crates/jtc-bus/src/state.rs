@@ -1,7 +1,7 @@
 //! States that nodes report.
 use core::fmt;
 
-/// State of a node, one byte. Generations of drives have different states.
+/// State of a node, one byte. The states depend on the generation of the drive.
 ///
 /// ```
 /// use jtc_bus::NodeState;
@@ -16,19 +16,19 @@ pub struct NodeState(u8);
 impl NodeState {
     /// Start.
     pub const START: Self = Self(0);
-    /// Init: motor off, waits for configuration.
+    /// Init: motor off, waiting for its configuration.
     pub const INIT: Self = Self(1);
     /// Ready to operate: motor off, configured.
     pub const READY: Self = Self(2);
     /// Operation enabled: follows its command.
     pub const ENABLED: Self = Self(3);
-    /// From Start to Init.
+    /// Transition from Start to Init.
     pub const START_TO_INIT: Self = Self(10);
-    /// From Init to ready.
+    /// Transition from Init to ready.
     pub const INIT_TO_READY: Self = Self(11);
-    /// From ready to enabled: the motor may be aligned on the way.
+    /// Transition from ready to enabled. The drive may align the motor in this state.
     pub const READY_TO_ENABLED: Self = Self(12);
-    /// From enabled to ready.
+    /// Transition from enabled to ready.
     pub const ENABLED_TO_READY: Self = Self(13);
     /// Fault reaction active.
     pub const FAULT_REACTION: Self = Self(254);
@@ -45,18 +45,18 @@ impl NodeState {
         self.0
     }
 
-    /// Returns the name as in manuals and in a status.
+    /// Returns the name that is used in manuals and in a status.
     pub const fn name(self) -> &'static str {
         self.texts().0
     }
 
-    /// Returns a description of the node's activity, for a log of the bus.
+    /// Returns a description of the node's activity, for a bus log.
     pub const fn description(self) -> &'static str {
         self.texts().1
     }
 
-    /// Returns name and description. Generations of drives disagree about 14, 15 and 16, so these mean only that the node is between two
-    /// states.
+    /// Returns name and description. The meaning of 14, 15 and 16 depends on the generation of the drive, so the text says only that the
+    /// node is between two states.
     const fn texts(self) -> (&'static str, &'static str) {
         match self {
             Self::START => ("Start", "start"),
@@ -77,17 +77,17 @@ impl NodeState {
         }
     }
 
-    /// Returns true in Start, in Init and between them.
+    /// Returns true in Start, in Init, and in the transition between them.
     pub const fn is_starting(self) -> bool {
         matches!(self, Self::START | Self::INIT | Self::START_TO_INIT)
     }
 
-    /// Returns true between two states of the node (10..16).
+    /// Returns true in a transition between two states (10..16).
     pub const fn is_transition(self) -> bool {
         matches!(self.0, 10..=16)
     }
 
-    /// Returns true in Fault and in the fault reaction.
+    /// Returns true in Fault and in its fault reaction.
     pub const fn is_fault(self) -> bool {
         matches!(self, Self::FAULT_REACTION | Self::FAULT)
     }

@@ -1,6 +1,6 @@
 //! Bit timing of the bus (J-10), in the terms of a Bosch M_CAN (the FDCAN of the STM32).
 //!
-//! Both phases have 17 time quanta with the sample point after the 13th, from a kernel clock of 85 MHz.
+//! Both phases have 17 time quanta with the sample point after the 13th. The kernel clock is 85 MHz.
 
 /// Kernel clock of the CAN controller, Hz.
 pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
@@ -8,13 +8,13 @@ pub const KERNEL_CLOCK_HZ: u32 = 85_000_000;
 /// Division of a bit into periods of the kernel clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BitTiming {
-    /// Kernel clock periods in a time quantum.
+    /// Kernel clock periods per time quantum.
     pub prescaler: u16,
-    /// Quanta from the end of the synchronisation quantum to the sample point (propagation included).
+    /// Quanta from the end of the synchronisation quantum to the sample point, including propagation.
     pub segment1: u8,
     /// Quanta after the sample point.
     pub segment2: u8,
-    /// Most quanta that a resynchronisation may move.
+    /// Highest number of quanta by which a resynchronisation may shift the bit.
     pub jump_width: u8,
 }
 
@@ -24,7 +24,7 @@ impl BitTiming {
         1 + self.segment1 as u32 + self.segment2 as u32
     }
 
-    /// Returns the bit rate at a kernel clock in Hz, bit/s.
+    /// Returns the bit rate in bit/s for a kernel clock in Hz.
     pub const fn bit_rate(&self, clock_hz: u32) -> u32 {
         clock_hz / (self.prescaler as u32 * self.quanta())
     }
@@ -34,7 +34,7 @@ impl BitTiming {
         1 + self.segment1 as u32
     }
 
-    /// Returns the timing for a bit rate with 17 quanta, sample point 13/17.
+    /// Returns the timing for a bit rate with 17 quanta and the sample point at 13/17.
     const fn at(bit_rate: u32) -> Self {
         let prescaler = KERNEL_CLOCK_HZ / (17 * bit_rate);
         assert!(prescaler * 17 * bit_rate == KERNEL_CLOCK_HZ, "the clock is no multiple of this bit rate");
@@ -43,24 +43,24 @@ impl BitTiming {
     }
 }
 
-/// bit/s outside the data phase.
+/// Bit rate outside the data phase, bit/s.
 pub const NOMINAL_BIT_RATE: u32 = 1_000_000;
-/// bit/s in the data phase.
+/// Bit rate in the data phase, bit/s.
 pub const DATA_BIT_RATE: u32 = 5_000_000;
 /// Timing outside the data phase.
 pub const NOMINAL: BitTiming = BitTiming::at(NOMINAL_BIT_RATE);
 /// Timing in the data phase.
 pub const DATA: BitTiming = BitTiming::at(DATA_BIT_RATE);
-/// Transmitter delay compensation: distance from the measured loop delay to the secondary sample point, in
-/// kernel clock periods. With this offset the secondary sample point is at the sample point of every receiver.
+/// Transmitter delay compensation: distance from the measured loop delay to the secondary sample point, in kernel clock periods. With this
+/// offset the secondary sample point is at the sample point of the receivers.
 pub const TDC_OFFSET: u8 = {
-    // The hardware compensates with prescalers 1 and 2 only.
+    // The hardware supports compensation only with prescalers 1 and 2.
     assert!(DATA.prescaler <= 2);
     let offset = DATA.prescaler as u32 * DATA.sample_point();
     assert!(offset <= 127);
     offset as u8
 };
-/// Window of the filter of the measured delay: 0, off.
+/// Window of the filter for the measured delay; 0 switches the filter off.
 pub const TDC_FILTER: u8 = 0;
 
 #[cfg(test)]

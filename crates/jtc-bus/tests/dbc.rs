@@ -1,4 +1,4 @@
-//! `joint-bus.dbc` agrees with the code: the values that it decodes from frames are those encoded by the code.
+//! Compares `joint-bus.dbc` with the code: the file must decode the values that the code has encoded.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 static DBC: LazyLock<Dbc> =
     LazyLock::new(|| Dbc::try_from(include_str!("../joint-bus.dbc")).expect("the file is a DBC"));
 
-/// Bits of a signal, highest first. Big-endian signals begin at their highest bit and continue with bit 7 of the next byte.
+/// Returns the bits of a signal, highest first. A big-endian signal begins at its highest bit and continues with bit 7 of the next byte.
 fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
     assert_eq!(signal.byte_order, ByteOrder::BigEndian);
     let (byte, bit) = (signal.start_bit as usize / 8, signal.start_bit as usize % 8);
@@ -24,7 +24,7 @@ fn bits_of(signal: &Signal) -> impl Iterator<Item = usize> {
 fn decoded(frame: &Frame) -> BTreeMap<String, f64> {
     let id = MessageId::Standard(frame.id);
     let message = DBC.messages.iter().find(|message| message.id == id).expect("the file has this frame");
-    // The short form of a report ends before the last signals.
+    // The short form of a report ends before its last signals.
     let held = |signal: &&Signal| (signal.start_bit / 8) < frame.data().len() as u64;
     message.signals.iter().filter(held).map(|signal| (signal.name.clone(), value(signal, frame))).collect()
 }
@@ -40,7 +40,7 @@ fn value(signal: &Signal, frame: &Frame) -> f64 {
     raw as f64 * signal.factor + signal.offset
 }
 
-/// Inserts a byte of flags under the names of the file.
+/// Inserts the bits of a byte under the names in the file.
 fn flags(into: &mut BTreeMap<String, f64>, prefix: &str, suffix: &str, byte: u8, names: &[(&str, u8)]) {
     for (name, mask) in names {
         let set = f64::from(u8::from(byte & mask != 0));
@@ -173,7 +173,7 @@ fn j11_the_file_has_the_frames_of_this_bus_and_no_others() {
         let in_file = DBC.messages.iter().any(|message| message.id == MessageId::Standard(id));
         assert_eq!(in_file, in_code(id), "0x{id:03X}");
     }
-    // No signal overlaps another.
+    // Signals must not overlap.
     for message in &DBC.messages {
         let mut taken = vec![false; 8 * message.size as usize];
         for signal in &message.signals {
@@ -187,7 +187,7 @@ fn j11_the_file_has_the_frames_of_this_bus_and_no_others() {
 #[test]
 fn j10_every_frame_is_can_fd() {
     for message in &DBC.messages {
-        // Value 14 is standard CAN FD.
+        // Value 14 means standard CAN FD.
         let is_fd = DBC.attribute_values_message.iter().any(|attribute| {
             attribute.message_id == message.id
                 && attribute.name == "VFrameFormat"

@@ -1,4 +1,4 @@
-//! Runs the body of the fuzz target over the kept inputs, over frames of every kind, and over some random frames.
+//! Runs the function of the fuzz target on the stored inputs, on frames of every kind, and on some random frames.
 
 use jtc_bus::fuzzing::bus_frame;
 use proptest::prelude::*;
@@ -8,7 +8,7 @@ fn kept_inputs() {
     test_kit::run_kept_inputs(&[("bus_frame", bus_frame)]);
 }
 
-/// Covers the identifier of every frame of the bus, with the most different payload bytes.
+/// Tests the identifier of every frame of the bus with very different payload bytes.
 #[test]
 fn every_frame_with_extreme_payloads() {
     for id in 0..0x800_u16 {
@@ -22,7 +22,7 @@ fn every_frame_with_extreme_payloads() {
     }
 }
 
-/// A drive may report -32768, the only number below the scale.
+/// A drive may report -32768, the only number below the negative full scale.
 #[test]
 fn the_lowest_numbers() {
     bus_frame(b"\x00\x00\x80\x00\x80\x00\x80\x00\x80\x00\x80\x00\x80\x00\xff\x00\x00\x00");

@@ -1,8 +1,8 @@
-//! Answers states of an arm with results, for comparison with other implementations.
+//! Computes results for states of an arm, for comparison with other implementations.
 //!
-//! Standard input: lines as in `lines/mod.rs`. Each `state` is answered by one line of 144 numbers: inverse
-//! dynamics and gravity torque (6 each), mass matrix (36, by rows), acceleration under the torque with and
-//! without rotors (6 each), and the poses of the 7 frames (position, then rotation by rows).
+//! Standard input has lines in the format of `lines/mod.rs`. For each `state` the program prints one line of 144 numbers: inverse dynamics
+//! and gravity torque (6 each), mass matrix (36, by rows), acceleration under the torque with and without rotors (6 each), and the poses of
+//! the 7 frames (position, then rotation by rows).
 mod lines;
 
 use std::io::{BufRead, Write};

@@ -1,7 +1,7 @@
-//! Prints the cost of each call: lines of a name and nanoseconds, the minimum over many batches of calls.
+//! Prints the time of each call: lines with a name and nanoseconds, which are the minimum of many batches of calls.
 //!
-//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, with an arm and its states as lines (see `lines/mod.rs`).
-//! `references/dynamics/anchors.py --ours` makes such a file, and times this and other implementations.
+//! `cargo run --profile dist -p jtc-dynamics --example time -- FILE`, where FILE has an arm and its states as lines (see `lines/mod.rs`).
+//! `references/dynamics/anchors.py --ours` creates such a file, and measures this and other implementations.
 mod lines;
 
 use std::hint::black_box;
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     let d = dynamics.ok_or("there is no model in the file")?;
-    // Runs `$call` on every state. `black_box` makes sure that every result is computed.
+    // Runs `$call` on every state. With `black_box` every result must be computed.
     macro_rules! time {
         ($name:literal, |$state:ident| $call:expr) => {
             let least = least_ns(BATCHES, || {

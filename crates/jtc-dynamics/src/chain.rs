@@ -1,15 +1,14 @@
-//! The arm prepared for the recursions: modified Denavit-Hartenberg frames and base inertial parameters.
+//! The arm in the form that the recursions use: modified Denavit-Hartenberg frames and base inertial parameters.
 //!
-//! Neither changes a joint torque, and both leave fewer multiplications per call:
+//! Both leave the joint torques unchanged and save multiplications in each call:
 //!
-//! * **Frames** (modified Denavit-Hartenberg: Craig, Introduction to Robotics). Each constant rotation between joints is
-//!   Rz(a)·Rx(α)·Rz(b). Rz(b) is added to the joint's position and Rz(a) to the frame before, so that Rx(α)·Rz(q + offset) is
-//!   left: two plane rotations. The origin of a frame is the point of its joint axis from which the vector to the next origin is
-//!   perpendicular to the axis.
+//! * **Frames** (modified Denavit-Hartenberg: Craig, Introduction to Robotics). Each constant rotation between joints is Rz(a)·Rx(α)·Rz(b).
+//!   Rz(b) is added to the position of the joint, and Rz(a) to the frame before, so that Rx(α)·Rz(q + offset) remains: two plane rotations.
+//!   The origin of a frame is the point of its joint axis from which the vector to the next origin is perpendicular to the axis.
 //! * **Base (minimal) inertial parameters** (Gautier and Khalil, Direct calculation of minimum set of inertial parameters of serial robots,
 //!   1990). The part of a link's inertia that is symmetric about its joint axis (the mass, the first and the second moment along the axis)
-//!   moves in the same way whether it rotates with the link or not. This part is regrouped to the link before, from the wrist to the base.
-//!   Each link keeps seven parameters, and none of them is a mass.
+//!   moves in the same way whether it rotates with the link or not. This part is added to the link before, from the wrist to the base. Each
+//!   link keeps seven parameters, which do not include a mass.
 
 use crate::model::{ArmModel, JOINTS, Link, Origin, symmetric};
 use crate::payload::Payload;
@@ -18,35 +17,35 @@ use crate::rotation::{
 };
 use crate::trig::{angle, sin_cos};
 
-/// Maximum distance, rad, at which an angle of a joint origin is taken as the nearest multiple of a right angle. Models write π/2 with six
-/// digits, and the wire carries it as f32.
+/// Largest distance of an angle in a joint origin from a multiple of a right angle, rad, at which the angle is replaced by that multiple.
+/// Models write π/2 with six digits, and the wire format uses f32.
 const RIGHT_ANGLE_TOLERANCE: f64 = 2e-6;
-/// Sine or cosine of the angle between two axes that is taken as 0. Rounding leaves such values when right angles are multiplied.
+/// Sine or cosine of the angle between two axes that is treated as 0. Rounding leaves such values when right angles are multiplied.
 const ALIGNED: f64 = 1e-12;
 
-/// Direction of a joint's axis relative to that of the joint before.
+/// Direction of a joint's axis relative to the axis of the joint before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Axes {
     /// Parallel, in the same or in the opposite direction: sin α = 0.
     Parallel,
-    /// At a right angle: α = π/2, as α is never negative here.
+    /// At a right angle: α = π/2. The parameters are chosen so that α is never negative.
     Perpendicular,
     /// Any other direction, which saves no multiplication.
     Any,
 }
 
-/// Directions of the joint axes of an arm. The recursion is compiled for the shapes that most arms have, without their multiplications by 0
-/// and 1, and for any shape.
+/// Directions of the joint axes of an arm. The recursion is compiled for the shapes of most arms, without multiplications by 0 and 1, and
+/// for a general shape.
 pub(crate) trait Shape {
-    /// Directions of the axes. The first one has no meaning, because gravity is given after the first joint's Rx(α).
+    /// Directions of the axes. The first one is not used, because gravity is given after the Rx(α) of the first joint.
     const AXES: [Axes; JOINTS];
 }
 
-/// Any arm.
+/// An arm of any shape.
 pub(crate) struct AnyShape;
-/// Three parallel axes, then two at right angles: an arm whose wrist axes have no common point.
+/// Three parallel axes, followed by two at right angles: an arm whose wrist axes do not meet in one point.
 pub(crate) struct ThreeParallel;
-/// Two parallel axes, then three at right angles: an arm with a spherical wrist.
+/// Two parallel axes, followed by three at right angles: an arm with a spherical wrist.
 pub(crate) struct TwoParallel;
 
 impl Shape for AnyShape {
@@ -75,7 +74,7 @@ impl Shape for TwoParallel {
     ];
 }
 
-/// Shape of an arm, among those for which the recursion is compiled.
+/// Shapes for which the recursion is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum KnownShape {
     /// [`AnyShape`].
@@ -105,24 +104,24 @@ pub(crate) struct JointTransform {
     /// sin α, which is not negative, and cos α.
     pub sin: f64,
     pub cos: f64,
-    /// Direction of the axis, as the shape of the arm has it.
+    /// Direction of the axis in the shape of the arm.
     pub axes: Axes,
     /// Added to the joint's position, rad.
     pub offset: f64,
-    /// Origin of frame k in frame k−1, m; its z is 0 by choice of the origin of frame k−1. If the axes are parallel, its y is 0, too, by
-    /// choice of the x axis of frame k−1.
+    /// Origin of frame k in frame k−1, m. Its z is 0 because of the choice of the origin of frame k−1. If the axes are parallel, its y is
+    /// also 0, because of the choice of the x axis of frame k−1.
     pub p: [f64; 2],
 }
 
-/// The base inertial parameters of a link, in its own frame: mass, first moment along z and the integral of z² are
-/// regrouped to the link before and are zero.
+/// The base inertial parameters of a link in its own frame. Mass, first moment along z and the integral of z² are zero, because they have
+/// been added to the link before.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BaseInertialParameters {
     /// First moment of mass: integrals of x and y over the mass, kg·m.
     pub hx: f64,
     pub hy: f64,
-    /// Second moments of mass: integrals of x², y² and of the products, kg·m². Unlike moments of inertia
-    /// these enter the torque with the acceleration of each axis alone.
+    /// Second moments of mass: integrals of x² and y² and of the products, kg·m². Unlike moments of inertia, each of them contributes to
+    /// the torque only with the acceleration of its own axis.
     pub xx: f64,
     pub yy: f64,
     pub xy: f64,
@@ -130,7 +129,7 @@ pub(crate) struct BaseInertialParameters {
     pub yz: f64,
 }
 
-/// A joint frame of the model in the frame before, for kinematics.
+/// A joint frame of the model, relative to the frame before, for kinematics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
     pub rotation: Mat3,
@@ -155,7 +154,7 @@ impl Inertia {
         about_com.placed(&from_rpy(rpy), xyz)
     }
 
-    /// Returns the inertia of a payload, in the frame of the last link. `flange` is the flange in that frame.
+    /// Returns the inertia of a payload in the frame of the last link. `flange`: the flange in that frame.
     fn of_payload(payload: &Payload, flange: &Placement) -> Self {
         let about_com = Self { mass: payload.mass, h: [0.0; 3], j: symmetric(&payload.inertia) };
         about_com.placed(&about_z(0.0, 1.0), &payload.com).placed(&flange.rotation, &flange.xyz)
@@ -187,10 +186,10 @@ impl Inertia {
         }
     }
 
-    /// Returns the base inertial parameters, and the part that is symmetric about z.
+    /// Splits the inertia into the base inertial parameters and the part that is symmetric about z.
     fn split(&self) -> (BaseInertialParameters, Self) {
         let [[xx, xy, xz], [_, yy, yz], [_, _, zz]] = self.j;
-        // Integral of z², which x² + z² and y² + z² share.
+        // Integral of z², which is contained in both x² + z² and y² + z².
         let z2 = 0.5 * (xx + yy - zz);
         let [hx, hy, hz] = self.h;
         let rest = BaseInertialParameters { hx, hy, xx: yy - z2, yy: xx - z2, xy: -xy, xz: -xz, yz: -yz };
@@ -208,7 +207,7 @@ fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
 pub(crate) struct Chain {
     pub transforms: [JointTransform; JOINTS],
     pub base_parameters: [BaseInertialParameters; JOINTS],
-    /// Minus gravity, after the first joint's Rx(α), m/s²: gravity acts as an acceleration of the base upwards.
+    /// Negative gravity after the Rx(α) of the first joint, m/s². Gravity has the effect of an upward acceleration of the base.
     pub base_acceleration: [f64; 3],
     pub placements: [Placement; 7],
     /// First moments (`hx`, `hy`) of a massless arm with 1 kg at the flange, kg·m.
@@ -217,7 +216,7 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// Returns the transform of a joint, with the direction of its axis as a constant of the shape.
+    /// Returns the transform of a joint. The direction of its axis is a constant of the shape.
     #[inline(always)]
     pub fn transform<S: Shape>(&self, k: usize) -> JointTransform {
         JointTransform { axes: S::AXES[k], ..self.transforms[k] }
@@ -227,15 +226,15 @@ impl Chain {
         let placements = model.joints.map(|o| Placement { rotation: joint_rotation(&o.rpy), xyz: o.xyz });
         let none = JointTransform { sin: 0.0, cos: 1.0, axes: Axes::Any, offset: 0.0, p: [0.0; 2] };
         let mut transforms = [none; JOINTS];
-        // Frame k from the model's frame k: sine and cosine of the rotation about z, and the shift along z.
+        // Frame k relative to the model's frame k: sine and cosine of the rotation about z, and the shift along z.
         let mut z_rotations = [(0.0, 1.0); JOINTS];
         let mut z_shifts = [0.0; JOINTS];
         let mut base_acceleration = gravity.map(|g| -g);
         let mut origins = [[0.0; 3]; JOINTS];
         for k in 0..JOINTS {
             let c = &placements[k].rotation;
-            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The best one
-            // is along the vector from one axis to the other.
+            // The third column of Rz(a)·Rx(α) is (sin α sin a, −sin α cos a, cos α). If the axes are parallel, any a is valid. The
+            // direction from one axis to the other is chosen.
             let parallel = c[0][2].abs().max(c[1][2].abs()) < ALIGNED;
             let [x, y, _] = placements[k].xyz;
             let (cos_a, sin_a) = if parallel { unit(x, y) } else { unit(-c[1][2], c[0][2]) };
@@ -278,7 +277,7 @@ impl Chain {
     }
 }
 
-/// Returns the rotation of a joint origin, with exact right angles.
+/// Returns the rotation of a joint origin, in which right angles are exact.
 fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(|angle| {
         let (sin, cos) = sin_cos(angle);
@@ -292,8 +291,8 @@ fn joint_rotation(rpy: &[f64; 3]) -> Mat3 {
     }))
 }
 
-/// Returns the base inertial parameters: the inertia of the links in the frames of the chain. The part that is symmetric about a joint axis
-/// is regrouped to the link before (Gautier and Khalil 1990).
+/// Returns the base inertial parameters of links with this inertia in the frames of the chain. The part that is symmetric about a joint
+/// axis is added to the link before (Gautier and Khalil 1990).
 fn regroup(
     bodies: &[Inertia; JOINTS],
     transforms: &[JointTransform; JOINTS],

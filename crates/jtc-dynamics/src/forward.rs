@@ -1,7 +1,7 @@
-//! The mass matrix by the composite-rigid-body algorithm, and the forward dynamics by its LDLᵀ factors (Featherstone, Rigid
-//! Body Dynamics Algorithms, 2008, chapter 6: the mass matrix, and the bias torques by recursive Newton-Euler).
+//! The mass matrix by the composite-rigid-body algorithm, and the forward dynamics by its LDLᵀ factors (Featherstone, Rigid Body Dynamics
+//! Algorithms, 2008, chapter 6). The bias torques are computed by recursive Newton-Euler.
 
-// Matrix elements are named by their indices, as in the formulas; written-out triangles have empty corners.
+// Matrix elements are named by their indices, as in the formulas. Unrolled loops over triangles contain empty cases.
 #![allow(clippy::needless_range_loop, clippy::absurd_extreme_comparisons)]
 
 use crate::chain::{AnyShape, BaseInertialParameters, Chain, JointTransform};
@@ -12,8 +12,8 @@ use crate::unroll::unroll;
 /// A square matrix over the joints.
 pub(crate) type JointMat = [[f64; JOINTS]; JOINTS];
 
-/// A composite rigid body: a link and all links after it, as first and second moments of mass about the link's origin. Base
-/// inertial parameters have no mass: see [`crate::chain`].
+/// A composite rigid body: a link and all links after it. It is described by first and second moments of mass about the link's origin. Base
+/// inertial parameters do not include a mass: see [`crate::chain`].
 #[derive(Clone, Copy)]
 struct Composite {
     h: [f64; 3],
@@ -39,7 +39,7 @@ impl Composite {
         Self { h: [b.hx, b.hy, 0.0], xx: b.xx, yy: b.yy, zz: 0.0, xy: b.xy, xz: b.xz, yz: b.yz }
     }
 
-    /// Returns the composite of frame k in frame k−1.
+    /// Returns the composite of frame k, expressed in frame k−1.
     #[inline(always)]
     fn inwards(&self, t: &JointTransform, (s, c): (f64, f64)) -> Self {
         let (xx, yy, xy) = rotate_plane(s, c, self.xx, self.yy, self.xy);
@@ -65,14 +65,14 @@ impl Composite {
         self.yz += b.yz;
     }
 
-    /// Returns the wrench of a unit acceleration about the frame's z axis.
+    /// Returns the wrench for a unit acceleration about the z axis of the frame.
     #[inline(always)]
     fn column(&self) -> Wrench {
         [[-self.h[1], -self.xz], [self.h[0], -self.yz], [0.0, self.xx + self.yy]]
     }
 }
 
-/// Returns the lower triangle of the mass matrix. The upper one stays zero.
+/// Returns the lower triangle of the mass matrix. The upper triangle is zero.
 #[inline(always)]
 fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     let mut m = [[0.0; JOINTS]; JOINTS];
@@ -98,7 +98,7 @@ fn lower(chain: &Chain, trig: &JointSinesCosines) -> JointMat {
     m
 }
 
-/// Joint-space mass matrix, kg·m².
+/// Returns the joint-space mass matrix, kg·m².
 #[inline(always)]
 pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
     let mut m = lower(chain, &JointSinesCosines::new(chain, q));
@@ -110,17 +110,16 @@ pub(crate) fn mass_matrix(chain: &Chain, q: &JointVec) -> JointMat {
     m
 }
 
-/// Smallest pivot, relative to its diagonal entry, that does not count as a rounding error.
+/// Smallest pivot, relative to its diagonal entry, that is not treated as a rounding error.
 const PIVOT_MIN: f64 = 1.0e-14;
 
-/// Solves M·x = b for a symmetric positive definite M given by its lower triangle. A joint whose pivot is
-/// zero or lost in rounding gets 0.
+/// Solves M·x = b for a symmetric positive definite M, given by its lower triangle. A joint whose pivot is zero or a rounding error gets 0.
 #[inline(always)]
 fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
     let mut inverse = [0.0; JOINTS];
     unroll!(K in [0, 1, 2, 3, 4, 5] {
         let floor = m[K][K] * PIVOT_MIN;
-        // The rows above are done: m[K][I] holds L·D and becomes L.
+        // The rows above are finished. m[K][I] contains L·D, and becomes L.
         unroll!(I in [0, 1, 2, 3, 4] {
             if I < K {
                 let scaled = m[K][I];
@@ -136,7 +135,7 @@ fn solve(mut m: JointMat, mut x: JointVec) -> JointVec {
             }
         });
         let reciprocal = 1.0 / m[K][K];
-        // A mask instead of a choice: no branch.
+        // A mask is used, to avoid a branch.
         let mask = u64::from(m[K][K] > floor).wrapping_neg();
         inverse[K] = f64::from_bits(reciprocal.to_bits() & mask);
     });
@@ -176,7 +175,7 @@ fn felt(m: JointMat, joint: usize) -> f64 {
     1.0 / unit.iter().zip(&acceleration).map(|(u, a)| u * a).sum::<f64>()
 }
 
-/// Joint accelerations, rad/s²: the solution of M·qdd = tau − bias torques.
+/// Returns the joint accelerations, rad/s²: the solution of M·qdd = tau − bias torques.
 #[inline(always)]
 pub(crate) fn forward(
     chain: &Chain,

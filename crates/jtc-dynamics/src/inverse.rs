@@ -1,7 +1,7 @@
 //! Inverse dynamics: recursive Newton-Euler (Luh, Walker and Paul, On-line computational scheme for mechanical
 //! manipulators, 1980) in the frames and with the base inertial parameters of [`crate::chain`].
 
-// The indices are those of the formulas.
+// The indices are the same as in the formulas.
 #![allow(clippy::needless_range_loop)]
 
 use core::array::from_fn;
@@ -30,7 +30,7 @@ impl JointSinesCosines {
         for k in 0..JOINTS {
             angle[k] += chain.transforms[k].offset;
         }
-        // A compiler for a processor with SIMD vectorises this loop over all six joints.
+        // A compiler for a processor with SIMD can vectorise this loop over the six joints.
         let (mut sin, mut cos) = (angle, angle);
         for k in 0..JOINTS {
             (sin[k], cos[k]) = sin_cos(angle[k]);
@@ -39,13 +39,13 @@ impl JointSinesCosines {
     }
 }
 
-/// Rx(α)·v.
+/// Returns Rx(α)·v.
 #[inline(always)]
 pub(crate) fn rx(t: &JointTransform, v: Vec3) -> Vec3 {
     [v[0], t.cos * v[1] - t.sin * v[2], t.sin * v[1] + t.cos * v[2]]
 }
 
-/// Rx(α)ᵀ·v.
+/// Returns Rx(α)ᵀ·v.
 #[inline(always)]
 fn rx_back(t: &JointTransform, v: Vec3) -> Vec3 {
     match t.axes {
@@ -55,7 +55,7 @@ fn rx_back(t: &JointTransform, v: Vec3) -> Vec3 {
     }
 }
 
-/// y and z of Rx(α)ᵀ·(0, 0, `z`).
+/// Returns y and z of Rx(α)ᵀ·(0, 0, `z`).
 #[inline(always)]
 fn axis_back(t: &JointTransform, z: f64) -> (f64, f64) {
     match t.axes {
@@ -65,13 +65,13 @@ fn axis_back(t: &JointTransform, z: f64) -> (f64, f64) {
     }
 }
 
-/// Rz·v.
+/// Returns Rz·v.
 #[inline(always)]
 pub(crate) fn rz(s: f64, c: f64, v: Vec3) -> Vec3 {
     [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]
 }
 
-/// Rzᵀ·v.
+/// Returns Rzᵀ·v.
 #[inline(always)]
 fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
     [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]
@@ -80,7 +80,7 @@ fn rz_back(s: f64, c: f64, v: Vec3) -> Vec3 {
 /// Two vectors that are rotated together.
 pub(crate) type Pair3 = [[f64; 2]; 3];
 
-/// A component of both vectors.
+/// The same component of both vectors.
 type Pair = [f64; 2];
 
 #[inline(always)]
@@ -88,7 +88,7 @@ fn scaled(k: f64, v: Pair) -> Pair {
     v.map(|x| k * x)
 }
 
-/// Rx(α) of both vectors.
+/// Applies Rx(α) to both vectors.
 #[inline(always)]
 fn rx_pair(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
     match t.axes {
@@ -98,7 +98,7 @@ fn rx_pair(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
     }
 }
 
-/// Rx(α)ᵀ of both vectors.
+/// Applies Rx(α)ᵀ to both vectors.
 #[inline(always)]
 fn rx_pair_back(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
     match t.axes {
@@ -108,7 +108,7 @@ fn rx_pair_back(t: &JointTransform, &[x, y, z]: &Pair3) -> Pair3 {
     }
 }
 
-/// Rz of both vectors.
+/// Applies Rz to both vectors.
 #[inline(always)]
 fn rz_pair(s: f64, c: f64, v: &Pair3) -> Pair3 {
     let mut out = *v;
@@ -119,7 +119,7 @@ fn rz_pair(s: f64, c: f64, v: &Pair3) -> Pair3 {
     out
 }
 
-/// Rzᵀ of both vectors.
+/// Applies Rzᵀ to both vectors.
 #[inline(always)]
 fn rz_pair_back(s: f64, c: f64, v: &Pair3) -> Pair3 {
     let mut out = *v;
@@ -142,8 +142,8 @@ struct Motion {
 /// Force (N) and moment (N·m) that a link needs, in its own frame and about its origin.
 pub(crate) type Wrench = Pair3;
 
-/// U = [dw]× + [w]×[w]× (Khalil and Dombre, Modeling, Identification and Control of Robots): maps the position of a point to
-/// its acceleration relative to the origin.
+/// U = [dw]× + [w]×[w]× (Khalil and Dombre, Modeling, Identification and Control of Robots). U maps the position of a point to its
+/// acceleration relative to the origin.
 type AccelerationMatrix = [Vec3; 3];
 
 impl Motion {
@@ -155,7 +155,7 @@ impl Motion {
         [[-(yy + zz), xy - az, zx + ay], [xy + az, -(zz + xx), yz - ax], [zx - ay, yz + ax, -(xx + yy)]]
     }
 
-    /// Motion of the link after joint `t`.
+    /// Returns the motion of the link after joint `t`.
     #[inline(always)]
     fn next(
         &self,
@@ -167,7 +167,7 @@ impl Motion {
     ) -> Self {
         let [x, y] = t.p;
         let reach = |k: usize| {
-            // Between parallel axes y is 0.
+            // If the axes are parallel, y is 0.
             let way = if t.axes == Axes::Parallel { u[k][0] * x } else { u[k][0] * x + u[k][1] * y };
             self.acc[k] + way
         };
@@ -196,7 +196,7 @@ impl BaseInertialParameters {
     }
 }
 
-/// A wrench on frame k, in frame k−1.
+/// Returns a wrench on frame k, expressed in frame k−1.
 #[inline(always)]
 pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -> Wrench {
     let mut v = rx_pair(t, &rz_pair(s, c, wrench));
@@ -211,8 +211,8 @@ pub(crate) fn inwards(t: &JointTransform, (s, c): (f64, f64), wrench: &Wrench) -
     v
 }
 
-/// Returns the wrench of each link alone, under the motion `qd`, `qdd`. For the first link only the moment about its axis is computed: the
-/// base carries the remainder.
+/// Returns the wrench of each link alone for the motion `qd`, `qdd`. For the first link only the moment about its axis is computed, because
+/// the base carries the rest.
 #[inline(always)]
 fn wrenches<S: Shape>(
     chain: &Chain,
@@ -224,7 +224,7 @@ fn wrenches<S: Shape>(
     let acc = rz_back(trig.sin[0], trig.cos[0], chain.base_acceleration);
     let first = &chain.base_parameters[0];
     out[0][2][1] = qdd[0] * (first.xx + first.yy) + (acc[1] * first.hx - acc[0] * first.hy);
-    // The first link only rotates about its axis, so that most of U and of the motion of the second is zero.
+    // The first link only rotates about its axis, so most elements of U and of the motion of the second link are zero.
     let t = &chain.transform::<S>(1);
     let (s, c) = (trig.sin[1], trig.cos[1]);
     let square = qd[0] * qd[0];
@@ -261,7 +261,7 @@ pub(crate) fn inverse(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec
     }
 }
 
-/// Like [`inverse`], for an arm of this shape. Each shape has its own function, so that its machine code can be examined.
+/// Like [`inverse`], for an arm of one shape. Each shape has its own function, so that its machine code can be inspected.
 #[inline(never)]
 fn inverse_of<S: Shape>(chain: &Chain, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
     recursion::<S>(chain, &JointSinesCosines::new(chain, q), qd, qdd)
@@ -287,7 +287,7 @@ pub(crate) fn recursion<S: Shape>(
     torque
 }
 
-/// Returns the joint torques at rest, N·m. The base inertial parameters have no mass, so that they need only moments and no forces.
+/// Returns the joint torques at rest, N·m. The base inertial parameters do not include a mass, so only moments are needed, and no forces.
 #[inline(always)]
 pub(crate) fn gravity_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec {
     static_torque(chain, trig, |k| [chain.base_parameters[k].hx, chain.base_parameters[k].hy])
@@ -299,7 +299,7 @@ pub(crate) fn flange_torque(chain: &Chain, trig: &JointSinesCosines) -> JointVec
     static_torque(chain, trig, |k| chain.flange[k])
 }
 
-/// Returns the joint torques at rest of bodies with these first moments (kg·m).
+/// Returns the joint torques at rest for bodies with these first moments (kg·m).
 #[inline(always)]
 fn static_torque(
     chain: &Chain,

@@ -24,23 +24,23 @@ pub use trig::{SIN_COS_MAX, sin_cos, sqrt};
 
 /// An arm prepared for kinematics and dynamics: values that do not depend on the joint positions are precomputed.
 ///
-/// No function fails or panics. Results for a NaN, an infinite argument or a position beyond [`SIN_COS_MAX`] are
-/// meaningless, mostly NaN.
+/// No function fails or panics. For a NaN, an infinite argument or a position above [`SIN_COS_MAX`] the results are not valid, and usually
+/// NaN.
 #[derive(Clone, Debug)]
 pub struct Dynamics {
     chain: chain::Chain,
 }
 
 impl Dynamics {
-    /// Prepares `model`; `gravity`: acceleration of gravity in the base frame, m/s², (0, 0, −9.81) for an arm that stands upright.
+    /// Prepares `model`. `gravity`: acceleration of gravity in the base frame, m/s²; (0, 0, −9.81) for an upright arm.
     ///
-    /// The model must have passed [`ArmModel::check`], else the results are meaningless.
+    /// The model must have passed [`ArmModel::check`], otherwise the results are not valid.
     pub fn new(model: &ArmModel, gravity: [f64; 3]) -> Self {
         Self::with_payload(model, gravity, &Payload::default())
     }
 
-    /// Like [`Dynamics::new`], with a `payload` at the flange, as if the payload were a part of the last link (J-60). The payload must have
-    /// passed [`Payload::check`]. [`Dynamics::flange_torque`] remains the torque of 1 kg alone.
+    /// Like [`Dynamics::new`], with a `payload` at the flange, as if it were a part of the last link (J-60). The payload must have passed
+    /// [`Payload::check`]. The result of [`Dynamics::flange_torque`] does not contain the payload.
     pub fn with_payload(model: &ArmModel, gravity: [f64; 3], payload: &Payload) -> Self {
         Self { chain: chain::Chain::new(model, gravity, payload) }
     }
@@ -50,14 +50,14 @@ impl Dynamics {
         LinkInertias(self.chain.base_parameters)
     }
 
-    /// Sets the masses and inertias for all later calls. `inertias` must be of an arm with the same joints.
+    /// Sets the masses and inertias for all later calls. `inertias` must come from an arm with the same joints.
     #[inline(always)]
     pub fn set_inertias(&mut self, inertias: &LinkInertias) {
         self.chain.base_parameters = inertias.0;
     }
 
-    /// Returns the joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without
-    /// friction and rotors; recursive Newton-Euler.
+    /// Returns the joint torques (N·m) for positions `q` (rad), velocities `qd` (rad/s) and accelerations `qdd` (rad/s²), without friction
+    /// and rotors (recursive Newton-Euler).
     pub fn inverse(&self, q: &JointVec, qd: &JointVec, qdd: &JointVec) -> JointVec {
         inverse::inverse(&self.chain, q, qd, qdd)
     }
@@ -68,19 +68,20 @@ impl Dynamics {
     }
 
     /// Returns the joint torques (N·m) that hold 1 kg at the origin of the flange at rest at the positions `q` (rad), without the arm
-    /// itself: gravity through the transposed Jacobian of the flange.
+    /// itself. They are the gravity force multiplied by the transposed Jacobian of the flange.
     pub fn flange_torque(&self, q: &JointVec) -> JointVec {
         inverse::flange_torque(&self.chain, &JointSinesCosines::new(&self.chain, q))
     }
 
-    /// Returns the joint-space mass matrix (kg·m²) at the positions `q` (rad), symmetric, without rotors; composite-rigid-body algorithm.
+    /// Returns the joint-space mass matrix (kg·m²) at the positions `q` (rad). It is symmetric and does not contain the rotors
+    /// (composite-rigid-body algorithm).
     pub fn mass_matrix(&self, q: &JointVec) -> [[f64; JOINTS]; JOINTS] {
         forward::mass_matrix(&self.chain, q)
     }
 
-    /// Returns the inertia (kg·m²) that each joint feels at the positions `q` (rad) while all other joints are free to move: the least that
-    /// a torque of this joint alone accelerates. `rotor` is as in [`Dynamics::forward`]. The value is infinite for a joint without any
-    /// inertia.
+    /// Returns the inertia (kg·m²) that each joint feels at the positions `q` (rad) while all other joints are free to move. This is the
+    /// least inertia that a torque on this joint alone accelerates. `rotor` is the same as in [`Dynamics::forward`]. The value is infinite
+    /// for a joint without inertia.
     pub fn felt_inertia(&self, q: &JointVec, rotor: &JointVec) -> JointVec {
         forward::felt_inertia(&self.chain, q, rotor)
     }
@@ -91,10 +92,10 @@ impl Dynamics {
         forward::felt_inertia_of(&self.chain, q, rotor, joint)
     }
 
-    /// Returns the joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m); `rotor`, the
-    /// inertias of the rotors about their joint axes (kg·m²), is added to the diagonal of the mass matrix.
+    /// Returns the joint accelerations (rad/s²) at positions `q` (rad) and velocities `qd` (rad/s) under torques `tau` (N·m). `rotor`:
+    /// inertias of the rotors about their joint axes (kg·m²), which are added to the diagonal of the mass matrix.
     ///
-    /// A joint without any inertia (its row of the mass matrix is lost in rounding) gets the acceleration 0.
+    /// A joint without inertia, whose pivot is zero or a rounding error, gets the acceleration 0.
     pub fn forward(&self, q: &JointVec, qd: &JointVec, tau: &JointVec, rotor: &JointVec) -> JointVec {
         forward::forward(&self.chain, q, qd, tau, rotor)
     }
@@ -105,8 +106,8 @@ impl Dynamics {
         kinematics::flange_speed(&self.chain, q, qd)
     }
 
-    /// Returns the poses in the base frame (m) of the joint frames, base to wrist, and of the flange, at the positions `q` (rad). Joint
-    /// frames are those of the model, after the rotation of the joint.
+    /// Returns the poses, in the base frame (m), of the joint frames from base to wrist and of the flange, at the positions `q` (rad). The
+    /// joint frames are those of the model after the rotation of the joint.
     pub fn forward_kinematics(&self, q: &JointVec) -> [Pose; 7] {
         kinematics::forward_kinematics(&self.chain, q)
     }

@@ -7,20 +7,19 @@ use crate::rotation::{Mat3, principal_moments};
 /// Number of actuated joints, all revolute.
 pub const JOINTS: usize = 6;
 
-/// Values of the joints, base to wrist; the unit is that of the quantity.
+/// Values of the joints, base to wrist. The unit depends on the quantity.
 pub type JointVec = [f64; JOINTS];
 
-/// A frame placed in its parent as URDF does: translate by `xyz` (m), then rotate by
-/// Rz(yaw)·Ry(pitch)·Rx(roll) (rad).
+/// A frame relative to its parent, as in URDF: a translation by `xyz` (m), followed by the rotation Rz(yaw)·Ry(pitch)·Rx(roll) (rad).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Origin {
     /// Translation in the parent frame, m.
     pub xyz: [f64; 3],
-    /// Roll, pitch, yaw, rad. An angle of a joint within 2 µrad of a multiple of π/2 is taken as that multiple.
+    /// Roll, pitch, yaw, rad. A joint angle within 2 µrad of a multiple of π/2 is replaced by that multiple.
     pub rpy: [f64; 3],
 }
 
-/// A rigid link: mass, centre of mass and inertia about it. The link frame is the frame of the joint that moves the link.
+/// A rigid link: mass, centre of mass, and inertia about the centre of mass. The link frame is the frame of the joint that moves the link.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Link {
     /// Centre of mass (xyz, m) and orientation of the inertia frame (rpy, rad) in the link frame.
@@ -34,8 +33,8 @@ pub struct Link {
 /// The arm as rule J-40 and the ArmModel frame define it. Every joint rotates about the z axis of its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct ArmModel {
-    /// `joints[i]`: the frame of link i+1 in the frame of link i, at the joint's position 0; `joints[6]` is the fixed flange in
-    /// the frame of link 6.
+    /// `joints[i]`: the frame of link i+1 in the frame of link i, at position 0 of the joint. `joints[6]`: the fixed flange in the frame of
+    /// link 6.
     pub joints: [Origin; 7],
     /// `links[0]` is the base, which does not move.
     pub links: [Link; 7],
@@ -59,7 +58,7 @@ pub enum Field {
     Mass,
 }
 
-/// Why a model is not physical (J-06).
+/// Reason why a model is not physical (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -72,7 +71,7 @@ pub enum ModelError {
         /// Its value, in the unit of `field`.
         value: f64,
     },
-    /// An angle is too large to have a meaning.
+    /// An angle is too large to be meaningful.
     AngleTooLarge {
         /// Index of the joint or link that has `field`, 0..7.
         index: usize,
@@ -90,25 +89,25 @@ pub enum ModelError {
         /// Mass, kg.
         mass: f64,
     },
-    /// A link of 1..=5 has no mass.
+    /// One of the links 1..=5 has no mass.
     MassZero {
-        /// Link, 1..=5.
+        /// Link number, 1..=5.
         link: usize,
     },
-    /// The inertia of a link with mass has a negative principal moment.
+    /// A link with mass has a negative principal moment of inertia.
     InertiaNegative {
         /// Link, 0..7.
         link: usize,
         /// The smallest principal moment, kg·m²; the limit is 0.
         moment: f64,
     },
-    /// A principal moment of a link with mass is larger than the sum of the two others, which is impossible.
+    /// A principal moment of a link with mass is larger than the sum of the other two, which is impossible.
     InertiaTriangle {
         /// Link, 0..7.
         link: usize,
         /// The largest principal moment, kg·m².
         moment: f64,
-        /// The sum of the others, kg·m², which is the limit.
+        /// The sum of the other two moments, kg·m², which is the limit.
         limit: f64,
     },
 }
@@ -190,9 +189,9 @@ impl ModelError {
     }
 }
 
-/// Largest angle of a model, rad: far beyond a meaningful angle, and below [`crate::SIN_COS_MAX`].
+/// Largest angle in a model, rad. It is far above meaningful angles, and below [`crate::SIN_COS_MAX`].
 const ANGLE_MAX: f64 = 1.0e6;
-/// Tolerance of the inertia limits, relative to the largest moment: models are rounded to f32.
+/// Tolerance of the inertia limits, relative to the largest moment, because models are rounded to f32.
 const INERTIA_TOLERANCE: f64 = 1.0e-6;
 
 impl ArmModel {
@@ -201,7 +200,7 @@ impl ArmModel {
     ///
     /// # Errors
     ///
-    /// Returns the first number that fails, joints before links: see [`ModelError`].
+    /// Returns the first number that fails, joints before links. See [`ModelError`].
     pub fn check(&self) -> Result<(), ModelError> {
         for (index, joint) in self.joints.iter().enumerate() {
             finite(index, &joint.xyz, Field::JointXyz)?;
@@ -237,7 +236,7 @@ impl Link {
     }
 }
 
-/// Returns the principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in rising order, and the tolerance of their limits.
+/// Returns the principal moments of an inertia (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) in ascending order, and the tolerance of their limits.
 pub(crate) fn principal_moments_of(inertia: &[f64; 6]) -> ([f64; 3], f64) {
     let moments = principal_moments(&symmetric(inertia));
     (moments, INERTIA_TOLERANCE * moments[2].abs().max(moments[0].abs()))

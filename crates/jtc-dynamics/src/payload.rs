@@ -1,4 +1,4 @@
-//! A body carried at the flange, and the arm with it (J-60).
+//! A body that is fixed to the flange, and the arm with this body (J-60).
 
 use core::fmt;
 
@@ -12,7 +12,7 @@ pub struct Payload {
     pub mass: f64,
     /// Centre of mass in the flange frame, m.
     pub com: [f64; 3],
-    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, along the axes of the flange frame, kg·m². Zeros: a point mass.
+    /// Ixx, Ixy, Ixz, Iyy, Iyz, Izz about the centre of mass, along the axes of the flange frame, kg·m². Zeros mean a point mass.
     pub inertia: [f64; 6],
 }
 
@@ -31,14 +31,14 @@ pub enum PayloadError {
     MassZero,
     /// The smallest principal moment of inertia is negative.
     InertiaNegative {
-        /// That moment, kg·m².
+        /// The smallest principal moment, kg·m².
         moment: f64,
     },
-    /// The largest principal moment of inertia is more than the sum of the two others.
+    /// The largest principal moment of inertia is larger than the sum of the other two.
     InertiaTriangle {
-        /// That moment, kg·m².
+        /// The largest principal moment, kg·m².
         moment: f64,
-        /// The sum of the others, kg·m², which is the limit.
+        /// The sum of the other two moments, kg·m², which is the limit.
         limit: f64,
     },
 }
@@ -104,13 +104,14 @@ impl Payload {
 }
 
 /// The part of an arm's dynamics that depends on masses: base inertial parameters of its links (Gautier and Khalil 1990), with the payload.
-/// The parameters are linear in the masses, first and second moments of the bodies. Therefore an interpolation between two arms with the
+/// The parameters are linear in the masses and in the first and second moments of the bodies. Therefore an interpolation between two
+/// physical arms with the same joints is also physical.
 /// same joints is as physical as both.
 #[derive(Clone, Copy, Debug)]
 pub struct LinkInertias(pub(crate) [BaseInertialParameters; JOINTS]);
 
 impl LinkInertias {
-    /// Returns the parameters as numbers, to store them. [`from_numbers`](Self::from_numbers) restores the same inertias.
+    /// Returns the parameters as numbers, for storing them. [`from_numbers`](Self::from_numbers) restores the same inertias.
     pub fn numbers(&self) -> [[f64; 7]; JOINTS] {
         self.0.map(|BaseInertialParameters { hx, hy, xx, yy, xy, xz, yz }| [hx, hy, xx, yy, xy, xz, yz])
     }
@@ -128,7 +129,7 @@ impl LinkInertias {
         }))
     }
 
-    /// Interpolates linearly to `other`: `share` 0 gives `self`, 1 gives `other`.
+    /// Interpolates linearly between `self` (`share` 0) and `other` (`share` 1).
     #[inline(always)]
     pub fn toward(&self, other: &Self, share: f64) -> Self {
         let mut between = *self;

@@ -1,11 +1,11 @@
-//! Rotation matrices, and the principal moments of a symmetric matrix: the 3×3 algebra of set-up and kinematics.
+//! Rotation matrices, and the principal moments of a symmetric matrix: 3×3 algebra for preparation and kinematics.
 
 use crate::trig::{sin_cos, sqrt};
 
 /// A 3×3 matrix, row major.
 pub(crate) type Mat3 = [[f64; 3]; 3];
 
-/// Rz(yaw)·Ry(pitch)·Rx(roll).
+/// Returns Rz(yaw)·Ry(pitch)·Rx(roll).
 pub(crate) fn from_rpy(rpy: &[f64; 3]) -> Mat3 {
     from_sines_cosines(&rpy.map(sin_cos))
 }
@@ -35,17 +35,17 @@ pub(crate) fn product(a: &Mat3, b: &Mat3) -> Mat3 {
     transpose(&[apply(a, &columns[0]), apply(a, &columns[1]), apply(a, &columns[2])])
 }
 
-/// m·s·mᵀ.
+/// Returns m·s·mᵀ.
 pub(crate) fn congruent(m: &Mat3, s: &Mat3) -> Mat3 {
     product(&product(m, s), &transpose(m))
 }
 
-/// Rz(s, c) as a matrix.
+/// Returns Rz(s, c) as a matrix.
 pub(crate) fn about_z(s: f64, c: f64) -> Mat3 {
     [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// Rx(s, c) as a matrix.
+/// Returns Rx(s, c) as a matrix.
 pub(crate) fn about_x(s: f64, c: f64) -> Mat3 {
     [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]]
 }
@@ -61,8 +61,8 @@ pub(crate) fn unit(x: f64, y: f64) -> (f64, f64) {
     (x / length, y / length)
 }
 
-/// Returns the eigenvalues of a symmetric matrix of finite numbers in rising order, by Jacobi's rotations. The 8 sweeps go far past
-/// convergence.
+/// Returns the eigenvalues of a symmetric matrix of finite numbers in ascending order (Jacobi rotations). The 8 sweeps are far more than
+/// convergence needs.
 pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     let [[mut xx, mut xy, mut xz], [_, mut yy, mut yz], [_, _, mut zz]] = *m;
     let scale = [xx, xy, xz, yy, yz, zz].iter().fold(0.0f64, |a, v| a.max(v.abs()));
@@ -81,12 +81,12 @@ pub(crate) fn principal_moments(m: &Mat3) -> [f64; 3] {
     [low.min(zz) * scale, low.max(high.min(zz)) * scale, high.max(zz) * scale]
 }
 
-/// Rotates in the plane of `a` and `b`, so that their product `ab` vanishes. `ac` and `bc` turn with the plane.
+/// Rotates in the plane of `a` and `b`, so that their product `ab` becomes zero. `ac` and `bc` rotate with the plane.
 fn eliminate(a: f64, b: f64, ab: f64, ac: f64, bc: f64) -> (f64, f64, f64, f64, f64) {
     let half = 0.5 * (b - a);
     let root = sqrt(half * half + ab * ab);
     if root == 0.0 {
-        // The moments are equal within the range of the square root, so that any rotation would do.
+        // The moments are equal within the precision of the square root, so any rotation is valid.
         return (a, b, 0.0, ac, bc);
     }
     // The smaller of the two possible rotations.
@@ -127,7 +127,7 @@ mod tests {
             prop_assert!((x - angle.cos()).abs() < 4e-16 && (y - angle.sin()).abs() < 4e-16, "{x} {y}");
         }
 
-        /// What any turn leaves as it is: also of moments that are equal, zero or negative, in any unit.
+        /// A rotation does not change the principal moments, even if they are equal, zero or negative, in any unit.
         #[test]
         fn principal_moments_are_those_before_a_turn(
             moments in prop::array::uniform3(prop_oneof![Just(0.0), Just(1.0), Just(-1.0), -2.0..2.0f64, -1e-9..1e-9f64]),

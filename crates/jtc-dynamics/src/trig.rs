@@ -1,16 +1,16 @@
-//! Sine, cosine and square root of f64 without the standard library; sine and cosine without branches on the argument.
+//! Sine, cosine and square root of f64 without the standard library. Sine and cosine have no branches that depend on the argument.
 //!
-//! Sine and cosine of 128 directions are in a table. The values of the nearest direction are rotated by the remaining angle, which is at
-//! most π/128, so that short polynomials are sufficient.
+//! A table contains sine and cosine of 128 directions. The values of the nearest direction are rotated by the remaining angle. This angle
+//! is at most π/128, so that short polynomials suffice.
 
-/// Directions of the table in a turn, a power of two.
+/// Number of directions in the table per turn, a power of two.
 const DIRECTIONS: usize = 128;
 /// Reciprocal of the angle between two directions, 1/rad.
 const PER_RAD: f64 = 20.371832715762604;
 /// The angle between two directions, π/64, in two parts. The first has 28 significant bits, so that its product with a number of
 /// steps below 2^25 is exact.
 const STEP: [f64; 2] = [0.049087385181337595, 3.100292436501689e-11];
-/// 1.5·2^52: adding it rounds to an integer and leaves that integer in the low bits of the sum.
+/// 1.5·2^52. Adding it rounds to an integer, and leaves that integer in the low bits of the sum.
 const ROUND: f64 = 6755399441055744.0;
 /// (sin r − r)/r³ as a polynomial in r², minimax on |r| ≤ π/128 (error of sin below 3e-17).
 const SIN: [f64; 2] = [-0.1666666666295987, 0.00833315540165295];
@@ -67,7 +67,7 @@ const fn table() -> [[f64; 2]; DIRECTIONS] {
     table
 }
 
-/// Returns the sine of a direction, from the direction of the first quarter that mirrors it.
+/// Returns the sine of a direction, from the corresponding direction in the first quarter.
 const fn direction_sin(k: usize) -> f64 {
     let (half, quarter) = (DIRECTIONS / 2, DIRECTIONS / 4);
     let in_half = k % half;
@@ -75,18 +75,18 @@ const fn direction_sin(k: usize) -> f64 {
     if k % DIRECTIONS < half { sin } else { -sin }
 }
 
-/// Largest argument that [`sin_cos`] takes, rad; beyond it the result is NaN.
+/// Largest argument of [`sin_cos`], rad. Above it the result is NaN.
 pub const SIN_COS_MAX: f64 = 1.0e9;
 
 /// Returns sine and cosine of `x` (rad).
 ///
-/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6 and grows to half the spacing of numbers around `x` beyond. Above
-/// [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions for any `x`.
+/// The absolute error of each is at most 2^-52 (2.3e-16) for |x| ≤ 1e6. Above that it grows to half the spacing of numbers around `x`.
+/// Above [`SIN_COS_MAX`] and for a NaN both results are NaN. Every call executes the same instructions, whatever `x` is.
 #[inline(always)]
 pub fn sin_cos(x: f64) -> (f64, f64) {
     let rounded = x * PER_RAD + ROUND;
     let [sin, cos] = TABLE[rounded.to_bits() as usize % DIRECTIONS];
-    // NaN for infinities, and if the reduction has no digits left.
+    // NaN for infinities, and if the reduction leaves no valid digits.
     let k = if x.abs() <= SIN_COS_MAX { rounded - ROUND } else { f64::NAN };
     let r = (x - k * STEP[0]) - k * STEP[1];
     let z = r * r;
@@ -96,13 +96,13 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (sin + (cos * s + sin * c), cos + (cos * c - sin * s))
 }
 
-/// Returns the square root of a finite `x` ≥ 0 by Newton's method, within 2^-52 of its value. Returns 0 for a NaN and for any number below
-/// the normal numbers, including negative numbers. The function takes five divisions.
+/// Returns the square root of a finite `x` ≥ 0 by Newton's method, with a relative error of at most 2^-52. Returns 0 for a NaN, for
+/// negative numbers, and for numbers below the normal range. The function needs five divisions.
 pub fn sqrt(x: f64) -> f64 {
     if x.is_nan() || x < f64::MIN_POSITIVE {
         return 0.0;
     }
-    // Halving the exponent is within 6 % of the root; each step squares the relative error.
+    // Halving the exponent gives the root within 6 %. Each step squares the relative error.
     let mut y = f64::from_bits((x.to_bits() >> 1) + (1023 << 51));
     for _ in 0..5 {
         y = 0.5 * (y + x / y);
@@ -110,7 +110,7 @@ pub fn sqrt(x: f64) -> f64 {
     y
 }
 
-/// Returns the angle in (−π, π] of a direction given by its sine and cosine. For set-up, not for the tick.
+/// Returns the angle in (−π, π] of a direction that is given by its sine and cosine. It is used for preparation, not in the tick.
 pub(crate) fn angle(sin: f64, cos: f64) -> f64 {
     use core::f64::consts::{FRAC_PI_2, PI};
     let mut angle = if cos >= sin.abs() {

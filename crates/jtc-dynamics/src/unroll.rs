@@ -1,7 +1,6 @@
-//! Unrolled loops: with constant indices the compiler keeps the recursion in registers and drops unused
-//! parts.
+//! Unrolled loops. With constant indices the compiler keeps the recursion in registers and removes unused parts.
 
-/// Repeats the block for each of the numbers, with the name as a constant of that value.
+/// Repeats the block for each of the numbers. In the block, the name is a constant with that value.
 macro_rules! unroll {
     ($k:ident in [$($n:literal),+] $body:block) => {
         $({

@@ -1,4 +1,4 @@
-//! Properties that hold for every arm (J-40), and known values of the default one.
+//! Properties that are true for every arm (J-40), and known values of the default arm.
 use crate::arms;
 
 use std::f64::consts::FRAC_PI_2;
@@ -52,13 +52,13 @@ fn rotation(o: &Origin) -> Mat3 {
     product(&about(2, o.rpy[2]), &product(&about(1, o.rpy[1]), &about(0, o.rpy[0])))
 }
 
-/// Returns an angle of a joint origin; within 2 µrad of a multiple of a right angle it is that multiple.
+/// Returns an angle of a joint origin. An angle within 2 µrad of a multiple of a right angle is replaced by that multiple.
 fn squared(angle: f64) -> f64 {
     let quarters = (angle / FRAC_PI_2).round() * FRAC_PI_2;
     if (angle - quarters).abs() <= 2e-6 { quarters } else { angle }
 }
 
-/// Returns the frames of the links, directly by the rule: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
+/// Returns the frames of the links, directly from the definition: Trans·Rz(yaw)·Ry(pitch)·Rx(roll)·Rz(q).
 fn frames(model: &ArmModel, q: &JointVec) -> Vec<(Mat3, [f64; 3])> {
     let mut at = (about(0, 0.0), [0.0; 3]);
     let mut all = Vec::new();
@@ -97,7 +97,7 @@ fn by_energy(model: &ArmModel, gravity: [f64; 3], q: &JointVec) -> ([JointVec; J
     (mass, torque)
 }
 
-/// Checks with a Cholesky factorisation.
+/// Checks by a Cholesky factorisation whether the matrix is positive definite.
 fn positive_definite(m: &[JointVec; JOINTS]) -> bool {
     let mut l = [NONE; JOINTS];
     for i in 0..JOINTS {
@@ -158,8 +158,7 @@ proptest! {
         prop_assert!(close(&d.inverse(&q, &NONE, &NONE), &d.gravity_torque(&q), largest(&whole).max(1.0), 1e-13));
     }
 
-    /// The velocity torques of the bias are quadratic: doubling the velocities makes them four times as
-    /// large.
+    /// The velocity torques are quadratic: doubling the velocities makes them four times as large.
     #[test]
     fn j40_velocity_torque_is_quadratic(model in arms::model(), q in arms::vector(3.2), qd in arms::vector(3.0)) {
         let d = Dynamics::new(&model, [0.0; 3]);
@@ -167,7 +166,7 @@ proptest! {
         prop_assert!(close(&two, &one.map(|t| 4.0 * t), largest(&two), 1e-13));
     }
 
-    /// Power put in by the velocity torques is half the change of the mass matrix: ½·qdᵀ·Ṁ·qd.
+    /// The power of the velocity torques is half the change of the mass matrix: ½·qdᵀ·Ṁ·qd.
     #[test]
     fn j40_power_is_the_change_of_the_kinetic_energy(
         model in arms::model(), q in arms::vector(3.2), qd in arms::vector(2.0)
@@ -197,7 +196,7 @@ proptest! {
             t.iter_mut().zip(rotor).zip(back).for_each(|((t, r), a)| *t += r * a);
             t
         };
-        // As torques: an almost weightless wrist may turn a rounding error into an acceleration.
+        // The torques are compared, because an almost weightless wrist may turn a rounding error into an acceleration.
         prop_assert!(close(&again, &torque, largest(&torque), 1e-10));
     }
 
@@ -231,8 +230,8 @@ proptest! {
     }
 }
 
-/// Values of the existing device's arm, computed by another program. There gravity points the other way (the arm hangs) and joint 3 is 10
-/// mm higher.
+/// Values of the existing device's arm, computed by another program. In that program gravity has the opposite direction (the arm hangs),
+/// and joint 3 is 10 mm higher.
 #[test]
 fn j40_gravity_torque_of_the_default_arm_hanging() {
     let mut model = arms::avena();
@@ -248,7 +247,7 @@ fn j40_gravity_torque_of_the_default_arm_hanging() {
     }
 }
 
-/// The torque that holds a mass is the slope of its potential energy, here from the heights of forward kinematics.
+/// The torque that holds a mass is the derivative of its potential energy, which is computed here from the heights in forward kinematics.
 #[test]
 fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     let gravity = [1.3, -0.7, -9.81];
@@ -267,7 +266,7 @@ fn j25_the_flange_torque_is_the_slope_of_the_potential_energy() {
     }
 }
 
-/// Compares with the inertia of all joints, and with the distance between positions at two close times.
+/// Compares with the inertia of all joints, and with the distance between the positions at two close times.
 #[test]
 fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     let mut random = random_from(11);
@@ -294,7 +293,7 @@ fn j25_inertia_of_a_joint_and_speed_of_the_flange() {
     }
 }
 
-/// Returns a joint whose axis is not parallel to any other and does not meet any other.
+/// Returns the origin of a joint whose axis is neither parallel to another axis nor meets one.
 fn skew(k: usize) -> Origin {
     let k = k as f64;
     Origin { xyz: [0.1 + 0.02 * k, 0.2 - 0.03 * k, 0.1 * k], rpy: [0.3 + 0.2 * k, -0.4, 0.5 * k] }
@@ -317,7 +316,7 @@ fn j40_rpy_turns_about_fixed_axes_x_then_y_then_z() {
     assert!(close(pose.rotation.as_flattened(), wanted.as_flattened(), 1.0, 1e-15));
 }
 
-/// π/2 and π with six digits or rounded to f32 count as the exact angles. Angles that differ by more do not.
+/// π/2 and π with six digits or rounded to f32 are treated as the exact angles. Angles with a larger difference are not.
 #[test]
 fn j06_j40_angles_next_to_a_right_angle_are_right_angles() {
     let poses = |rpy: [f64; 3]| {
@@ -346,7 +345,7 @@ fn j40_the_flange_is_placed_by_the_seventh_joint() {
     assert!(close(&poses[6].position, &along, 1.0, 1e-15));
 }
 
-/// RK4 at 1 ms with the drives' rotors: a second of free fall keeps the energy.
+/// With the drives' rotors, the energy stays constant during a free fall of one second (RK4 at 1 ms).
 #[test]
 fn j40_free_fall_keeps_the_energy() {
     let model = arms::avena();
@@ -396,7 +395,7 @@ fn j40_a_joint_without_inertia_stays_finite() {
 }
 
 proptest! {
-    /// It is the largest inertia that can be taken from the joint before the arm has a motion without kinetic energy.
+    /// The felt inertia is the largest inertia that can be subtracted from the joint before the arm has a motion without kinetic energy.
     #[test]
     fn j71_the_inertia_that_a_joint_feels_is_all_that_can_be_taken_from_it(
         model in arms::model(),

@@ -1,10 +1,10 @@
-//! Checks that an arm model is physical (J-06).
+//! The check that an arm model is physical (J-06).
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Field, ModelError};
 use proptest::prelude::*;
 
-/// Returns number `i` of the 133 of a model, in the order of the ArmModel frame.
+/// Returns number `i` of the 133 numbers of a model, in the order of the ArmModel frame.
 fn number(model: &mut ArmModel, i: usize) -> &mut f64 {
     if i < 42 {
         let joint = &mut model.joints[i / 6];
@@ -81,7 +81,7 @@ fn j06_a_link_without_mass_may_have_any_inertia() {
 fn j06_inertia_must_be_positive_semidefinite() {
     for link in 0..7 {
         let mut model = arms::avena();
-        // Moments 3, 1 and, by the product, −1 in the plane of y and z.
+        // The moments are 3, 1 and −1. The product in the plane of y and z makes the last one negative.
         model.links[link].inertia = [3.0, 0.0, 0.0, 1.0, 2.0, 1.0];
         let Err(ModelError::InertiaNegative { link: at, moment }) = model.check() else {
             panic!("link {link}")
@@ -95,7 +95,7 @@ fn j06_inertia_must_be_positive_semidefinite() {
 fn j06_inertia_must_hold_the_triangle_inequality() {
     for link in 0..7 {
         let mut model = arms::avena();
-        // Moments 1, 1 and 3: the axes of the largest are not those of the frame.
+        // The moments are 1, 1 and 3. The axis of the largest moment is not an axis of the frame.
         model.links[link].inertia = [2.0, 1.0, 0.0, 2.0, 0.0, 1.0];
         let Err(ModelError::InertiaTriangle { link: at, moment, limit }) = model.check() else {
             panic!("link {link}")
@@ -123,7 +123,7 @@ fn j06_angles_without_a_meaning_are_refused() {
     assert_eq!(error.to_string(), "joint 2: origin pitch is 10000000 rad, limit 1000000 rad; degrees?");
 }
 
-/// The error names the largest allowed angle.
+/// The error contains the largest allowed angle.
 #[test]
 fn j06_an_angle_at_the_limit_is_accepted() {
     let mut model = arms::avena();
@@ -139,13 +139,13 @@ fn j06_an_angle_at_the_limit_is_accepted() {
     }
 }
 
-/// A body at the limit stays valid when its numbers are rounded to f32, as the frame carries them. With a hundred times that deviation the
-/// body is not valid. Both are true for light and heavy bodies.
+/// A body at the limit is still valid after its numbers have been rounded to f32, as in the frame. With a deviation a hundred times as
+/// large, the body is not valid. Both are true for light and heavy bodies.
 #[test]
 fn j06_only_the_rounding_of_f32_is_allowed_for_in_light_and_heavy_links() {
     let off = f64::from(f32::EPSILON);
     for unit in [1e-6, 1e-3, 1.0, 1e3] {
-        // A rod: one moment slightly below zero; a plate: one slightly above the sum of the others.
+        // For a rod, one moment is slightly below zero. For a plate, one moment is slightly above the sum of the others.
         for (shape, defect) in [([0.0, 1.0, 1.0], [-1.0, 0.0, 0.0]), ([1.0, 1.0, 2.0], [0.0, 0.0, 1.0])] {
             let check = |off: f64| {
                 let [a, b, c]: [f64; 3] = core::array::from_fn(|i| unit * (shape[i] + off * defect[i]));
@@ -193,8 +193,8 @@ fn j06_what_is_not_physical_is_said_with_its_place_value_and_limit() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// Inertia made of point masses passes in every orientation, and fails once a moment is taken from it
-    /// that it does not have.
+    /// The inertia of point masses is accepted in every orientation. It is refused if more is subtracted from a moment than the masses
+    /// provide.
     #[test]
     fn j06_what_points_of_mass_make_is_accepted(
         points in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 1..6)

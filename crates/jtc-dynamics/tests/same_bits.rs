@@ -1,9 +1,9 @@
-//! Results have the same bits on every processor and at every optimisation level (J-40), so that a PC can replay a board's recording.
+//! Results are equal bit for bit on every processor and at every optimisation level (J-40), so that a PC can replay a board's recording.
 use crate::arms;
 
 use jtc_dynamics::{ArmModel, Dynamics, Link, Origin};
 
-/// Returns numbers in (−1, 1), the same on every machine (xorshift).
+/// Returns numbers in (−1, 1), which are the same on every machine (xorshift).
 fn random(state: &mut u64) -> f64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;
@@ -11,7 +11,7 @@ fn random(state: &mut u64) -> f64 {
     (*state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// A hash over bits.
+/// A hash of bits.
 struct Sum(u64);
 
 impl Sum {
@@ -24,8 +24,8 @@ impl Sum {
     }
 }
 
-/// Compares a hash over the bits of all results of 1 000 states. Fused multiply-add, another order of operations or another polynomial
-/// changes the hash. Then the number below must be updated on purpose, and old recordings no longer replay.
+/// Compares a hash of the bits of all results for 1 000 states. Fused multiply-add, another order of operations or another polynomial
+/// changes the hash. Then the number below must be updated on purpose, and old recordings can no longer be replayed.
 #[test]
 fn j40_results_are_the_same_bits_everywhere() {
     let d = Dynamics::new(&arms::avena(), [0.0, 0.0, -9.81]);
@@ -43,7 +43,7 @@ fn j40_results_are_the_same_bits_everywhere() {
     assert_eq!(sum.0, 0x700f_d817_6e8b_cbd5, "{:#018x}", sum.0);
 }
 
-/// Like the test above, over arms with any angles: a host may upload any model, and recordings with it must replay, too.
+/// Like the test above, for arms with any angles. A host may upload any model, and recordings with it must be replayable as well.
 #[test]
 fn j40_every_arm_is_made_ready_to_the_same_bits() {
     let mut seed = 2;

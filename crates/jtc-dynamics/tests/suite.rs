@@ -1,4 +1,4 @@
-//! The tests of the crate in one program, which links in the time of one: each file here is a module of it.
+//! All tests of the crate in one program, so that only one program must be linked. Each file here is a module of it.
 mod arms;
 mod dynamics;
 mod model_check;

@@ -1,8 +1,8 @@
-//! The crate's own sine and cosine against the standard library's.
+//! Compares the crate's sine and cosine with those of the standard library.
 use jtc_dynamics::{SIN_COS_MAX, sin_cos};
 use proptest::prelude::*;
 
-/// 2^-52, the stated bound.
+/// The documented bound, 2^-52.
 const BOUND: f64 = f64::EPSILON;
 
 fn error(x: f64) -> f64 {

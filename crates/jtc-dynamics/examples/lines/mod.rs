@@ -1,7 +1,6 @@
-//! Arms and states as lines of text: `model` and 136 numbers (7 joint origins xyz rpy; 7 links: origin, ixx
-//! ixy ixz iyy iyz izz, mass; gravity), with ten more if the arm has a payload (mass, centre of mass, ixx ixy ixz iyy
-//! iyz izz in the flange frame), `state` and 30 numbers (q, qd, qdd, torque, rotor inertia of six
-//! joints).
+//! Arms and states as lines of text. A `model` line has 136 numbers (7 joint origins xyz rpy; 7 links: origin, ixx ixy ixz iyy iyz izz,
+//! mass; gravity). If the arm has a payload, ten more follow (mass, centre of mass, ixx ixy ixz iyy iyz izz in the flange frame). A `state`
+//! line has 30 numbers (q, qd, qdd, torque and rotor inertia of six joints).
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin, Payload};
 
 pub enum Line {

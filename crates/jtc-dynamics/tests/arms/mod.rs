@@ -1,8 +1,8 @@
-//! Arms for the tests: the default one from its file, and random ones.
+//! Arms for the tests: the default arm from its file, and random arms.
 use jtc_dynamics::{ArmModel, JointVec, Link, Origin};
 use proptest::prelude::*;
 
-/// The arm of `arms/avena.toml`.
+/// Returns the arm of `arms/avena.toml`.
 pub fn avena() -> ArmModel {
     let file: toml::Table = include_str!("../../../../arms/avena.toml").parse().expect("arms/avena.toml");
     let number =
@@ -45,14 +45,14 @@ fn link() -> impl Strategy<Value = Link> {
     })
 }
 
-/// A physical arm.
+/// A random physical arm.
 pub fn model() -> impl Strategy<Value = ArmModel> {
     (prop::array::uniform7(origin(0.8)), prop::array::uniform7(link()))
         .prop_map(|(joints, links)| ArmModel { joints, links })
         .prop_filter("inertia of a body", |m| m.check().is_ok())
 }
 
-/// Six numbers within ±`scale`.
+/// Six random numbers within ±`scale`.
 pub fn vector(scale: f64) -> impl Strategy<Value = JointVec> {
     prop::array::uniform6(-scale..scale)
 }

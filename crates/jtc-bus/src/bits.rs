@@ -29,7 +29,7 @@ bit_words! {
     warning: u8 {
         /// Position not accurate.
         POSITION_NOT_ACCURATE = 0, "position not accurate";
-        /// Outside its working area.
+        /// The position is outside the working area.
         OUTSIDE_WORKING_AREA = 1, "outside working area";
         /// Magnetic field of the encoder out of range.
         MAGNETIC_FIELD = 2, "magnetic field of the encoder out of range";
@@ -41,7 +41,7 @@ bit_words! {
     error: u8 {
         /// Position encoder failed (oldest drives).
         POSITION_ENCODER = 0, "position encoder";
-        /// Motor-control fault: its bits identify it.
+        /// Motor-control fault. The motor-control bits show which one.
         MOTOR_CONTROL = 1, "motor-control fault";
         /// Joint over-speed.
         OVER_SPEED = 2, "over-speed";
@@ -49,7 +49,7 @@ bit_words! {
         HARDWARE = 3, "hardware fault of the gate driver";
     }
 
-    /// Motor-control fault bits of a joint (now, and occurred).
+    /// Motor-control fault bits of a joint (present, and occurred).
     motor_control: u8 {
         /// The current loop took too long.
         FOC_DURATION = 0, "current loop took too long";
@@ -73,13 +73,13 @@ bit_words! {
     config: u8 {
         /// Keep to the working area.
         WORKING_AREA = 0, "working area";
-        /// Absolute encoder on; without it the position reads 0.
+        /// Switches the absolute encoder on. Without it the position reads 0.
         ABSOLUTE_ENCODER = 1, "absolute encoder";
         /// React to the safety line.
         SAFETY_LINE = 2, "safety line";
         /// Watch the bus.
         BUS_WATCHDOG = 3, "bus watchdog";
-        /// Trip on over-speed; a configuration without this bit switches the trip off.
+        /// Trips on over-speed. A configuration without this bit switches the trip off.
         OVER_SPEED_TRIP = 4, "over-speed trip";
         with
         /// Default of a joint, 0x17.

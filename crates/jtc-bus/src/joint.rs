@@ -12,12 +12,12 @@ impl Joint {
     /// All joints, base to wrist.
     pub const ALL: [Self; JOINTS] = [Self(0), Self(1), Self(2), Self(3), Self(4), Self(5)];
 
-    /// Returns the joint with this number, 1..6, or `None` for another number.
+    /// Returns the joint with this number, 1..6. Returns `None` for another number.
     pub fn from_number(number: usize) -> Option<Self> {
         number.checked_sub(1).and_then(Self::from_index)
     }
 
-    /// Returns the joint at this index of an array, which is its node number, 0..5, or `None` for another index.
+    /// Returns the joint at this index of an array, 0..5, which is also its node number. Returns `None` for another index.
     pub fn from_index(index: usize) -> Option<Self> {
         Self::ALL.get(index).copied()
     }

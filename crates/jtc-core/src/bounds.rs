@@ -11,7 +11,7 @@ const MEASURED: f64 = 0.5;
 /// Number of speeds at which a friction polynomial is checked. A cubic changes little between them.
 const SPEEDS: u8 = 16;
 
-/// Bounds of gains, masses and friction. Values beyond them do not belong to an arm with these drives, and could throw or drop the arm
+/// Bounds of gains, masses and friction. No arm with these drives has values outside them, and such values could throw or drop the arm
 /// (J-06).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterBounds {
@@ -25,7 +25,7 @@ pub struct ParameterBounds {
     pub integral_max: f64,
     /// Largest torque on a joint at rest, as a share of its torque limit, that bounds of the integral may force if they exclude zero.
     pub integral_bias_max: f64,
-    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, holds 50 kg no further out than 0.73 m.
+    /// Heaviest link, kg. A drive of 360 N·m, the full scale of the bus, can hold 50 kg only up to a distance of 0.73 m.
     pub link_mass_max: f64,
     /// Largest moment or product of inertia of a link, kg·m²: the moment of a mass of 50 kg at a distance of 1.4 m.
     pub link_inertia_max: f64,
@@ -34,8 +34,8 @@ pub struct ParameterBounds {
     pub friction_max: f64,
     /// Like `friction_max`, but for speeds up to half of the velocity limit. Values up to 0.82 are in use.
     pub slow_friction_max: f64,
-    /// Largest friction torque that acts along a motion instead of against it, up to half of the velocity limit, as a share of the torque
-    /// limit. Noise of a measurement can cause such a torque.
+    /// Largest friction torque along a motion instead of against it, up to half of the velocity limit, as a share of the torque limit.
+    /// Measurement noise can cause such a torque.
     pub friction_reversed_max: f64,
     /// Largest friction torque at standstill, as a share of the torque limit.
     pub rest_friction_max: f64,

@@ -1,10 +1,10 @@
 //! Catching a load that the model lacks, when the joints are enabled (J-43).
 //!
-//! Such a load begins to fall when its joint is enabled. The joint then swings around the position at which it will be held, and at the end
-//! of the first swing the control law needs up to 1.7 times the torque that the model lacks. If that is beyond the torque limit, the limit
-//! is commanded, which stops every load that it can hold, and the set position *sags* towards the joint: by as much as the computed torque
-//! exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. If it were held at its old position
-//! instead, the joint would be thrown upwards and fall again; with little friction this would never end.
+//! Such a load begins to fall when its joint is enabled. The joint then swings around the position at which it will be held. At the end of
+//! the first swing the control law needs up to 1.7 times the torque that the model lacks. If that is above the torque limit, the limit is
+//! commanded, which stops every load that it can hold. Meanwhile the set position *sags* towards the joint, by as much as the computed
+//! torque exceeds the limit. So the joint comes to rest at the position at which the limit has stopped it. If it were held at its old
+//! position instead, the joint would be thrown upwards and fall again; with little friction this would never end.
 use crate::config::Config;
 use crate::deceleration::moves;
 use crate::limits::JointConfig;
@@ -20,7 +20,7 @@ const FAST_SWING: f64 = 0.1;
 /// State of a joint whose load may need to be caught.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Catch {
-    /// Time left for the catch, ms; 0: the catch is over, or the joint was not enabled.
+    /// Time left for the catch, ms. 0: the catch is over, or the joint was not enabled.
     left_ms: u16,
     /// Time left until the joint is considered caught, ms.
     busy_ms: u16,
@@ -107,7 +107,7 @@ impl Catch {
         *self = Self { settled: true, ..Self::default() };
     }
 
-    /// Returns `true` if the swing of a joint that has not settled yet has grown from one half to the next: its loop is unstable.
+    /// Returns `true` if a joint that has not settled yet swings with a growing amplitude, because its loop is unstable.
     pub fn swing_grows(&self) -> bool {
         !self.settled && self.peak_before > 0.0 && self.peak.abs() > self.peak_before.max(FAST_SWING)
     }

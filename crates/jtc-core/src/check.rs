@@ -5,9 +5,9 @@
 //! control points. An interval passes at once if a rough estimate of its hulls is within the limits (`screen`). For any other interval the
 //! curves are halved until the hull is within the limits or a point of the curve is outside (`curve`).
 //!
-//! Positions come in steps of 96 µrad. The effect of that rounding on the derivative is not a fault of the path, so the distance of each
-//! interval is reduced by one such step. `range` handles the effect on the positions themselves, and the path of a joint that begins
-//! outside its limits.
+//! Positions are rounded to steps of 96 µrad. The effect of this rounding on the derivative is not a fault of the path, so the distance of
+//! each interval is reduced by one step. `range` handles the effect on the positions themselves, and paths that begin outside the limits of
+//! a joint.
 mod curve;
 mod range;
 mod screen;

@@ -1,4 +1,4 @@
-//! Set values of the last ticks, so that a measurement is compared with the set value of the same time (J-62).
+//! Set values of the last ticks. A measurement is compared with the set value of the same time (J-62).
 //!
 //! A measurement is delayed: the drive read its encoder before it received the Move that it answered, and the command that follows from the
 //! measurement acts even later. The *due* position is the position that was commanded this *delay* ([`Config::delay_ticks`](crate::Config))

@@ -19,18 +19,17 @@ pub struct Config {
     /// A gripper is on the bus (J-20).
     pub gripper: bool,
     /// Behaviour of the gripper when the arm loses its torque, in Error and in Init. `true`: the pump is switched off until the host
-    /// switches it on again, and the gripper is in ReadyToOperate; a part drops. `false`: an enabled gripper does not change, and its pump
-    /// stays as it was commanded last; the gripper keeps its part.
+    /// switches it on again, and the gripper goes to ReadyToOperate, so that a part drops. `false`: an enabled gripper does not change, and
+    /// its pump keeps its last command, so that the gripper keeps its part.
     pub pump_off_on_error: bool,
     /// Full scale of the drives' velocity, rad/s (J-11).
     pub velocity_full_scale: f64,
     /// Speed at which the drives stop with an error of their own while configuration bit 0x10 is set, rad/s (J-35).
     pub drive_speed_trip: f64,
-    /// Time over which the drives average their speed, ms. The controller compares their position with their speed over this time (J-35); 0
-    /// means no comparison.
+    /// Time over which the drives average their speed, ms. The controller compares positions and speed over this time (J-35). 0: no
+    /// comparison.
     pub drive_speed_window_ms: u8,
-    /// Torque that twists a gear by 1 rad, N·m/rad: the position at one end of the gear may differ from the speed at the other by the twist
-    /// (J-35).
+    /// Torque that twists a gear by 1 rad, N·m/rad. The positions at the two ends of the gear may differ by the twist (J-35).
     pub gear_stiffness: f64,
     /// Step of the joints' encoders, rad: 16 bits a turn in the known drives, which is far coarser than the bus. While a joint is at rest,
     /// the integral does not change within one such step (J-41).

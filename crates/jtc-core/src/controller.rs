@@ -118,7 +118,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         &self.config
     }
 
-    /// Returns the number of frames of the joint bus that were ignored because they were not understood (J-15).
+    /// Returns the number of frames on the joint bus that were ignored because they could not be decoded (J-15).
     pub fn ignored_frames(&self) -> u32 {
         self.nodes.ignored
     }
@@ -151,7 +151,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             && !clearing
             && if self.powered() { !self.nodes.fallen_back() } else { self.nodes.all_ready(&self.config) };
         if initialised && !self.powered() && !self.parameters.holdable(self.nodes.positions(), &self.config) {
-            // The model was received before the positions were known: the host must send it again.
+            // The model was received before the positions were known, so the host must send it again.
             self.parameters.withdraw_model();
             initialised = false;
         }
@@ -174,7 +174,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
             return;
         }
         if matches!(next, ControllerState::Error | ControllerState::Init | ControllerState::Teaching) {
-            // J-24: a trajectory is never resumed after these states; the host must send it again.
+            // J-24: a trajectory is never resumed after these states, so the host must send it again.
             self.store.clear();
             self.set_trajectory(TrajectoryState::Null);
         }

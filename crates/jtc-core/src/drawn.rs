@@ -1,4 +1,4 @@
-//! Parts of the documents that tests generate from the code; `UPDATE_DOCS=1` writes them again.
+//! Parts of the documents that tests generate from the code. With `UPDATE_DOCS=1` the tests write these parts.
 extern crate std;
 use std::format;
 use std::path::Path;

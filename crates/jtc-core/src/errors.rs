@@ -1,4 +1,4 @@
-//! Errors latch (J-21): errors that have occurred, and errors that hold the controller in Error.
+//! Errors latch (J-21). This module stores the errors that have occurred, and the errors that hold the controller in Error.
 use crate::remembered::remembered;
 use crate::{JOINTS, error};
 
@@ -80,7 +80,7 @@ impl Errors {
         self.hold_joints(bits, false);
     }
 
-    /// Returns `true` if a held stop is latched: nothing moves until the host clears it.
+    /// Returns `true` if a held stop is latched, so that nothing moves until the host clears it.
     pub fn held_stop(&self) -> bool {
         any(&self.held)
     }
@@ -120,7 +120,7 @@ impl Errors {
         *self = Self::default();
     }
 
-    /// Returns `true` if an internal error is latched: it holds the safety output at 0 (J-22).
+    /// Returns `true` if an internal error is latched, which holds the safety output at 0 (J-22).
     pub fn internal(&self) -> bool {
         self.device || self.can != 0 || any(&self.joints)
     }

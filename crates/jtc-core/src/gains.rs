@@ -19,7 +19,7 @@ pub(crate) const POSES: usize = 17;
 /// Age of the derivative's torque beyond [`Config::delay_ticks`], ticks. It is half of the ticks over which the derivative is taken, plus
 /// half of the tick for which a torque is held.
 const DERIVATIVE_AGE: f64 = 3.0;
-/// Age of the torque of the position error beyond [`Config::delay_ticks`], ticks.
+/// Age of the position error's torque beyond [`Config::delay_ticks`], ticks.
 const POSITION_AGE: f64 = 0.5;
 /// Factors of the required inertia: of Kd and of Kp, each times the age of its torque. The result is 1.1 to 1.7 times the inertia at which
 /// the loop of one joint becomes stable, if Kp is at most half of the Kp that Kd can damp.

@@ -105,7 +105,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         self.last_stop = LastStop { cause, tick: self.observed.tick };
     }
 
-    /// Returns the measured value of a joint, and its limit, in the unit of the kind.
+    /// Returns the measured value of a joint and its limit, in the unit of the kind of the cause.
     fn measure(&self, kind: StopKind, joint: usize) -> (f64, f64) {
         // The index comes from this crate. This form lets the compiler see that it is in range.
         let j = joint.min(JOINTS - 1);

@@ -1,4 +1,4 @@
-//! Path time that is held back while a joint is overloaded by its motion (J-75).
+//! Slows down path time while a motion overloads a joint (J-75).
 //!
 //! If the arm is heavier or has more friction than its model, a path at the torque limits needs more torque than is available. A slower
 //! path needs less torque: the torque for inertia falls with the square of the rate. Therefore path time slows down as far as the joints at

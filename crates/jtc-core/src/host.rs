@@ -347,7 +347,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         }
     }
 
-    /// Returns `true` if a held stop is latched, or a joint yields (J-69), or the safety input stops the arm (J-22).
+    /// Returns `true` if a held stop is latched, a joint yields (J-69), or the safety input stops the arm (J-22).
     pub(crate) fn stops_held(&self) -> bool {
         self.errors.held_stop() || self.motion.law.any_yields() || self.safety_stop_ms.is_some()
     }

@@ -264,7 +264,7 @@ mod tests {
             prop_assert!((slope - speed).abs() < 1e-5 * (1.0 + speed.abs()), "{slope} {speed}");
         }
 
-        /// Rounding the positions to the int16 grid must not leak into velocity and acceleration.
+        /// Rounding the positions to the int16 grid must not change velocity and acceleration.
         #[test]
         fn j32_position_grid_leaves_the_other_channels_alone(a in point(), b in point(), u in 0.0..1.0f64) {
             let mut rounded = b;

@@ -150,7 +150,7 @@ pub(crate) fn check_set(set: (f64, f64, f64), error: f64, limits: &JointConfig, 
         | bit(error.abs() <= limits.position_error_max, joint_error::POSITION_ERROR)
 }
 
-/// Returns the part of the `wanted` torque that fits within the limit in addition to the present `torque`, N·m.
+/// Returns the part of the `wanted` torque that fits within the limit if it is added to the present `torque`, N·m.
 pub(crate) fn within(wanted: f64, torque: f64, torque_max: f64) -> f64 {
     let (low, high) = ((-torque_max - torque).min(0.0), (torque_max - torque).max(0.0));
     wanted.max(low).min(high)

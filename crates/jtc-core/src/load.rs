@@ -3,7 +3,7 @@ use crate::DT;
 use crate::limits::JointConfig;
 use crate::remembered::remembered;
 
-/// Ticks between two observations of a joint: one joint is observed in each tick.
+/// Ticks between two observations of the same joint. One joint is observed in each tick.
 const PERIOD: f64 = crate::JOINTS as f64;
 /// Time constant of the low-pass filter, s.
 const TIME_S: f64 = 1.0;

@@ -1,17 +1,17 @@
 //! Reactions of the controller to findings about a joint while it can still act, instead of taking the torque away (J-66).
 //!
-//! | found | reaction |
+//! | finding | reaction |
 //! |---|---|
-//! | a torque that is not a number; with `torque_reaction` 1 an overloaded joint | release: the torque of all joints becomes zero (J-21) |
-//! | anything else in Teaching | none: Teaching adds a bounded torque, and a joint that is led too fast ends it (J-25) |
-//! | an unstable loop: a torque that goes from limit to limit, or a swing that grows | the last gains come back, or the joint gets softer ones; it yields (J-68) |
-//! | the same joint again within 500 ms | release |
-//! | an overloaded joint that has not settled since it was enabled | it lowers its load (J-70) |
-//! | a joint that is pushed, or overloaded by its feedback torque; a position error | it yields (J-68), the others stop |
+//! | a torque of NaN; an overloaded joint if `torque_reaction` is 1 | release: the torque of all joints becomes zero (J-21) |
+//! | any other finding in Teaching | none: Teaching adds a bounded torque, and a joint that is led too fast ends it (J-25) |
+//! | an unstable loop: torque jumping between limits, or a growing swing | earlier or softer gains are used; the joint yields (J-68) |
+//! | the same joint is unstable again within 500 ms | release |
+//! | an overloaded joint that has not settled since it was enabled | the joint lowers its load (J-70) |
+//! | a joint that is pushed, or overloaded by its feedback torque; a position error | the joint yields (J-68), the others stop |
 //! | any other overloaded joint, on the path or the approach | path time is held back (J-75); if that does not help, the arm stops |
 //! | any other overloaded joint, in a jog | the jog ends (J-33) |
-//! | any other overloaded joint, at rest, or still in motion when a stop has taken its time | it lowers its load |
-//! | a limit of the path | the arm stops on its path, or its jog ends |
+//! | any other overloaded joint, at rest, or still moving at the end of the time for a stop | the joint lowers its load |
+//! | a set value above its limit | the arm stops on its path, or its jog ends |
 //!
 //! The first row that applies to a joint is used. All rows except the first end in a held stop (J-69): the arm is held, the cause is shown,
 //! and nothing moves until the host clears it.

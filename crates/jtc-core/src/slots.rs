@@ -4,12 +4,12 @@
 //! the newest image, so that the previous image stays complete until the new one is complete. A slot is a header of one flash word followed
 //! by the image, filled up to whole words:
 //!
-//! | bytes | what |
+//! | bytes | content |
 //! |---|---|
 //! | 0..4 | `JTCA` |
-//! | 4..6 | version of this form, 1 |
+//! | 4..6 | version of this layout, 1 |
 //! | 6..8 | 0 |
-//! | 8..12 | bytes of the image |
+//! | 8..12 | length of the image, bytes |
 //! | 12..16 | sequence number: the newer image has the higher one, modulo 2³² |
 //! | 16..28 | 0 |
 //! | 28..32 | CRC-32 (ISO-HDLC) of bytes 0..28 and of all words after them |

@@ -12,7 +12,7 @@ pub(crate) fn depth(position: f64, range: (f64, f64)) -> f64 {
     above - below
 }
 
-/// Returns the torque of a spring that is compressed by `depth` (rad), N·m: `most` at the position limit.
+/// Returns the torque of a spring that is compressed by `depth` (rad), N·m. At the position limit it is `most`.
 pub(crate) fn spring(depth: f64, most: f64) -> f64 {
     -most * depth / SOFT_END
 }

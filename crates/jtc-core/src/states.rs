@@ -1,4 +1,4 @@
-//! The states of the controller, and the choice of the next one (J-20 to J-25). docs/protocol-jtc.md draws this function.
+//! The states of the controller, and the choice of the next one (J-20 to J-25). The diagram in docs/protocol-jtc.md shows this function.
 use crate::ControllerState;
 
 /// Conditions that choose the next state.

@@ -314,7 +314,7 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Store<M> {
         }
     }
 
-    /// Returns the number of points, the last of them, and the state of the check after them; `None` without points.
+    /// Returns the number of points, the last point, and the state of the check after it. Returns `None` without points.
     pub fn tail(&self) -> Option<(u32, RawPoint, Passed)> {
         let last = *self.points.as_ref().get(..self.received)?.last()?;
         Some((self.received as u32, last, self.passed))

@@ -44,7 +44,7 @@ pub struct JointTelemetry {
 }
 
 impl JointTelemetry {
-    /// Returns the position error, rad: the position that was commanded for the time of the measurement minus the measured one.
+    /// Returns the position error, rad: the position that was commanded for the time of the measurement, minus the measured position.
     pub fn position_error(&self) -> f64 {
         self.due_position - self.position
     }

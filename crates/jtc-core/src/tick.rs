@@ -10,7 +10,7 @@ use crate::motion::{ControlMode, Found, LawInputs};
 use crate::{ControllerState, JOINTS, joint_error};
 
 impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
-    /// Runs one control tick (1 ms). The amount of work is bounded for any inputs.
+    /// Runs one control tick (1 ms). The amount of work is bounded, whatever the inputs are.
     pub fn tick(&mut self, inputs: &Inputs<'_>) -> Outputs {
         let before = self.state;
         // 1. Inputs. The error flags are formed before the commands of the host are executed, so that a clear cannot hide a fault that

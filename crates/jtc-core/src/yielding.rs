@@ -49,7 +49,7 @@ const DRIVEN_CALM_MS: u16 = 50;
 const LOADED: f64 = 0.05;
 /// Distance (rad) and time (ms) of sinking after which the joint is considered overloaded.
 const SINKS: (f64, u16) = (0.5, 3_000);
-/// Time constant of the load while it takes over the torque of the damper, s.
+/// Time constant with which the load takes over the torque of the damper, s.
 const LEARNS_S: f64 = 0.5;
 /// Range of the torque of spring and damper against a joint that its own load drives, as shares of that load; the rest is friction. If a
 /// load has driven the joint for [`DRIVEN_MS`], it does not exist: a person had leaned on the arm. The load fades with the time constant

@@ -67,7 +67,7 @@ impl LateArm {
         all
     }
 
-    /// Advances one millisecond. The controller sees an answer of the rig in the next tick, when it is one tick old.
+    /// Advances one millisecond. The controller receives an answer of the rig in the next tick, when it is one tick old.
     fn tick(&mut self) {
         self.past.pop_back();
         self.past.push_front(self.arm.q);

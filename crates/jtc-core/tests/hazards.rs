@@ -1,4 +1,4 @@
-//! Situations in which a controller that follows each rule by itself would still drop, jerk or misplace an arm.
+//! Situations in which a controller that follows each rule separately would drop, jerk or misplace an arm.
 use crate::rig;
 
 use jtc_bus::{NodeState, Request, warning};

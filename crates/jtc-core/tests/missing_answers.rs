@@ -109,7 +109,7 @@ fn correction(joint: &JointTelemetry) -> f64 {
     joint.torque - joint.torque_model
 }
 
-/// Returns the largest step of the correction in a tick that does not occur in the run without the fault, N·m.
+/// Returns the largest difference between the steps of the correction in the two runs, N·m.
 fn worst_step(clean: &[JointTelemetry], faulty: &[JointTelemetry]) -> f64 {
     let steps = |run: &[JointTelemetry]| -> Vec<f64> {
         run.windows(2).map(|pair| correction(&pair[1]) - correction(&pair[0])).collect()

@@ -1,5 +1,4 @@
-//! Joints that move faster than the limit, with or without a command (J-35), and limits that the drives cannot reach
-//! (J-35, J-43).
+//! Joints that move above their limit, with or without a command (J-35), and limits that the drives cannot reach (J-35, J-43).
 use crate::rig;
 
 use jtc_core::{Config, ConfigError, ControllerState, joint_error};

@@ -215,8 +215,8 @@ fn j60_j58_joints_are_not_jogged_on_the_way_and_a_payload_is_not_set_while_they_
     assert_eq!(set(&mut rig, &point_mass(2.0)), DataStatus::NoError);
 }
 
-/// A payload that a joint cannot hold in its present position is refused, and so are values that are not a valid body.
-/// A refused payload is never taken partly.
+/// A payload is refused if a joint cannot hold it in its present position, or if it is not a valid body. A refused payload is never applied
+/// in part.
 #[test]
 fn j60_a_payload_is_taken_whole_or_refused() {
     let mut rig = holding_at(&POSES[1]);

@@ -8,7 +8,7 @@ use rig::{Rig, point, rest, segment_body};
 
 const SEGMENT: FrameType = FrameType::Trajectory;
 
-/// A path of 4 s in which joint 1 reaches 0.4 rad/s. Its points are the sum of two cosines, 10 ms apart.
+/// A path of 4 s in which joint 1 follows a cosine and reaches 0.4 rad/s. Its points are 10 ms apart.
 fn path() -> Vec<RawPoint> {
     let w = core::f64::consts::TAU / 4.0;
     (0..=400)

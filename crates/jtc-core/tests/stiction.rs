@@ -118,7 +118,7 @@ fn j41_a_motion_ends_without_hunting() {
     }
 }
 
-/// Returns a point of a motion of 0.3 rad out (`u` 0 to 1) and back (1 to 2), 2 s each, from the hold position.
+/// Returns a point of a motion from the hold position: 0.3 rad out (`u` 0 to 1) and back (1 to 2), 2 s each.
 fn point(rig: &Rig, u: f64) -> RawPoint {
     let (u, back) = if u > 1.0 { (2.0 - u, -1.0) } else { (u, 1.0) };
     let way = 0.3 * u * u * u * (10.0 + u * (6.0 * u - 15.0));

@@ -121,8 +121,8 @@ fn j25_teaching_is_left_without_a_step_and_without_sag() {
     }
 }
 
-/// Returns the largest speed of a joint after the end of a contact that HoldPos had found, rad/s: a load of `mass` kg
-/// at the flange, or a push against the first joint. Returns `None` if Teaching waits until the contact has ended.
+/// Returns the largest speed of a joint after the end of a contact that HoldPos had found, rad/s. The contact is a load of `mass` kg at the
+/// flange or, for 0 kg, a push on the joints. Returns `None` if Teaching waits until the contact has ended.
 fn fastest_after_contact(pose: [f64; 6], factor: f64, mass: f64) -> Option<f64> {
     let mut arm = Plant::new(&model(), LuGre::of_avena_times(factor), pose);
     // A contact that lasts this long is learned as a load, and not detected as a push.

@@ -25,7 +25,7 @@ struct Composite {
     yz: f64,
 }
 
-/// Rotates the plane part of a symmetric matrix by (s, c). Returns its two diagonal entries and the product between them.
+/// Rotates the plane part of a symmetric matrix by (s, c). Returns its two diagonal entries and its off-diagonal entry.
 #[inline(always)]
 fn rotate_plane(s: f64, c: f64, a: f64, b: f64, ab: f64) -> (f64, f64, f64) {
     let w = s * (a - b) + (c + c) * ab;

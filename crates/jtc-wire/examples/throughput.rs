@@ -1,5 +1,5 @@
-//! Prints the throughput of the CRC and of the stream parser as one JSON object: `cargo run --profile dist -p jtc-wire --example
-//! throughput`.
+//! Prints the throughput of the CRC and of the stream parser as one JSON object. Run it with `cargo run --profile dist -p jtc-wire
+//! --example throughput`.
 use std::hint::black_box;
 
 use crc::{CRC_16_XMODEM, Crc, Table};

@@ -20,7 +20,7 @@ pub struct ReceivedEvent<'a> {
     pub event: LinkEvent<'a>,
 }
 
-/// Events in the order of execution. All fields are integers, so that all zeros are an empty batch.
+/// Events in the order of execution. All fields are integers, so that a memory of zeros is an empty batch.
 pub struct EventBatch {
     /// Number of stored events, and number of those that are done.
     len: u16,

@@ -6,17 +6,17 @@ bit_words! {
     error: u16 {
         /// Safety input low.
         EMERGENCY_INPUT = 0, "emergency input";
-        /// Safety output held at 0 by an internal error.
+        /// An internal error holds the safety output at 0.
         EMERGENCY_OUTPUT = 1, "emergency output";
         /// Any internal error.
         INTERNAL = 2, "internal error";
         /// Any external error.
         EXTERNAL = 3, "external error";
-        /// A joint's internal error.
+        /// A joint has an internal error.
         INTERNAL_JOINTS = 4, "internal joints error";
         /// CAN timeout or bus-off.
         INTERNAL_CAN = 5, "internal CAN error";
-        /// Host link (not used by this controller: a silent host is no error).
+        /// Error of the host link. Not used by this controller, which does not report a silent host as an error.
         INTERNAL_COM = 6, "internal COM error";
         /// A node reports an error or misbehaves.
         EXTERNAL_JOINTS = 7, "external joints error";
@@ -24,17 +24,17 @@ bit_words! {
 
     /// Bits of a joint's internal error words, current and occurred.
     joint_error: u16 {
-        /// Set position over limit.
+        /// A set position exceeds its limit.
         POSITION = 0, "position over limit";
-        /// Set velocity over limit, or measured speed over its own (J-35).
+        /// A set velocity exceeds its limit, or a measured speed exceeds its own limit (J-35).
         VELOCITY = 1, "velocity over limit";
-        /// Set acceleration over limit.
+        /// A set acceleration exceeds its limit.
         ACCELERATION = 2, "acceleration over limit";
-        /// Computed torque over limit.
+        /// A computed torque exceeds its limit.
         TORQUE = 3, "torque over limit";
-        /// Position error over limit.
+        /// The position error exceeds its limit.
         POSITION_ERROR = 4, "position error over limit";
-        /// No friction table value.
+        /// The friction table has no value.
         FRICTION_TABLE = 5, "friction table value missing";
     }
 
@@ -51,7 +51,7 @@ bit_words! {
 
 /// Bits of the CAN flags, current and occurred.
 pub mod can_flag {
-    /// Frames of the controller are not acknowledged, or the controller is off the bus.
+    /// Frames of the controller are not acknowledged, or its CAN controller is bus-off.
     pub const TRANSMIT_TIMEOUT: u32 = 1 << 0;
 
     /// Bit 8+n: node n (joints 0..5, gripper 6) does not answer.

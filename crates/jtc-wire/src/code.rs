@@ -87,7 +87,7 @@ impl<T: Known> Code<T> {
         self.byte
     }
 
-    /// Returns the variant of this code, or `None` if this version does not know the code.
+    /// Returns the variant of this code. Returns `None` if this version does not know the code.
     pub fn known(self) -> Option<T> {
         T::ALL.iter().copied().find(|known| known.code() == self.byte)
     }

@@ -100,8 +100,8 @@ pub const POINT_LEN: usize = 36;
 pub const FRAME_POINTS_MAX: usize = (FRAME_MAX - TRAJECTORY_OVERHEAD) / POINT_LEN;
 
 impl FrameType {
-    /// Returns the lengths of whole frames of this type. Some hosts send ClearCurrentErrors and FrictionPolynomial with 6 bytes (J-06). The
-    /// three lengths of JtcStatus are those of J-08.
+    /// Returns the lengths of whole frames of this type. Some hosts send ClearCurrentErrors and FrictionPolynomial with 6 bytes (J-06).
+    /// JtcStatus has the three lengths of J-08.
     pub const fn lengths(self) -> Lengths {
         use FrameType::*;
         match self {

@@ -111,7 +111,7 @@ impl StatusReceiver {
         Some(frame)
     }
 
-    /// Returns the bytes of the frame that [`next_frame`](Self::next_frame) returned last, to pass it on.
+    /// Returns the bytes of the frame that [`next_frame`](Self::next_frame) returned last, for a program that passes it on.
     pub fn frame_bytes(&self) -> &[u8] {
         self.held.get(..self.used).unwrap_or(&[])
     }

@@ -31,7 +31,7 @@ states! {
         /// Set-up is not complete.
         #[default]
         Start = 0;
-        /// Nodes are brought up, parameters are awaited; zero torque.
+        /// The nodes are brought up and parameters are awaited. The torque is zero.
         Init = 1;
         /// Holds a position.
         HoldPos = 2;
@@ -39,7 +39,7 @@ states! {
         Operate = 3;
         /// Gravity compensation only.
         Teaching = 4;
-        /// Zero torque until the cause is gone and the host has cleared.
+        /// The torque is zero until the cause has ended and the host has cleared the error.
         Error = 5;
     }
 }
@@ -52,20 +52,20 @@ impl ControllerState {
 }
 
 states! {
-    /// What becomes of the trajectory, "trajectory execution state" (TES) in manuals.
+    /// State of the trajectory; "trajectory execution state" (TES) in manuals.
     TrajectoryState, "unknown" {
         /// No trajectory.
         #[default]
         Null = 0;
-        /// Complete, at its start.
+        /// The trajectory is complete and at its start.
         Stop = 1;
         /// Paused on the path.
         Pause = 2;
         /// Being executed (until standstill).
         Execute = 3;
-        /// Executed to its last point.
+        /// The trajectory was executed to its last point.
         Finish = 4;
-        /// Being received. Only older controllers report it.
+        /// The trajectory is being received. Only older controllers report this state.
         TransNullToStop = 5;
     }
 }

@@ -118,7 +118,7 @@ enum ScanResult {
 }
 
 impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
-    /// `inter_byte_timeout_us`: silence that ends a frame, µs (5000).
+    /// Creates a parser. `inter_byte_timeout_us`: silence that ends a frame, µs (5000).
     pub fn new(buffer: B, inter_byte_timeout_us: u32) -> Self {
         Self {
             buffer,
@@ -145,10 +145,10 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.buffer.as_ref().len().min(FRAME_MAX)
     }
 
-    /// Takes bytes that were received until `now_us` and returns how many were taken. If the buffer is full, it takes fewer: offer the
-    /// remainder again after `release` or more `poll`s. The delay of these bytes does not count as a gap.
+    /// Takes bytes that were received until `now_us`, and returns how many were taken. A full buffer takes fewer bytes. Offer the remainder
+    /// again after `release` or more `poll`s. The delay of these bytes is not a gap.
     ///
-    /// Call it at least once every 2 ms while bytes arrive. Two calls that are the inter-byte timeout or more apart have a gap between
+    /// Call it at least once every 2 ms while bytes arrive. If two calls are at least the inter-byte timeout apart, there is a gap between
     /// them.
     pub fn push(&mut self, now_us: u64, bytes: &[u8]) -> usize {
         if bytes.is_empty() {
@@ -174,17 +174,17 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.registers.absorb(self.end, taken);
         self.end += taken.len();
         self.refused = taken.len() < bytes.len();
-        // If none of the bytes was taken, the gap before them is marked already.
+        // If none of the bytes was taken, the gap before them has already been stored.
         self.gap_before_refused = false;
         self.last_us = now_us;
         taken.len()
     }
 
-    /// Scans for the next event with bounded work. Returns true if `event` has one. Call it after `push` and at least once per millisecond,
-    /// so that gaps are detected. If it returns false and [`busy`](Self::busy) is true, the next call continues the scan.
+    /// Scans for the next event with a bounded amount of work. Returns true if `event` has one. Call it after `push`, and at least once per
+    /// millisecond, so that gaps are detected. If it returns false and [`busy`](Self::busy) is true, the next call continues the scan.
     pub fn poll(&mut self, now_us: u64) -> bool {
         if !self.refused && now_us.saturating_sub(self.last_us) >= self.inter_byte_timeout_us {
-            // A full list of gaps ends in one at the last byte or is shortened below.
+            // If the list of gaps is full, its last gap is at the last byte, or the list becomes shorter below.
             self.gaps.mark(self.end);
         }
         self.busy = false;
@@ -226,7 +226,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         true
     }
 
-    /// Returns the event that was found, until it is released.
+    /// Returns the event that was found. It remains until it is released.
     pub fn event(&self) -> Option<LinkEvent<'_>> {
         Some(match self.event? {
             Found::Frame(frame_type, n) => {
@@ -238,8 +238,8 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Returns the position in the stream of the first byte of the event, counted from the first byte ever pushed. This position orders the
-    /// event and the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
+    /// Returns the position of the first byte of the event, counted from the first byte that was pushed. With this position the event can
+    /// be ordered relative to the urgent commands that an [`UrgentWatch`](crate::UrgentWatch) has found.
     pub fn event_position(&self) -> Option<u64> {
         Some(match self.event? {
             Found::Frame(..) => self.base + self.start as u64,
@@ -247,13 +247,13 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         })
     }
 
-    /// Returns the event as a controller gets it, with the number of its line.
+    /// Returns the event in the form that a controller uses, with the number of its line.
     pub fn received(&self, line: usize) -> Option<ReceivedEvent<'_>> {
         let (event, position) = (self.event()?, self.event_position()?);
         Some(ReceivedEvent { line, position, plain: self.plain, event })
     }
 
-    /// Decides for a complete frame whether its line was plain when the frame began. An extension request makes the line known.
+    /// Decides for a complete frame whether its line was plain when the frame began. An extension request ends the plain state of its line.
     fn judge(&mut self, kind: FrameType, now_us: u64) {
         let (position, seen_us) = self.began;
         let began_us = if position == self.base + self.start as u64 { seen_us } else { now_us };
@@ -264,9 +264,9 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Discards all held bytes and the event, because bytes were lost before the next one, which is byte `position` of the stream. The loss
-    /// is reported as one run that was not received to its end (J-04). The next bytes do not continue a frame. Up to the next frame they
-    /// belong to that run.
+    /// Discards all held bytes and the event, because bytes were lost before the next one, whose position in the stream is `position`. The
+    /// loss is reported as one run that was not received to its end (J-04). The next bytes do not continue a frame. Up to the next frame
+    /// they belong to that run.
     pub fn restart(&mut self, position: u64) {
         (self.base, self.start, self.end) = (position, 0, 0);
         (self.refused, self.gap_before_refused) = (false, false);
@@ -292,7 +292,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         self.end > self.start + frame
     }
 
-    /// Returns true if the last `poll` stopped because its work is bounded. The next call can then scan more without new bytes.
+    /// Returns true if the last `poll` stopped because its work is bounded. The next call can then continue without new bytes.
     pub fn busy(&self) -> bool {
         self.busy
     }
@@ -315,7 +315,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
         let Some(&byte) = seen.get(field::TYPE) else {
             return match closed {
-                // A header and nothing more.
+                // A header without a type.
                 Some(_) => run(Sort::Noise, 0, FrameStatus::DiscontinuousFrame, seen.len()),
                 None => ScanResult::Wait,
             };
@@ -345,7 +345,7 @@ impl<B: AsRef<[u8]> + AsMut<[u8]>> Receiver<B> {
         }
     }
 
-    /// Skips the first held byte and at most `most` more, up to the next header or gap. Returns how many more.
+    /// Skips the first held byte and at most `most` further bytes, up to the next header or gap. Returns the number of further bytes.
     fn pass_over(&mut self, most: usize) -> usize {
         self.start += 1;
         let limit = self.gaps.first().unwrap_or(self.end).min(self.start + most);
@@ -394,7 +394,7 @@ impl Gaps {
         self.count = self.count.saturating_sub(1);
     }
 
-    /// Stores a gap before the byte at `place`, which must not be before the stored gaps. Returns false if the list is full.
+    /// Stores a gap before the byte at `place`. The gaps must be stored in order. Returns false if the list is full.
     fn mark(&mut self, place: usize) -> bool {
         let place = place as u16;
         if self.places[..self.count].last() == Some(&place) {

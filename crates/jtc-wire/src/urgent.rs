@@ -1,14 +1,14 @@
-//! Stop and Pause before all other frames: they are found in the bytes of a line as they arrive, independently of the parsing of frames
-//! (J-04).
+//! Stop and Pause take effect before all other frames. They are found in the bytes of a line when these arrive, independently of the
+//! parsing of frames (J-04).
 //!
 //! A frame may wait for the frames before it, for a false header that announces bytes which never come, or for space in a full buffer. A
-//! Stop must not wait. Therefore the watch recognises the seven bytes of a Stop or a Pause at any position, and the command acts in the
-//! next tick. The frame itself still passes through the [`Receiver`](crate::Receiver) and gets its response record in its turn. From its
-//! position in the stream the controller sees that the command has already acted, and that an Execute that was received before it must no
-//! longer be executed.
+//! Stop must not wait. Therefore the watch recognises the seven bytes of a Stop or a Pause at any position, and the command takes effect in
+//! the next tick. The frame itself still passes through the [`Receiver`](crate::Receiver) and gets its response record when it is its turn.
+//! From its position in the stream the controller can see that the command has already taken effect, and that an Execute that was received
+//! earlier must no longer be executed.
 //!
-//! The price: the same seven bytes inside the body of another frame also stop the arm. This error is on the safe side. In a body of random
-//! bytes it occurs at one in 2⁵⁶ positions.
+//! The disadvantage is that the same seven bytes inside the body of another frame also stop the arm. This error is on the safe side. In a
+//! body of random bytes it occurs at one of 2⁵⁶ positions.
 use crate::command::ExecCommand;
 use crate::fixed;
 
@@ -30,7 +30,7 @@ impl From<UrgentCommand> for ExecCommand {
 }
 
 impl UrgentCommand {
-    /// Stop or Pause; `None` for Execute.
+    /// Returns Stop or Pause; `None` for Execute.
     pub const fn from_exec(command: ExecCommand) -> Option<Self> {
         match command {
             ExecCommand::Stop => Some(Self::Stop),
@@ -40,7 +40,7 @@ impl UrgentCommand {
     }
 }
 
-/// The urgent commands that arrived on a line in one tick: the number of each, and which was the last.
+/// The urgent commands that arrived on a line in one tick: the number of each, and the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct UrgentCommands {
     stops: u8,

@@ -55,7 +55,7 @@ pub(super) fn leaves<const N: usize>(
     None
 }
 
-/// Returns the control point that is furthest outside, and the bound that it crosses.
+/// Returns the control point that is furthest outside, and the bound that it exceeds.
 fn outside<const N: usize>(curve: &[f64; N], low: f64, high: f64) -> Option<(f64, f64)> {
     let lowest = curve.iter().fold(f64::INFINITY, |a, &b| a.min(b));
     let highest = curve.iter().fold(f64::NEG_INFINITY, |a, &b| a.max(b));

@@ -67,7 +67,7 @@ impl Screen {
         }
     }
 
-    /// Returns `true` if point `b`, and the interval between it and point `a` before it, are certainly within every bound.
+    /// Returns `true` if point `b`, and the interval from point `a` to it, are certainly within every bound.
     pub fn passes(&self, a: &Steps, b: &Steps) -> bool {
         let (kv, ka) = (self.per_velocity, self.per_acceleration);
         let mut good = true;

@@ -47,7 +47,8 @@ impl<M: AsRef<[RawPoint]> + AsMut<[RawPoint]>> Controller<M> {
         loaded
     }
 
-    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] requests it; empty without a stored arm.
+    /// Returns the image of the stored arm, which the board writes when [`crate::Outputs::store`] requests it. The image is empty if no arm
+    /// is stored.
     pub fn stored_arm(&self) -> &[u8] {
         self.extensions.stored.bytes()
     }

@@ -1,4 +1,4 @@
-//! Parts of the extensions for logs (J-56): the name of the firmware, and the points of the trajectory.
+//! Parts of the extensions for logs (J-56): the hash of the firmware, and the points of the trajectory.
 use jtc_wire::{Answer, Hash, PAGE_POINTS, POINT_LEN, Points, RawPoint};
 
 use crate::controller::Controller;

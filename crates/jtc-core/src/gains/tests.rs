@@ -1,4 +1,4 @@
-//! Gains against the inertia that they need, and the result of gains on trial.
+//! Tests of the inertia that gains need, and of gains on trial.
 use proptest::prelude::*;
 
 use super::*;

@@ -1,4 +1,4 @@
-//! The control law: τ = τ_id + τ_pid + τ_fric, each tick, for each joint (J-40 to J-44).
+//! The control law for each joint in each tick: τ = τ_id + τ_pid + τ_fric (J-40 to J-44).
 use jtc_dynamics::Dynamics;
 
 use super::set_values::{Latched, SetValues};

@@ -38,7 +38,7 @@ pub(crate) struct SetValues {
 remembered!(SetValues { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog });
 
 impl SetValues {
-    /// Releases all joints: none is held, and the set position is the measured one.
+    /// Releases all joints: no joint is held, and the set position equals the measured one.
     pub fn release(&mut self, nodes: &Nodes) {
         let Self { point, commanded, holding, absent, found_moving, catch, deceleration, led, jog } = self;
         *point = SetPoint::still(*nodes.positions());

@@ -40,7 +40,7 @@ pub(super) struct Transfer {
     falls: [bool; JOINTS],
     /// Time left until all steps are blended out, ms.
     left_ms: u16,
-    /// Joints that yield from this tick on: their torque falls within [`FALL_MS`].
+    /// Joints that yield from this tick on. Their torque falls within [`FALL_MS`].
     yields: [bool; JOINTS],
     /// Joints that were latched in this tick. Their torque begins at the torque of the model.
     just_enabled: [bool; JOINTS],

@@ -11,7 +11,8 @@ const MOVES_BETWEEN: u8 = 3;
 const MOVES_ASIDE: u8 = 19;
 
 impl Nodes {
-    /// Creates the frame of this tick (J-12). `must_move`: the first frame after an error, or after power is taken away, is Move.
+    /// Creates the frame of this tick (J-12). `must_move`: this frame must be a Move, because it is the first one after an error or after
+    /// the torque was taken away.
     pub fn frame(
         &mut self,
         config: &Config,

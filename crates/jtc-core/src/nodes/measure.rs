@@ -240,7 +240,7 @@ impl Measurement {
     }
 
     /// Returns the speed of the joint, rad/s: its reported velocity or the rate of its positions, whichever is higher. Reported velocities
-    /// are not trusted alone: their full scale depends on the drive (J-11).
+    /// alone are not trusted, because their full scale depends on the drive (J-11).
     pub fn speed(&self) -> f64 {
         self.used.velocity.abs().max(self.rate.abs())
     }

@@ -40,7 +40,7 @@ pub(crate) struct Node {
     /// Ticks left in which silence of the node is not an error yet.
     pub(super) boot_left: u32,
     pub(super) deaf_left: u8,
-    /// The node is commanded to Init to clear its errors, until it has followed (J-21).
+    /// The node is commanded to Init to clear its errors, until it is in Init (J-21).
     pub(super) clear: bool,
     /// A reset frame must be sent.
     pub(super) reset: bool,
@@ -51,7 +51,7 @@ pub(crate) struct Node {
     pub(super) fresh: bool,
     /// The joint is marked as absent (J-53).
     pub(super) absent: bool,
-    /// State that the node reported although its joint is absent.
+    /// State that the node reported while its answers are ignored.
     pub(super) unasked: Option<NodeState>,
     /// Number of answers since the last tick. All except the last one were late.
     pub(super) answers: u8,
@@ -97,7 +97,7 @@ impl Node {
         self.absent
     }
 
-    /// Returns the reported state; Start for an absent joint, unless its drive still reports.
+    /// Returns the reported state. For an absent joint this is Start, unless its drive still reports.
     pub fn state(&self) -> NodeState {
         if self.absent { self.unasked.unwrap_or(NodeState::START) } else { self.report.state }
     }

@@ -182,7 +182,7 @@ fn j16_a_configuration_accepted_in_this_tick_counts_from_the_next_answer() {
     assert!(!nodes.node(2).configured && !nodes.node(2).seen);
 }
 
-/// A pump is on from its command until the gripper leaves OperationEnable or loses its configuration.
+/// A pump stays on from its command until the gripper leaves OperationEnable or loses its configuration.
 #[test]
 fn j23_a_gripper_is_lost_when_it_leaves_what_it_was_in() {
     for (configured, before, now, lost) in [

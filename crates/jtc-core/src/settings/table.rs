@@ -1,5 +1,5 @@
-//! The table of settings (J-53): number in the wire format, name, unit, range, meaning, and field of each. Docs, arm files and `jtc arm
-//! show` are generated from it. A number is never used again: 59 to 63 belonged to an earlier Teaching.
+//! The table of settings (J-53): number in the wire format, name, unit, range, meaning, and field of each. Docs, arm files and the output
+//! of `jtc arm show` are generated from it. A number is never used again: 59 to 63 belonged to an earlier Teaching.
 use super::{Kind, Live, Setting};
 use crate::config::Config;
 

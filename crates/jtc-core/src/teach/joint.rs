@@ -14,7 +14,7 @@ const FAST: (f64, f64) = (0.4, 0.8);
 pub(super) const DAMPING_RATE: f64 = 90.0;
 /// Speed at which the damping of a joint balances the load that it carries, rad/s, if its inertia tolerates so much damping.
 const SINKS: f64 = 0.5;
-/// Value to which the damping grows, as a multiple of the torque limit, s/rad.
+/// Value to which the damping grows, divided by the torque limit, s/rad.
 const GROWN: f64 = 1.0;
 /// Speeds between which a brake is added to the damping, rad/s, and deceleration of that brake, rad/s². The brake is too weak to reverse a
 /// joint before that is measured. Without it, over-speed would release the arm.

@@ -65,7 +65,7 @@ pub mod capability {
 }
 
 codes! {
-    /// Why a device started.
+    /// Cause of the start of a device.
     #[derive(Default)]
     #[allow(missing_docs)]
     BootCause {
@@ -81,7 +81,7 @@ codes! {
 }
 
 codes! {
-    /// What becomes of a stored arm (J-54).
+    /// State of the memory for a stored arm (J-54).
     #[derive(Default)]
     #[allow(missing_docs)]
     StoreState {

@@ -13,7 +13,7 @@ pub const LOG_PAGE: usize = (ANSWER_MAX - FRAME_MIN - LOG_HEAD_LEN) & !3;
 pub const LOG_NO_BLOCK: u32 = u32::MAX;
 
 codes! {
-    /// What a flight recorder does, or why its log ends (J-56).
+    /// State of a flight recorder, or the reason why its log ends (J-56).
     #[derive(Default)]
     #[allow(missing_docs)]
     LogState {

@@ -5,21 +5,21 @@ use crate::bits::joint_error;
 use crate::code::codes;
 
 codes! {
-    /// Why the arm came to a held stop, or a motion was given up.
+    /// Kind of the cause of a held stop, or of a motion that was given up.
     #[derive(Default)]
     StopKind {
         /// A torque was at its limit for too long (J-43).
         #[default]
         Overload = 1, "overload";
-        /// Something pushed a joint: the torque against it says so (J-66).
+        /// A push on a joint, which was detected by the torque against it (J-66).
         Push = 2, "push";
-        /// A joint was too far from where it was commanded to be (J-43).
+        /// The position error of a joint was too large (J-43).
         PositionError = 3, "position error";
-        /// A commanded position was beyond its limit.
+        /// A commanded position exceeded its limit.
         Position = 4, "position over limit";
-        /// A commanded velocity was beyond its limit.
+        /// A commanded velocity exceeded its limit.
         Velocity = 5, "velocity over limit";
-        /// A commanded acceleration was beyond its limit.
+        /// A commanded acceleration exceeded its limit.
         Acceleration = 6, "acceleration over limit";
         /// The friction table has no value for a commanded velocity (J-42).
         FrictionTable = 7, "friction table value missing";
@@ -29,11 +29,12 @@ codes! {
         EncoderJump = 9, "encoder jump";
         /// The position and the speed that a drive reports differ by a factor (J-35).
         SpeedScale = 10, "speed scale";
-        /// An arm that was enabled late was too far from the path, or had too little torque left for the way to it (J-34).
+        /// An arm whose drives were enabled late was too far from the path, or its torque limits left too little torque for the approach
+        /// (J-34).
         Approach = 11, "approach";
-        /// A joint did not bear the gains that it was given under torque: those before are in use again (J-71).
+        /// A joint could not be held with new gains that were received under torque. The earlier gains are in use again (J-71).
         Gains = 12, "gains";
-        /// Something pushed a joint, which moved away faster than its torque told (J-66).
+        /// A push on a joint, which was detected by its speed before its torque (J-66).
         Shove = 13, "shove";
     }
 }

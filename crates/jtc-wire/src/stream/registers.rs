@@ -1,17 +1,17 @@
-//! CRC registers kept along the receive buffer, so that a candidate of any length is checked with two of them.
+//! CRC registers that are stored along the receive buffer, so that a candidate of any length can be checked with two of them.
 use crate::crc::crc16_update;
 use crate::frame::FRAME_MAX;
 
-/// Bytes between two kept CRC registers.
+/// Number of bytes between two stored CRC registers.
 const GRID: usize = 64;
-/// CRC registers kept.
+/// Number of stored CRC registers.
 const REGISTERS: usize = FRAME_MAX.div_ceil(GRID) + 1;
 
 /// CRC registers along the buffer: before its first byte, and before the bytes `phase`, `phase + 64`, …
 pub(super) struct Registers {
     base: u16,
     last: u16,
-    /// 1..=GRID.
+    /// Position of the first stored register, 1..=GRID.
     phase: usize,
     count: usize,
     kept: [u16; REGISTERS],
@@ -22,7 +22,7 @@ impl Registers {
         Self { base: 0, last: 0, phase: GRID, count: 0, kept: [0; REGISTERS] }
     }
 
-    /// Continues over `bytes`, which are at `end..` of the buffer.
+    /// Computes the registers for `bytes`, which are at `end..` of the buffer.
     pub fn absorb(&mut self, mut end: usize, mut bytes: &[u8]) {
         while !bytes.is_empty() {
             let next = self.phase + self.count * GRID;
@@ -46,7 +46,7 @@ impl Registers {
         }
     }
 
-    /// Drops the bytes before `by`.
+    /// Removes the bytes before `by`.
     pub fn shift(&mut self, by: usize, buffer: &[u8]) {
         self.base = self.at(by, buffer);
         if by >= self.phase {
@@ -66,7 +66,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// Bytes in pieces, and now and then some gone from the front.
+    /// Bytes arrive in pieces, and some are removed from the front now and then.
     fn steps() -> impl Strategy<Value = Vec<(Vec<u8>, Option<prop::sample::Index>)>> {
         let piece = prop::collection::vec(any::<u8>(), 0..200);
         prop::collection::vec((piece, any::<Option<prop::sample::Index>>()), 1..12)
@@ -75,7 +75,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig { failure_persistence: None, ..Default::default() })]
 
-        /// At every place the register of the whole stream, and from fewer than `GRID` bytes: those before are overwritten.
+        /// At every position the register equals that of the whole stream. It is computed from fewer than `GRID` bytes, because older ones
+        /// are overwritten.
         #[test]
         fn any_register_from_a_few_bytes(steps in steps()) {
             let (mut registers, mut gone, mut held) = (Registers::new(), Vec::new(), Vec::new());

@@ -4,7 +4,7 @@ use crate::remembered::remembered;
 
 /// Number of answers over which a rate is computed, and least time for it, ms.
 const WINDOW: usize = 5;
-/// Slots of the ring: a power of two, so that an index needs no comparison.
+/// Number of slots in the ring: a power of two, so that an index needs no comparison.
 const SLOTS: usize = 16;
 const WINDOW_MS: u32 = 5;
 /// Inverse of the time over which the rate is computed while no answer is lost, 1/s.

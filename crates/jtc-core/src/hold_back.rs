@@ -36,7 +36,7 @@ pub(crate) struct HoldBack {
     quiet_ms: u16,
     /// Ticks of this run in which the path was held back.
     run_ms: u16,
-    /// Joints that have been at their limits since then, a bit each.
+    /// Joints that have been at their limits since holding back began, a bit each.
     pressed: u8,
 }
 

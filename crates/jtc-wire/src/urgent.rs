@@ -131,8 +131,9 @@ pub struct UrgentWatch<const LINES: usize> {
 }
 
 impl<const LINES: usize> UrgentWatch<LINES> {
-    /// `inter_byte_timeout_us`: silence after which bytes no longer belong to the same frame, µs. Times are only as precise as the calls of
-    /// `scan`. If this timeout is one tick longer than the timeout of the receiver, every Stop that the receiver finds is also found here.
+    /// Creates a watch. `inter_byte_timeout_us`: silence after which bytes no longer belong to the same frame, µs. Times are only as
+    /// precise as the calls of `scan`. If this timeout is one tick longer than the timeout of the receiver, every Stop that the receiver
+    /// finds is also found here.
     pub const fn new(inter_byte_timeout_us: u32) -> Self {
         let tail =
             Tail { window: 0, received: 0, last_us: 0, commands: UrgentCommands::NONE, hit: 0, overtaken: 0 };

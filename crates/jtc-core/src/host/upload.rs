@@ -18,8 +18,8 @@ const COPIED_PER_TICK: usize = 64;
 /// State of the last upload that was begun on a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct LineUpload {
-    /// Segment 0 of the upload came on a plain line (J-51). `None` before the first upload, and after the Execute of an upload that came on
-    /// another kind of line.
+    /// Segment 0 of the upload came on a plain line (J-51). `None` before the first upload, and after the Execute of an upload from a line
+    /// that was not plain.
     plain: Option<bool>,
 }
 

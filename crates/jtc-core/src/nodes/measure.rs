@@ -245,9 +245,9 @@ impl Measurement {
         self.used.velocity.abs().max(self.rate.abs())
     }
 
-    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. It must differ from the `due` velocity
-    /// (rad/s) in the same direction as the reported velocity, and not by much more. Otherwise an encoder has jumped and the joint has not
-    /// moved, and the `due` velocity is returned.
+    /// Returns the velocity over the last 5 ms, rad/s, which is younger than the reported velocity. Its difference from the `due` velocity
+    /// (rad/s) is limited to [`YOUNGER`] times the difference of the reported velocity. If the differences have opposite signs, an encoder
+    /// has jumped and the joint has not moved: then the `due` velocity is returned.
     pub fn young_velocity(&self, due: f64) -> f64 {
         // The remainder of a fading offset is subtracted, because it is even older.
         let (young, reported) = (self.rate - due, self.used.velocity - self.velocity_offset.left - due);

@@ -37,7 +37,7 @@ states! {
         HoldPos = 2;
         /// Follows the trajectory.
         Operate = 3;
-        /// Gravity compensation only.
+        /// Compensates gravity and the load found, and damps the joints, so that a hand can lead the arm.
         Teaching = 4;
         /// The torque is zero until the cause has ended and the host has cleared the error.
         Error = 5;
